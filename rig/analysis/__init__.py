@@ -1,0 +1,1 @@
+"""From edges to Δz, V and their uncertainties."""

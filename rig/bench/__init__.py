@@ -1,0 +1,1 @@
+"""Benchmarks: accuracy against hidden truth, and speed as ratios."""

@@ -1,0 +1,1 @@
+"""The station: the one owner of the port and of the session."""

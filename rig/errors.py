@@ -1,0 +1,82 @@
+"""One error root, each error with a hint for the user and an exit code for scripts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class RigError(Exception):
+    """Any failure the user can act on.
+
+    Parameters
+    ----------
+    message
+        What happened, in one sentence.
+    hint
+        What to do next; empty when the message already says it.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message}\n  hint: {self.hint}" if self.hint else self.message
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Problem:
+    """One fault of an input file, at its place (lines and columns count from 1)."""
+
+    file: str
+    line: int
+    column: int
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        key = f" {self.key}:" if self.key else ""
+        return f"{self.file}:{self.line}:{self.column}:{key} {self.message}"
+
+
+class InputError(RigError):
+    """Bad input: one located line a problem, exit code 2."""
+
+    exit_code = 2
+
+    def __init__(self, message: str = "", hint: str = "", *, problems: Iterable[Problem] = ()):
+        self.problems = tuple(sorted(problems))
+        super().__init__(message or "\n".join(map(str, self.problems)), hint)
+
+
+class DomainError(InputError, ValueError):
+    """A model was asked for a value it cannot give (for example a singular Eq. 13)."""
+
+
+class RunVoidError(RigError):
+    """A run was void and stayed void, exit code 3."""
+
+    exit_code = 3
+
+
+class DeviceError(RigError):
+    """The device refused, broke off or answered nonsense, exit code 4."""
+
+    exit_code = 4
+
+
+class DeviceTimeoutError(DeviceError, TimeoutError):
+    """The device did not answer in time."""
+
+
+class SessionError(RigError, OSError):
+    """The session file cannot be used as asked."""
+
+    exit_code = 2

@@ -1,0 +1,82 @@
+"""Files that are either the old one or the new one, never half of each."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+def write_atomic(path: str | os.PathLike[str], text: str) -> None:
+    """Write `text` as UTF-8 so that a crash leaves the old file or the new one.
+
+    A path that is a device or a pipe (``/dev/stdout``) is written straight through, since
+    replacing it would be wrong.
+
+    Parameters
+    ----------
+    path
+        The file to make or replace; a symbolic link is followed.
+    text
+        The whole content, line ends as they stand.
+
+    Raises
+    ------
+    InputError
+        If the place cannot be written: no such folder, no permission, disk full.
+    """
+    target = Path(os.path.realpath(path))
+    data = text.encode("utf-8")
+    try:
+        if target.is_dir():
+            raise InputError(f"cannot write {path}: it is a folder", "name a file in it")
+        if target.exists() and not target.is_file():
+            target.write_bytes(data)
+            return
+        _replace(target, data)
+    except OSError as error:
+        raise InputError(
+            f"cannot write {path}: {error.strerror or error}",
+            "choose another place, or free some space there; an older file was left as it was",
+        ) from error
+
+
+def sync_directory(path: Path) -> None:
+    """Make the names in a folder durable, where the file system can."""
+    with suppress(OSError):  # some network and FAT mounts refuse to sync a folder
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _replace(target: Path, data: bytes) -> None:
+    with _temporary(target) as temporary:
+        # Plain open, not tempfile: the result keeps the permissions of the user's umask.
+        with temporary.open("xb") as stream:
+            stream.write(data)
+            stream.flush()
+            # Without it the rename may reach the disk before the content does, and a power cut
+            # would leave an empty file under the right name.
+            os.fsync(stream.fileno())
+        temporary.replace(target)
+    sync_directory(target.parent)
+
+
+@contextmanager
+def _temporary(target: Path) -> Iterator[Path]:
+    # Hidden and in the same folder: a rename is atomic only within one file system. The name is
+    # cut because the target's own may already be as long as a name can be.
+    temporary = target.with_name(f".{target.name[:40]}.{os.getpid()}.tmp")
+    temporary.unlink(missing_ok=True)  # left by a killed process that had this id
+    try:
+        yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)

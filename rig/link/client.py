@@ -1,0 +1,288 @@
+"""The host's side of the conversation: requests, repeats, and the reading of a drop."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.errors import DeviceError, DeviceTimeoutError
+from rig.link import messages as wire
+from rig.link.exchange import Exchange
+from rig.link.frames import DELIMITER
+from rig.link.refusals import DeviceRefusedError
+from rig.records import Ping
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.assembly import Assembly
+    from rig.link.clock import Clock
+    from rig.link.exchange import OnRecord, Tap
+    from rig.link.port import Port
+    from rig.link.transcript import Record, Transcript
+    from rig.records import Drop
+
+BOOT_WAIT_S = 2.0
+"""The Mega's boot loader listens this long before it starts the firmware."""
+_LONGEST_RECORD_S = 65.535  # record_ms is a u16
+_LATE_S = 0.25  # how much later than announced a certificate may come before the host asks
+_SMALLEST_READ = 4
+
+
+class Device:
+    """A device on an open port. Not for use from several threads at once.
+
+    Parameters
+    ----------
+    port
+        From `rig.link.port.open_port`.
+    clock
+        From `rig.link.port.port_clock`.
+    tap
+        Called with every chunk written or read, before anything else is done with it, so that
+        what was recorded is never behind what was acted upon.
+    on_record
+        Called with everything that becomes known, see `Transcript.feed`.
+    tries
+        How often a request is sent before the device counts as silent.
+    """
+
+    def __init__(
+        self,
+        port: Port,
+        clock: Clock,
+        tap: Tap | None = None,
+        *,
+        on_record: OnRecord | None = None,
+        tries: int = 8,
+    ) -> None:
+        self._samples: list[Ping] = []
+        self._record_ms: dict[int, int] = {}  # of the last armed drop, by label
+
+        def know(record: Record) -> None:
+            if isinstance(record, Ping):
+                self._samples.append(record)
+            if on_record is not None:
+                on_record(record)
+
+        self._line = Exchange(port, clock, tap, know, tries)
+
+    @property
+    def transcript(self) -> Transcript:
+        """The machine all bytes go through."""
+        return self._line.transcript
+
+    def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
+        """Find out who is there.
+
+        Parameters
+        ----------
+        boot_wait_s
+            How long to wait for a board that restarts because its port was opened; 0 when it is
+            known to be running.
+
+        Returns
+        -------
+        Identity
+            The device's account of itself.
+
+        Raises
+        ------
+        DeviceError
+            Protocol versions differ, or nobody answers.
+        """
+        line = self._line
+        line.expect_boot = True
+        try:
+            line.write(DELIMITER)  # ends whatever junk the line has seen so far
+            line.wait(boot_wait_s, lambda got: isinstance(got.message, wire.Boot))
+            identity = line.request(wire.Identify(), wire.Identity)
+        finally:
+            line.expect_boot = False
+        if identity.protocol_version != wire.PROTOCOL_VERSION:
+            raise DeviceRefusedError(wire.Reason.VERSION, identity.protocol_version)
+        return identity
+
+    def ping(self) -> Ping | None:
+        """Take a clock sample.
+
+        Returns
+        -------
+        Ping or None
+            `None` when the request had to be repeated: such a sample would be ambiguous.
+        """
+        self._samples.clear()
+        self._line.request(wire.Ping(), wire.Pong)
+        return self._samples.pop() if self._samples else None
+
+    def status(self) -> wire.State:
+        """Ask what the device is doing."""
+        return self._line.request(wire.Status(), wire.State)
+
+    def arm(
+        self,
+        *,
+        label: int,
+        gates: int,
+        release: int,
+        pulse_us: int,
+        timeout_ms: int,
+        record_ms: int,
+    ) -> int:
+        """Prepare a drop; the parameters are those of `rig.link.messages.Arm`.
+
+        Returns
+        -------
+        int
+            The token that fires.
+
+        Raises
+        ------
+        DeviceRefusedError
+            A gate is blocked, another drop is held, a parameter is out of range.
+        """
+        request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
+        token = self._line.request(request, wire.Armed).token
+        self._record_ms = {label: record_ms}
+        return token
+
+    def fire(self, token: int) -> int:
+        """Let go; from now until `collect` returns the host stays silent.
+
+        Parameters
+        ----------
+        token
+            From `arm`.
+
+        Returns
+        -------
+        int
+            The tick (u32) of the release.
+        """
+        return self._line.request(wire.Fire(token), wire.Fired).tick
+
+    def abort(self) -> None:
+        """Switch the release off, disarm, end a recording."""
+        self._line.request(wire.Abort(), wire.Done)
+
+    def acknowledge(self, label: int, crc32: int) -> None:
+        """Let the device forget a drop: call it when the drop is safe on disk, not before.
+
+        Parameters
+        ----------
+        label, crc32
+            As the drop's certificate has them.
+
+        Raises
+        ------
+        DeviceRefusedError
+            The device holds no such drop, or holds other data.
+        """
+        self._line.request(wire.Acknowledge(label, crc32), wire.Done)
+
+    def collect(
+        self, label: int, timeout: float | None = None, stop: Callable[[], bool] | None = None
+    ) -> Drop:
+        """Wait for a fired drop and read it whole.
+
+        Parameters
+        ----------
+        label
+            The drop's label.
+        timeout
+            Seconds without a certificate after which the host asks; by default the recording
+            time and a margin.
+        stop
+            Asked every few milliseconds; when true, the recording is aborted and what there is
+            is collected.
+
+        Returns
+        -------
+        Drop
+            As `Transcript.pending` has it; see its faults.
+
+        Raises
+        ------
+        DeviceError
+            The board restarted, lost the drop, or fell silent.
+        """
+        if timeout is None:
+            timeout = self._record_ms.get(label, 0) / 1000 + _LATE_S
+        drop = self.transcript.assembly(label)
+        now = self._line.clock.now_ns
+        hopeless = now() + round((_LONGEST_RECORD_S + timeout) * 1e9)
+        ask = now() + round(timeout * 1e9)
+        while drop.certificate is None:
+            self._line.receive()
+            if stop is not None and stop():
+                stop = None
+                self.abort()
+                ask = now() + round(_LATE_S * 1e9)
+            elif now() >= ask and drop.certificate is None:
+                state = self.status()
+                if (state.phase, state.label) != (wire.Phase.RECORDING, label):
+                    break  # the certificate was lost on the way, or the drop is gone
+                if now() >= hopeless:
+                    raise DeviceTimeoutError(
+                        "the device records and never ends", "abort the drop; rig selftest"
+                    )
+                ask = now() + round(_LATE_S * 1e9)
+        return self.fetch(label)
+
+    def fetch(self, label: int) -> Drop:
+        """Read a drop the device holds, as far as it is not known already.
+
+        Parameters
+        ----------
+        label
+            The drop's label.
+
+        Returns
+        -------
+        Drop
+            As `Transcript.pending` has it; see its faults.
+
+        Raises
+        ------
+        DeviceError
+            The device does not hold it, or fell silent.
+        """
+        drop = self.transcript.assembly(label)
+        if drop.certificate is None:
+            self._line.request(wire.Read(label, 0, 0), wire.DropCertificate)
+        self._read_missing(drop)
+        if not drop.sound():
+            # Two CRC-16 collisions in one drop are all but impossible: once more is enough.
+            drop.forget_events()
+            self._read_missing(drop)
+        return self.transcript.pending(label)
+
+    def poll(self) -> list[Record]:
+        """Take what the device has sent of its own accord (it may have disarmed itself).
+
+        Returns
+        -------
+        list of Record
+            What became known, perhaps nothing; waits no longer than the port's time-out.
+        """
+        return self._line.receive()
+
+    def _read_missing(self, drop: Assembly) -> None:
+        """Ask for missing events in ever smaller pieces: on a bad line short frames get through."""
+        size = wire.EVENTS_PER_FRAME
+        failures = 0
+        while missing := drop.missing(at_most=size):
+            first, count = missing[0]
+            try:
+                self._line.request(wire.Read(drop.label, first, count), wire.EventsFrame, tries=2)
+            except DeviceTimeoutError:
+                failures += 1
+                if failures > self._line.tries:
+                    raise
+                size = max(_SMALLEST_READ, size // 2)
+            else:
+                if drop.missing(at_most=size)[:1] == missing[:1]:
+                    raise DeviceError(
+                        "the device did not send the events it was asked for",
+                        "its firmware is faulty: rig flash, then rig selftest",
+                    )
+                failures = 0

@@ -1,0 +1,198 @@
+"""Requests and their answers: repeats, time-outs, and the reading of the port."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
+
+from rig.errors import DeviceError, DeviceTimeoutError
+from rig.link import messages as wire
+from rig.link.frames import Frame, encode
+from rig.link.refusals import refusal
+from rig.link.transcript import Received, Record, Transcript
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.clock import Clock
+    from rig.link.port import Port
+    from rig.link.transcript import Direction
+
+    Tap: TypeAlias = Callable[[Direction, int, bytes], None]
+    OnRecord: TypeAlias = Callable[[Record], None]
+
+Answer = TypeVar("Answer", bound=wire.DeviceMessage)
+
+_FIRST_WAIT_S = 0.1
+_LONGEST_WAIT_S = 0.5
+_BACK_OFF = 1.5
+
+
+class Exchange:
+    """One port, and the conversation over it.
+
+    Parameters
+    ----------
+    port, clock
+        The port and its time.
+    tap
+        Called with every chunk written or read, before anything else is done with it.
+    on_record
+        Called with everything that becomes known.
+    tries
+        How often a request is sent before the device counts as silent.
+
+    Attributes
+    ----------
+    transcript
+        The machine all bytes go through.
+    expect_boot
+        While true, a restart of the board is not an error.
+    """
+
+    def __init__(
+        self, port: Port, clock: Clock, tap: Tap | None, on_record: OnRecord | None, tries: int
+    ) -> None:
+        self.transcript = Transcript()
+        self.clock = clock
+        self.tries = tries
+        self.expect_boot = False
+        self._port = port
+        self._tap = tap
+        self._on_record = on_record
+        self._seq = 0
+
+    def request(
+        self, message: wire.HostMessage, expected: type[Answer], tries: int | None = None
+    ) -> Answer:
+        """Send a request until it is answered; every repeat has the same seq.
+
+        Parameters
+        ----------
+        message
+            The request.
+        expected
+            Which message answers it.
+        tries
+            How often to send it, if not as often as usual.
+
+        Returns
+        -------
+        DeviceMessage
+            The answer.
+
+        Raises
+        ------
+        DeviceRefusedError
+            The device refused.
+        DeviceTimeoutError
+            It did not answer any of the tries.
+        DeviceError
+            It answered something else, restarted, or the connection broke.
+        """
+        self._seq = self._seq % 255 + 1
+        seq = self._seq
+        code, payload = wire.pack(message)
+        data = encode(Frame(code, seq, 0, payload))
+        wait = _FIRST_WAIT_S
+        for _ in range(tries or self.tries):
+            self.write(data)
+            answer = self.wait(wait, lambda got: got.ack == seq)
+            wait = min(wait * _BACK_OFF, _LONGEST_WAIT_S)
+            if isinstance(answer, expected):
+                return answer
+            if isinstance(answer, wire.Refused):
+                raise refusal(answer)
+            if answer is not None:
+                raise DeviceError(
+                    f"the device answered {type(message).__name__} with {type(answer).__name__}",
+                    "is this the rig's own board? rig selftest",
+                )
+        raise DeviceTimeoutError(
+            f"the device did not answer {type(message).__name__}",
+            "check cable and power, press the board's reset button; no firmware yet? rig flash",
+        )
+
+    def wait(self, seconds: float, wanted: Callable[[Received], bool]) -> wire.Message | None:
+        """Read until a wanted message comes or the time is over.
+
+        Parameters
+        ----------
+        seconds
+            How long.
+        wanted
+            Whether it is the one.
+
+        Returns
+        -------
+        Message or None
+            The first that was wanted.
+        """
+        until = self.clock.now_ns() + round(seconds * 1e9)
+        while self.clock.now_ns() < until:
+            for record in self.receive():
+                if isinstance(record, Received) and wanted(record):
+                    return record.message
+        return None
+
+    def receive(self) -> list[Record]:
+        """Take what is there, waiting no longer than the port's time-out.
+
+        Returns
+        -------
+        list of Record
+            What became known.
+
+        Raises
+        ------
+        DeviceError
+            The board restarted, or the connection broke.
+        """
+        try:
+            data = self._port.read(max(1, self._port.in_waiting))
+        except OSError as error:  # SerialException is one
+            raise _lost(error) from error
+        records = self._chunk("rx", data) if data else []
+        boots = (r for r in records if isinstance(r, Received) and isinstance(r.message, wire.Boot))
+        if not self.expect_boot and any(boots):
+            raise DeviceError(
+                "the board restarted",
+                "check its power supply and the release's wiring (a coil without a diode resets "
+                "boards), then connect again",
+            )
+        return records
+
+    def write(self, data: bytes) -> None:
+        """Send bytes.
+
+        Parameters
+        ----------
+        data
+            The bytes.
+
+        Raises
+        ------
+        DeviceError
+            The connection broke.
+        """
+        self._chunk("tx", data)
+        try:
+            self._port.write(data)
+        except OSError as error:
+            raise _lost(error) from error
+
+    def _chunk(self, direction: Direction, data: bytes) -> list[Record]:
+        now_ns = self.clock.now_ns()
+        if self._tap is not None:
+            self._tap(direction, now_ns, data)
+        records = self.transcript.feed(direction, now_ns, data)
+        if self._on_record is not None:
+            for record in records:
+                self._on_record(record)
+        return records
+
+
+def _lost(error: OSError) -> DeviceError:
+    return DeviceError(
+        f"connection lost: {error}",
+        "check the cable; the board is found again by its serial number when it is back",
+    )

@@ -1,0 +1,224 @@
+"""Frames: COBS( type | seq | ack | payload | CRC-16 ) 0x00.
+
+COBS (Cheshire & Baker, IEEE/ACM Trans. Networking 7, 1999) removes every zero from a frame, so a
+zero always means "a frame ends here" and a receiver is in step again after one lost frame. The
+check is CRC-16/CCITT-FALSE over everything before it, little-endian like all numbers here.
+"""
+
+from __future__ import annotations
+
+from binascii import crc_hqx
+from typing import NamedTuple
+
+FRAME_LIMIT = 255
+"""Bytes of a whole frame with its delimiter: an 8-bit length suffices in firmware."""
+OVERHEAD = 7
+"""type, seq, ack, CRC (2), the COBS code byte and the delimiter."""
+PAYLOAD_LIMIT = FRAME_LIMIT - OVERHEAD
+DELIMITER = b"\0"
+_BLOCK = 254  # the longest run a COBS code byte can announce
+
+
+class FrameError(ValueError):
+    """Bytes that are not a frame, or a frame that would not fit."""
+
+
+class Frame(NamedTuple):
+    """One frame.
+
+    Attributes
+    ----------
+    type
+        Message code.
+    seq
+        The sender's own counter, 1 … 255 and around again; 0 is "none".
+    ack
+        `seq` of the request this frame answers; 0 when it answers none.
+    payload
+        At most `PAYLOAD_LIMIT` bytes.
+    """
+
+    type: int
+    seq: int
+    ack: int
+    payload: bytes
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16/CCITT-FALSE (polynomial 0x1021, start 0xFFFF, not reflected).
+
+    Parameters
+    ----------
+    data
+        Any bytes.
+
+    Returns
+    -------
+    int
+        The check, 0 … 0xFFFF; 0x29B1 for ``b"123456789"``.
+    """
+    return crc_hqx(data, 0xFFFF)
+
+
+def cobs_encode(data: bytes) -> bytes:
+    """Stuff bytes so that no zero is left.
+
+    Parameters
+    ----------
+    data
+        Any bytes, of any length.
+
+    Returns
+    -------
+    bytes
+        Zero-free, without delimiter; longer by 1 + at most one in 254.
+    """
+    out = bytearray()
+    groups = data.split(DELIMITER)
+    last = len(groups) - 1
+    for index, group in enumerate(groups):
+        rest = group
+        while len(rest) >= _BLOCK:
+            out.append(0xFF)
+            out += rest[:_BLOCK]
+            rest = rest[_BLOCK:]
+            if not rest and index == last:
+                return bytes(out)  # a full block at the very end needs no empty one behind it
+        out.append(len(rest) + 1)
+        out += rest
+    return bytes(out)
+
+
+def cobs_decode(data: bytes) -> bytes:
+    """Undo `cobs_encode`.
+
+    Parameters
+    ----------
+    data
+        Stuffed bytes without their delimiter.
+
+    Returns
+    -------
+    bytes
+        The original bytes.
+
+    Raises
+    ------
+    FrameError
+        When the bytes contain a zero, are empty, or end within a block.
+    """
+    if not data or 0 in data:
+        raise FrameError("not COBS: empty, or with a zero inside")
+    out = bytearray()
+    at, end = 0, len(data)
+    while at < end:
+        code = data[at]
+        after = at + code
+        if after > end:
+            raise FrameError("not COBS: the last block is cut short")
+        out += data[at + 1 : after]
+        at = after
+        if code != 0xFF and at < end:
+            out.append(0)
+    return bytes(out)
+
+
+def encode(frame: Frame) -> bytes:
+    """Write a frame as it goes over the line, delimiter included.
+
+    Parameters
+    ----------
+    frame
+        The frame.
+
+    Returns
+    -------
+    bytes
+        At most `FRAME_LIMIT` bytes, with one zero, at the end.
+
+    Raises
+    ------
+    FrameError
+        When the payload is too long or a header field is not a byte.
+    """
+    if len(frame.payload) > PAYLOAD_LIMIT:
+        raise FrameError(f"payload of {len(frame.payload)} bytes, at most {PAYLOAD_LIMIT} fit")
+    try:
+        body = bytes((frame.type, frame.seq, frame.ack)) + frame.payload
+    except ValueError as error:
+        raise FrameError("type, seq and ack are single bytes") from error
+    return cobs_encode(body + crc16(body).to_bytes(2, "little")) + DELIMITER
+
+
+def decode(stuffed: bytes) -> Frame:
+    """Read one frame.
+
+    Parameters
+    ----------
+    stuffed
+        The bytes between two delimiters.
+
+    Returns
+    -------
+    Frame
+        The frame.
+
+    Raises
+    ------
+    FrameError
+        When COBS, length or CRC is wrong.
+    """
+    if len(stuffed) >= FRAME_LIMIT:
+        raise FrameError("longer than a frame can be")
+    body = cobs_decode(stuffed)
+    if len(body) < 5 or crc16(body[:-2]) != int.from_bytes(body[-2:], "little"):
+        raise FrameError("too short, or wrong CRC")
+    return Frame(body[0], body[1], body[2], body[3:-2])
+
+
+class Decoder:
+    """Finds frames in a stream of bytes; survives anything, in bounded memory.
+
+    Attributes
+    ----------
+    good, bad
+        How many frames were read, and how many stretches between delimiters were not a frame.
+    """
+
+    def __init__(self) -> None:
+        self.good = 0
+        self.bad = 0
+        self._partial = b""
+        self._overlong = False
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Take the next bytes of the stream.
+
+        Parameters
+        ----------
+        data
+            Any number of bytes, cut anywhere.
+
+        Returns
+        -------
+        list of Frame
+            The frames that ended within these bytes.
+        """
+        *complete, partial = (self._partial + data).split(DELIMITER)
+        frames: list[Frame] = []
+        for stuffed in complete:
+            if self._overlong:  # the end of a stretch already counted as bad
+                self._overlong = False
+            elif stuffed:  # nothing between two delimiters is idle line, not a fault
+                try:
+                    frames.append(decode(stuffed))
+                except FrameError:
+                    self.bad += 1
+        self.good += len(frames)
+        if len(partial) >= FRAME_LIMIT or self._overlong:
+            # Keep no more than is needed to know that this stretch is hopeless.
+            self.bad += not self._overlong
+            self._overlong = True
+            partial = b""
+        self._partial = partial
+        return frames

@@ -1,0 +1,426 @@
+"""The wire's one table: every message, its code, its fields in order.
+
+The codec below and the firmware's C header both come from these definitions; nothing about the
+wire is written down a second time. Host requests have codes below 0x80, device frames above.
+
+How a drop goes: ARM → ARMED(token) → FIRE(token) → FIRED, then EVENTS as they come and a
+CERTIFICATE when `record_ms` is over. The device holds the drop until ACKNOWLEDGE names its label
+and CRC; until then READ gives any part of it again.
+
+Rules for a device: a frame that cannot be read, or with seq 0, is passed over in silence. A request
+with the type, seq and CRC of the one before it is a repeat (its answer was lost): ARMED, FIRED,
+DONE and REFUSED are then sent again without executing anything; answers that change nothing may
+simply be made anew. All gates of ARM must be clear then and at FIRE, so `initial_state` of the
+armed gates is 0; the other gates are left out of every event.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, Any, TypeAlias
+
+from rig.link.frames import PAYLOAD_LIMIT
+from rig.link.wiretypes import (
+    BYTE_ENUM,
+    U8,
+    U16,
+    U32,
+    Event,
+    Events,
+    Field,
+    Line,
+    MessageError,
+    Name,
+    UniqueId,
+    read_field,
+    wire_fields,
+    write_field,
+)
+
+__all__ = [
+    "CODES",
+    "EVENTS_PER_FRAME",
+    "FIELDS",
+    "PROTOCOL_VERSION",
+    "TABLE",
+    "Abort",
+    "Acknowledge",
+    "Arm",
+    "Armed",
+    "Boot",
+    "DeviceMessage",
+    "DisarmReason",
+    "Disarmed",
+    "Done",
+    "DropCertificate",
+    "Event",
+    "EventsFrame",
+    "Fire",
+    "Fired",
+    "HostMessage",
+    "Identify",
+    "Identity",
+    "Message",
+    "MessageError",
+    "Phase",
+    "Ping",
+    "Pong",
+    "Read",
+    "Reason",
+    "Refused",
+    "State",
+    "Status",
+    "pack",
+    "pack_label",
+    "unpack",
+    "unpack_label",
+]
+
+PROTOCOL_VERSION = 1
+EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
+"""Six-byte events that fit behind an EVENTS frame's label and index."""
+
+
+class Phase(IntEnum):
+    """What the device is doing."""
+
+    IDLE = 0
+    ARMED = 1
+    RECORDING = 2
+    HOLDING = 3
+
+
+class Reason(IntEnum):
+    """Why a request was refused; `Refused.detail` says more where noted."""
+
+    NOT_ARMED = 1
+    WRONG_TOKEN = 2
+    GATE_BLOCKED = 3  # detail: mask of the blocked gates
+    GATE_UNSTEADY = 4  # detail: mask of the gates that changed since ARM
+    BAD_PARAMETER = 5
+    BUSY = 6
+    HOLDING_A_DROP = 7  # detail: its run
+    NO_SUCH_DROP = 8
+    WRONG_CRC = 9
+    VERSION = 10  # detail: the device's protocol version
+    UNKNOWN_MESSAGE = 11  # detail: its code
+
+
+class DisarmReason(IntEnum):
+    """Why the device disarmed by itself."""
+
+    TIMEOUT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Identify:
+    """Ask who is there; the first request on a line."""
+
+    protocol_version: U8 = PROTOCOL_VERSION
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """Ask for the device's tick."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Ask what the device is doing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Prepare a drop.
+
+    Attributes
+    ----------
+    label
+        Run and attempt, see `pack_label`; never 0.
+    gates
+        Mask of the gates that count: they must be clear now and until FIRE.
+    release
+        Mask of the release outputs to pulse; 0 when something else lets go.
+    pulse_us
+        How long to pulse them.
+    timeout_ms
+        The device disarms itself when no FIRE came for so long.
+    record_ms
+        How long after FIRE to record.
+    """
+
+    label: U32
+    gates: U16
+    release: U8
+    pulse_us: U32
+    timeout_ms: U16
+    record_ms: U16
+
+
+@dataclass(frozen=True, slots=True)
+class Fire:
+    """Let go; `token` is from ARMED, so that no stray frame can fire."""
+
+    token: U32
+
+
+@dataclass(frozen=True, slots=True)
+class Abort:
+    """Switch the release off; disarm; end a recording now. A held drop may then be re-armed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Ask for events again (answer EVENTS, perhaps fewer); count 0 asks for the CERTIFICATE."""
+
+    label: U32
+    first: U16
+    count: U8
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledge:
+    """The drop is safe with the host: the device may forget it."""
+
+    label: U32
+    crc32: U32
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who the device is; `channels` names its gate inputs, separated by spaces."""
+
+    protocol_version: U8
+    board: Name
+    firmware: Name
+    unique_id: UniqueId
+    tick_hz: U32
+    gates: U8
+    releases: U8
+    max_pulse_us: U32
+    capacity: U16
+    channels: Line
+
+
+@dataclass(frozen=True, slots=True)
+class Pong:
+    """The tick when PING was executed."""
+
+    tick: U32
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What the device is doing; `label` 0 and `events` 0 when idle."""
+
+    phase: Annotated[Phase, BYTE_ENUM]
+    gates: U16
+    label: U32
+    events: U16
+
+
+@dataclass(frozen=True, slots=True)
+class Armed:
+    """Answer to ARM."""
+
+    token: U32
+
+
+@dataclass(frozen=True, slots=True)
+class Fired:
+    """Answer to FIRE: the tick of the release."""
+
+    tick: U32
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The request was understood and not executed."""
+
+    reason: Annotated[Reason, BYTE_ENUM]
+    detail: U16
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """ABORT or ACKNOWLEDGE was executed."""
+
+
+@dataclass(frozen=True, slots=True)
+class EventsFrame:
+    """Events number `first` and on. Stamps are already corrected for the board's mean latency."""
+
+    label: U32
+    first: U16
+    events: Events
+
+
+@dataclass(frozen=True, slots=True)
+class DropCertificate:
+    """The device's own account of a drop; `crc32` is over its events as they are on the wire."""
+
+    label: U32
+    fire_tick: U32
+    gates: U16
+    initial_state: U16
+    events: U16
+    crc32: U32
+    overflows: U16
+    glitches: U16
+    late: U16
+
+
+@dataclass(frozen=True, slots=True)
+class Disarmed:
+    """The device disarmed by itself."""
+
+    label: U32
+    reason: Annotated[DisarmReason, BYTE_ENUM]
+
+
+@dataclass(frozen=True, slots=True)
+class Boot:
+    """The device has (re)started; `cause` has the AVR's MCUSR bits.
+
+    A delimiter goes before it, since the reset may have cut another frame short.
+    """
+
+    cause: U8
+
+
+HostMessage: TypeAlias = Identify | Ping | Status | Arm | Fire | Abort | Read | Acknowledge
+DeviceMessage: TypeAlias = (
+    Identity
+    | Pong
+    | State
+    | Armed
+    | Fired
+    | Refused
+    | Done
+    | EventsFrame
+    | DropCertificate
+    | Disarmed
+    | Boot
+)
+Message: TypeAlias = HostMessage | DeviceMessage
+
+TABLE: dict[int, type[Message]] = {
+    0x01: Identify,
+    0x02: Ping,
+    0x03: Status,
+    0x04: Arm,
+    0x05: Fire,
+    0x06: Abort,
+    0x07: Read,
+    0x08: Acknowledge,
+    0x81: Identity,
+    0x82: Pong,
+    0x83: State,
+    0x84: Armed,
+    0x85: Fired,
+    0x86: Refused,
+    0x87: Done,
+    0x88: EventsFrame,
+    0x89: DropCertificate,
+    0x8A: Disarmed,
+    0x8B: Boot,
+}
+CODES = {message: code for code, message in TABLE.items()}
+FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}
+
+
+def pack(message: Message) -> tuple[int, bytes]:
+    """Write a message.
+
+    Parameters
+    ----------
+    message
+        Any message of the table.
+
+    Returns
+    -------
+    int, bytes
+        Its code and payload.
+
+    Raises
+    ------
+    MessageError
+        When a value does not fit its field.
+    """
+    kind: type[Any] = type(message)
+    payload = b"".join(write_field(f, getattr(message, f.name)) for f in FIELDS[kind])
+    return CODES[kind], payload
+
+
+def unpack(code: int, payload: bytes) -> Message:
+    """Read a message.
+
+    Parameters
+    ----------
+    code, payload
+        From a frame.
+
+    Returns
+    -------
+    Message
+        The message.
+
+    Raises
+    ------
+    MessageError
+        When the code is unknown or the payload does not fit it exactly.
+    """
+    kind: type[Any] | None = TABLE.get(code)
+    if kind is None:
+        raise MessageError(f"unknown message code 0x{code:02X}")
+    values: list[Any] = []
+    at = 0
+    for field in FIELDS[kind]:
+        value, at = read_field(field, payload, at)
+        values.append(value)
+    if at != len(payload):
+        raise MessageError(f"{len(payload) - at} bytes too many for {kind.__name__}")
+    message: Message = kind(*values)
+    return message
+
+
+def pack_label(run: int, attempt: int) -> int:
+    """Make a drop's label, ``run | attempt << 16``.
+
+    Parameters
+    ----------
+    run
+        The planned run, 0 … 65535.
+    attempt
+        1 … 65535, so that a label is never 0.
+
+    Returns
+    -------
+    int
+        The label (u32).
+
+    Raises
+    ------
+    ValueError
+        When a number is out of range.
+    """
+    if not (0 <= run <= 0xFFFF and 1 <= attempt <= 0xFFFF):
+        raise ValueError(f"run {run}, attempt {attempt}: at most 65535, attempt at least 1")
+    return run | attempt << 16
+
+
+def unpack_label(label: int) -> tuple[int, int]:
+    """Undo `pack_label`.
+
+    Parameters
+    ----------
+    label
+        A drop's label.
+
+    Returns
+    -------
+    int, int
+        Run and attempt.
+    """
+    return label & 0xFFFF, label >> 16

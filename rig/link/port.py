@@ -1,0 +1,104 @@
+"""Opening a port by name or URL (``/dev/ttyACM0``, ``sim://``, ``replay://``)."""
+
+from __future__ import annotations
+
+import errno
+from typing import Any, Protocol
+
+import serial
+
+from rig.errors import DeviceError, RigError
+from rig.link.clock import Clock, SystemClock
+
+BAUDRATE = 500_000
+"""Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
+READ_TIMEOUT_S = 0.02
+_HANDLERS = "sim"  # the package where pyserial finds sim:// and replay://
+
+_LOOK = "`rig ports` lists what is there"
+_ABSENT = ("there is no such port", f"is the board plugged in? {_LOOK}")
+_FORBIDDEN = ("permission denied", "join the group that owns it (often dialout), log in again")
+_TAKEN = ("another program uses it", "close that program, or let its daemon do the work")
+_CAUSES = {
+    errno.ENOENT: _ABSENT,
+    errno.ENODEV: _ABSENT,
+    errno.EACCES: _FORBIDDEN,
+    errno.EPERM: _FORBIDDEN,
+    errno.EBUSY: _TAKEN,
+    errno.EAGAIN: _TAKEN,
+}
+
+
+class Port(Protocol):
+    """What this program needs of a pyserial port."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+        ...
+
+    def read(self, size: int = ..., /) -> bytes:
+        """Read up to `size` bytes, waiting no longer than the port's time-out."""
+        ...
+
+    def write(self, data: bytes, /) -> int | None:
+        """Write bytes."""
+        ...
+
+    def close(self) -> None:
+        """Close the port."""
+        ...
+
+
+def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
+    """Open a port for this program alone.
+
+    Parameters
+    ----------
+    url
+        A device path or a pyserial URL.
+    baudrate
+        Line rate in bit/s.
+
+    Returns
+    -------
+    Port
+        The open pyserial port, with a short read time-out.
+
+    Raises
+    ------
+    DeviceError
+        When it cannot be opened; the hint says what to try.
+    """
+    if _HANDLERS not in serial.protocol_handler_packages:
+        serial.protocol_handler_packages.append(_HANDLERS)
+    try:
+        port: Any = serial.serial_for_url(  # a subclass of SerialBase
+            url, baudrate=baudrate, timeout=READ_TIMEOUT_S, exclusive=True
+        )
+    except RigError:
+        raise  # a simulated port knows better what is wrong
+    except OSError as error:  # SerialException is one
+        cause, hint = _CAUSES.get(error.errno or 0, (str(error), _LOOK))
+        raise DeviceError(f"cannot open {url}: {cause}", hint) from error
+    except ValueError as error:
+        raise DeviceError(f"cannot open {url}: {error}", _LOOK) from error
+    opened: Port = port
+    return opened
+
+
+def port_clock(port: object) -> Clock:
+    """Find the clock that goes with a port.
+
+    Parameters
+    ----------
+    port
+        An open port.
+
+    Returns
+    -------
+    Clock
+        The port's own (a simulated port lives in virtual time), else the computer's.
+    """
+    clock: Clock | None = getattr(port, "clock", None)
+    return SystemClock() if clock is None else clock

@@ -1,0 +1,94 @@
+"""What a refusal means, and what the user can do about it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.errors import DeviceError
+from rig.link.messages import PROTOCOL_VERSION, Reason
+
+if TYPE_CHECKING:
+    from rig.link.messages import Refused
+
+ADVICE: dict[Reason, tuple[str, str]] = {
+    Reason.NOT_ARMED: (
+        "the device is not armed",
+        "it disarms itself when it has waited too long: arm again",
+    ),
+    Reason.WRONG_TOKEN: (
+        "the device was armed by somebody else",
+        "make sure that only one program controls the device, then arm again",
+    ),
+    Reason.GATE_BLOCKED: (
+        "{gates} blocked",
+        "move the chain or whatever else stands in the beam; check that the emitter has power",
+    ),
+    Reason.GATE_UNSTEADY: (
+        "{gates} changed after arming",
+        "let the chains come to rest, check for loose plugs and stray light, then arm again",
+    ),
+    Reason.BAD_PARAMETER: (
+        "the device cannot do what was asked",
+        "compare gates, release and pulse of the protocol file with what the board has",
+    ),
+    Reason.BUSY: ("the device is recording", "wait until the drop is over, or abort it"),
+    Reason.HOLDING_A_DROP: (
+        "the device still holds the drop of run {detail}",
+        "read and acknowledge that drop first: resume its session",
+    ),
+    Reason.NO_SUCH_DROP: (
+        "the device does not hold this drop",
+        "it was acknowledged before, or lost when the board restarted: repeat the run",
+    ),
+    Reason.WRONG_CRC: (
+        "the device holds different data than was acknowledged",
+        "read the drop again",
+    ),
+    Reason.VERSION: (
+        "the board's firmware speaks protocol version {detail}, this program version "
+        f"{PROTOCOL_VERSION}",
+        "bring both to the same version: rig flash",
+    ),
+    Reason.UNKNOWN_MESSAGE: (
+        "the device does not know this request",
+        "its firmware is older than this program: rig flash",
+    ),
+}
+
+
+class DeviceRefusedError(DeviceError):
+    """The device understood the request and refused it.
+
+    Attributes
+    ----------
+    reason
+        The device's reason.
+    detail
+        What the reason's definition says it is.
+    """
+
+    def __init__(self, reason: Reason, detail: int) -> None:
+        message, hint = ADVICE[reason]
+        gates = [str(n) for n in range(16) if detail >> n & 1]
+        named = f"gate {gates[0]} is" if len(gates) == 1 else f"gates {', '.join(gates)} are"
+        if reason is Reason.GATE_UNSTEADY:
+            named = named.rsplit(" ", 1)[0]
+        super().__init__(message.format(gates=named, detail=detail), hint)
+        self.reason = reason
+        self.detail = detail
+
+
+def refusal(answer: Refused) -> DeviceRefusedError:
+    """Make the error for a REFUSED answer.
+
+    Parameters
+    ----------
+    answer
+        The device's answer.
+
+    Returns
+    -------
+    DeviceRefusedError
+        With the device's reason in words and what to do about it.
+    """
+    return DeviceRefusedError(answer.reason, answer.detail)

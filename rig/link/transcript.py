@@ -1,0 +1,200 @@
+"""Bytes in both directions → clock samples, drops, messages; without any I/O.
+
+The live client and the replay of a session feed the same bytes through this one machine, so they
+get the same drops by construction. How the bytes were cut into chunks matters only for the host
+times of clock samples and for the lone delimiter with which a client begins a connection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from rig.link import messages as wire
+from rig.link.assembly import Assembly
+from rig.link.frames import DELIMITER, Decoder, Frame
+from rig.records import Drop, Ping
+
+if TYPE_CHECKING:
+    from rig.link.messages import Identity, Message
+
+Direction: TypeAlias = Literal["tx", "rx"]
+"""``tx``: host to device."""
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """One message from the device; `ack` is the request's seq, 0 when it answers none."""
+
+    host_ns: int
+    ack: int
+    message: Message
+
+
+Record: TypeAlias = Received | Ping | Drop
+
+
+class Transcript:
+    """Reads a conversation.
+
+    A drop is given out when the host's ACKNOWLEDGE for it goes over the wire: the one moment
+    that shows in the bytes alone that the host has read enough. A drop that was never
+    acknowledged is in `unfinished`.
+
+    Attributes
+    ----------
+    identity
+        The device's last IDENTITY, or `None`.
+    unreadable
+        Frames with a good CRC whose payload was no message.
+    """
+
+    def __init__(self) -> None:
+        self.identity: Identity | None = None
+        self.unreadable = 0
+        self._tx = Decoder()
+        self._rx = Decoder()
+        self._request: tuple[int, Message] = (0, wire.Status())
+        self._answered = False
+        self._ping_sent: tuple[int, int] | None = None  # seq and host time of the open sample
+        self._tokens: dict[int, int] = {}
+        self._drops: dict[int, Assembly] = {}
+        self._given: set[int] = set()
+
+    @property
+    def bad_frames(self) -> int:
+        """Stretches between two delimiters that were no frame, from the device."""
+        return self._rx.bad
+
+    def feed(self, direction: Direction, host_ns: int, data: bytes) -> list[Record]:
+        """Take the next bytes of one direction.
+
+        Parameters
+        ----------
+        direction
+            Who sent them.
+        host_ns
+            Host time of the chunk.
+        data
+            The bytes, cut anywhere.
+
+        Returns
+        -------
+        list of Record
+            What became known by them, in order.
+        """
+        if direction == "tx" and data == DELIMITER:
+            # A client begins a connection with this. Half a frame from the connection before
+            # must not swallow the first of this one: live, each connection starts afresh.
+            self._rx.feed(DELIMITER)
+            self._ping_sent = None
+        decoder, take = (self._tx, self._sent) if direction == "tx" else (self._rx, self._got)
+        records: list[Record] = []
+        for frame in decoder.feed(data):
+            try:
+                message = wire.unpack(frame.type, frame.payload)
+            except wire.MessageError:
+                self.unreadable += 1
+            else:
+                records += take(host_ns, frame, message)
+        return records
+
+    def pending(self, label: int) -> Drop:
+        """Give a drop as far as it is known; what ACKNOWLEDGE would give out now.
+
+        Parameters
+        ----------
+        label
+            The drop's label.
+
+        Returns
+        -------
+        Drop
+            With faults for what is missing.
+
+        Raises
+        ------
+        KeyError
+            When nothing of such a drop was seen, or it was given out already.
+        """
+        return self._drops[label].drop(self._tick_hz)
+
+    def assembly(self, label: int) -> Assembly:
+        """Give the open drop of a label, begun anew when there is none.
+
+        Parameters
+        ----------
+        label
+            The drop's label.
+
+        Returns
+        -------
+        Assembly
+            To ask what is missing, or to have it read again.
+        """
+        self._given.discard(label)
+        return self._drops.setdefault(label, Assembly(label))
+
+    def unfinished(self) -> list[Drop]:
+        """Give the drops that began and were never acknowledged.
+
+        Returns
+        -------
+        list of Drop
+            In the order in which they were armed.
+        """
+        return [drop.drop(self._tick_hz) for drop in self._drops.values() if drop.begun]
+
+    @property
+    def _tick_hz(self) -> int:
+        return self.identity.tick_hz if self.identity else 0
+
+    def _sent(self, host_ns: int, frame: Frame, message: Message) -> list[Record]:
+        repeated = self._request == (frame.seq, message)
+        self._request = (frame.seq, message)
+        self._answered = repeated and self._answered
+        match message:
+            case wire.Ping():
+                # It cannot be told which of two equal requests an answer belongs to.
+                self._ping_sent = None if repeated else (frame.seq, host_ns)
+            case wire.Read(label=label) if not repeated:
+                self.assembly(label)  # asking for it means wanting it, even once given out
+            case wire.Acknowledge(label=label) if label in self._drops:
+                drop = self._drops.pop(label)
+                self._given.add(label)
+                return [drop.drop(self._tick_hz)] if drop.begun else []
+        return []
+
+    def _got(self, host_ns: int, frame: Frame, message: Message) -> list[Record]:
+        records: list[Record] = [Received(host_ns, frame.ack, message)]
+        seq, request = self._request
+        # Only the first answer counts: a repeated ARMED must not begin the drop a second time.
+        asked = request if seq and frame.ack == seq and not self._answered else None
+        self._answered = self._answered or asked is not None
+        match message:
+            case wire.Identity():
+                self.identity = message
+            case wire.Pong(tick=tick) if self._ping_sent and self._ping_sent[0] == frame.ack:
+                records.append(Ping(self._ping_sent[1], host_ns, tick))
+                self._ping_sent = None
+            case wire.Armed(token=token) if isinstance(asked, wire.Arm):
+                self._armed(token, asked)
+            case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):
+                label = self._tokens.get(asked.token)
+                if label in self._drops:
+                    self._drops[label].fire_tick = tick
+            case wire.EventsFrame(label=label) if label not in self._given:
+                self.assembly(label).add(message)
+            case wire.DropCertificate(label=label) if label not in self._given:
+                self.assembly(label).certificate = message
+            case wire.Boot():
+                self._ping_sent = None
+                for drop in self._drops.values():
+                    drop.reset = True
+        return records
+
+    def _armed(self, token: int, request: wire.Arm) -> None:
+        self._tokens = {token: request.label}
+        self._given.discard(request.label)
+        drop = self._drops[request.label] = Assembly(request.label)
+        drop.gates = request.gates

@@ -1,0 +1,1 @@
+"""Mechanics of a falling chain: pure functions of plain data."""

@@ -1,0 +1,46 @@
+"""A chain of rods: what the mechanics needs and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rig.units import Quantity
+
+UNIFORM_ROD_INERTIA = 1.0 / 3.0
+"""ξ = 4I/(mL²) of a uniform rod about its middle (below Eq. 8)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Masses and places of the rods, bottom up.
+
+    Attributes
+    ----------
+    masses
+        Mass of each rod; only ratios matter, so any one unit will do.
+    heights
+        Height of each rod's middle above the middle of the bottom rod, m; strictly rising from 0.
+    inertia
+        ξ = 4I/(mL²), the dimensionless rotational inertia of every rod (Eqs. 8 and 10).
+    alpha, gamma
+        Impact coefficients where they are simply given (a bead chain); `None` means that they
+        follow from the surface by Eqs. 8 to 13.
+    """
+
+    masses: tuple[float, ...]
+    heights: tuple[float, ...]
+    inertia: float = UNIFORM_ROD_INERTIA
+    alpha: Quantity | None = None
+    gamma: float | None = None
+
+    @property
+    def rods(self) -> int:
+        """Number of rods."""
+        return len(self.masses)
+
+    @property
+    def length(self) -> float:
+        """Middle of the bottom rod to the middle of the top rod, m."""
+        return self.heights[-1]

@@ -1,0 +1,158 @@
+"""The discrete fall: free fall between impacts, a speed step at each (section III.D).
+
+Two digits-losing forms are avoided on purpose. A leg of length d takes 2d/(V + V'), never
+(V' − V)/g; and Δz is the running sum of (speed gained so far) × (leg time), never a difference of
+two heights. Δz then keeps full relative precision as α → 0, and g → 0 costs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+from rig.errors import DomainError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.model.chain import Chain
+
+
+@dataclass(frozen=True, slots=True)
+class Fall:
+    """The end of a fall, at the instant the top rod's middle reaches the contact point.
+
+    Attributes
+    ----------
+    separation_m
+        Δz: how far the freely falling twin is above it.
+    speed_m_s
+        V: speed of the top rod just before.
+    time_s
+        Time since release.
+    """
+
+    separation_m: float
+    speed_m_s: float
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """One rod's impact: when, and the chain's speed before and after, downward positive."""
+
+    time_s: float
+    speed_before: float
+    speed_after: float
+
+
+def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
+    """Relative speed gain ΔV/V of the chain at each rod's impact, from Eq. 9.
+
+    ΔV = J/M with J = α m V / (1 + γ m/M), so ΔV/V = α m / (M + γ m).
+
+    Parameters
+    ----------
+    alphas
+        α of each rod, bottom up, shape ``(rods,)``.
+
+    Returns
+    -------
+    list of float
+        Shape ``(rods,)``; the top rod's is 0, there being nothing above it to pull on.
+    """
+    # Summed from the top so that a light end on a heavy chain keeps its digits.
+    above = list(accumulate(reversed(chain.masses[1:])))[::-1]
+    gains = [
+        alpha * m / (M + gamma * m)
+        for alpha, m, M in zip(alphas, chain.masses, above, strict=False)
+    ]
+    return [*gains, 0.0]
+
+
+def hits(
+    chain: Chain,
+    gains: Sequence[float],
+    drop: float,
+    gravity: float,
+    initial_speed: float = 0.0,
+) -> list[Hit]:
+    """Every impact of a fall, bottom rod first.
+
+    Parameters
+    ----------
+    gains
+        ΔV/V at each impact, as from `kicks`.
+    drop
+        Bottom rod's middle above the contact point at release, m.
+    gravity
+        m/s².
+    initial_speed
+        Downward speed at release, m/s.
+    """
+    events: list[Hit] = []
+    time, speed, before = 0.0, initial_speed, -drop
+    for height, gain in zip(chain.heights, gains, strict=True):
+        arrival, duration = _leg(height - before, speed, gravity)
+        time += duration
+        speed = arrival * (1.0 + gain)
+        before = height
+        events.append(Hit(time, arrival, speed))
+    return events
+
+
+def fall(
+    chain: Chain,
+    alpha: float,
+    gamma: float,
+    drop: float,
+    gravity: float,
+    initial_speed: float = 0.0,
+) -> Fall:
+    """Δz, V and t of one fall, nothing else computed.
+
+    Parameters
+    ----------
+    alpha, gamma
+        Impact coefficients of Eq. 9.
+    drop, gravity, initial_speed
+        As in `hits`.
+
+    Raises
+    ------
+    DomainError
+        Where nothing would ever move: no gravity and no initial speed.
+    """
+    gained = separation = time = 0.0
+    speed, before = initial_speed, -drop
+    arrival = speed
+    gains = kicks(chain, [alpha] * chain.rods, gamma)
+    for height, gain in zip(chain.heights, gains, strict=True):
+        arrival, duration = _leg(height - before, speed, gravity)
+        time += duration
+        separation += gained * duration
+        step = arrival * gain
+        gained += step
+        speed = arrival + step
+        before = height
+    return Fall(separation, arrival, time)
+
+
+def free_fall_speed(chain: Chain, drop: float, gravity: float, initial_speed: float = 0.0) -> float:
+    """Speed of the top rod at the contact point when nothing is struck, m/s."""
+    return math.sqrt(initial_speed**2 + 2.0 * gravity * (drop + chain.length))
+
+
+def _leg(distance: float, speed: float, gravity: float) -> tuple[float, float]:
+    """Speed at the end of a free-fall leg and its duration."""
+    if distance == 0.0:
+        return speed, 0.0
+    arrival = math.sqrt(speed * speed + 2.0 * gravity * distance)
+    if arrival == 0.0:
+        raise DomainError(
+            "the chain never falls: no gravity and no initial speed",
+            "give a gravity above zero",
+        )
+    return arrival, 2.0 * distance / (speed + arrival)

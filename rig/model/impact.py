@@ -1,0 +1,126 @@
+"""Impact coefficients α and γ of a rod chain (sections III.A to III.D of the paper)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rig.errors import DomainError
+from rig.model.chain import UNIFORM_ROD_INERTIA
+
+if TYPE_CHECKING:
+    from rig.model.chain import Chain
+    from rig.model.surface import Surface
+
+
+@dataclass(frozen=True, slots=True)
+class Impact:
+    """How one rod's impact pulls on the chain above it: J = α m V / (1 + γ m/M), Eq. 9.
+
+    Attributes
+    ----------
+    alpha, gamma
+        The coefficients of Eq. 9.
+    basis
+        Where α comes from: ``surface``, ``level``, ``pile`` or ``given``.
+    notes
+        Every way in which the case leaves the model's domain; empty inside it.
+    """
+
+    alpha: float
+    gamma: float
+    basis: str
+    notes: tuple[str, ...] = ()
+
+
+def alpha_level(restitution: float, inertia: float = UNIFORM_ROD_INERTIA) -> float:
+    """α of a long chain on a level surface, Eq. 8."""
+    return (1.0 + restitution) / 4.0 * (1.0 - inertia)
+
+
+def alpha_inclined(
+    restitution: float,
+    friction: float,
+    incline_deg: float,
+    inertia: float = UNIFORM_ROD_INERTIA,
+) -> float:
+    """α of a long chain on an inclined surface, Eqs. 12 and 13 with ξ_y = ξ_z.
+
+    Eq. 13 is multiplied through by cos θ + μ sin θ, so that cot θ at 0° and tan θ at 90° are
+    never formed.
+
+    Raises
+    ------
+    DomainError
+        Where g(θ) ≤ 0: no finite impulse satisfies Eqs. S7 to S12.
+    """
+    theta = math.radians(incline_deg)
+    cos, sin = math.cos(theta), math.sin(theta)
+    free_rod = gamma_finite(inertia)
+    g = cos + free_rod * sin * (sin - friction * cos) / (cos + friction * sin)
+    if g <= 0.0:
+        raise DomainError(
+            f"Eq. 13 is singular: g(θ) ≤ 0 at incline {incline_deg:g}°, "
+            f"friction {friction:g}, inertia {inertia:g}",
+            "use a steeper incline or a smaller friction: the rod must slide (tan θ > μ)",
+        )
+    return alpha_level(restitution, inertia) * cos / g
+
+
+def gamma_finite(inertia: float, inertia_above: float | None = None) -> float:
+    """γ, by which the tension falls off near the chain's end, Eq. 10 (ξ' = ξ unless given)."""
+    above = inertia if inertia_above is None else inertia_above
+    return 0.25 * (1.0 + inertia) * (1.0 + 1.0 / above)
+
+
+def impact_on(
+    surface: Surface,
+    chain: Chain,
+    incline_deg: float,
+    *,
+    restitution: float | None = None,
+    friction: float | None = None,
+) -> Impact:
+    """Coefficients for a chain on a surface, with every departure from the domain noted.
+
+    Parameters
+    ----------
+    restitution, friction
+        Replace the surface's (and the pile's) central values; used to vary them.
+
+    Raises
+    ------
+    DomainError
+        Where Eq. 13 has no finite solution.
+    """
+    if chain.alpha is not None:
+        impact = Impact(chain.alpha.value, chain.gamma or 0.0, "given")
+        return _noted(impact, ())
+    gamma = gamma_finite(chain.inertia) if chain.gamma is None else chain.gamma
+    pile = surface.pile
+    if pile is not None and incline_deg < pile.below_deg:
+        beta = pile.restitution.value if restitution is None else restitution
+        return _noted(Impact(alpha_level(beta, chain.inertia), gamma, "pile"), ())
+    beta = surface.restitution.value if restitution is None else restitution
+    if incline_deg == 0.0:
+        return _noted(Impact(alpha_level(beta, chain.inertia), gamma, "level"), ())
+    mu = surface.friction.value if friction is None else friction
+    alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia)
+    notes: list[str] = []
+    sliding = math.degrees(math.atan(mu))
+    if incline_deg < sliding:
+        notes.append(
+            f"the rod does not slide: incline {incline_deg:g}° is below arctan μ = {sliding:.1f}°, "
+            "so f = μN does not hold"
+        )
+    return _noted(Impact(alpha, gamma, "surface"), tuple(notes))
+
+
+def _noted(impact: Impact, notes: tuple[str, ...]) -> Impact:
+    """Add the notes that apply to any α."""
+    if impact.alpha > 0.5:
+        notes = (*notes, f"α = {impact.alpha:.4g} is above ½: more energy than the rod brings")
+    if impact.alpha < 0.0:
+        notes = (*notes, f"α = {impact.alpha:.4g} is negative: the rod would push the chain up")
+    return Impact(impact.alpha, impact.gamma, impact.basis, notes)

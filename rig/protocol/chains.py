@@ -1,0 +1,202 @@
+"""The ``chains`` of a protocol: from rods as people describe them to masses, heights and widths."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING
+
+from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.protocol import fields
+from rig.protocol.fields import Range, Section
+from rig.protocol.rods import Rods, read_rods
+from rig.protocol.scene import RodChain
+from rig.protocol.yamltree import Mapping, Node
+from rig.units import Dimension, Quantity, format_quantity, quoted
+
+if TYPE_CHECKING:
+    from rig.protocol.fields import Faults
+    from rig.protocol.yamltree import Place
+
+CHAIN_KEYS = (
+    "like", "rods", "length", "diameter", "rod_length", "tilt", "spacing", "inertia",
+    "alpha", "gamma", "position_uncertainty", "width_uncertainty",
+)  # fmt: skip
+LENGTH = Range(Dimension.LENGTH, 1e-3, 100.0, "m")
+ROD_LENGTH = Range(Dimension.LENGTH, 1e-6, 10.0, "m")
+UNCERTAINTY = Range(Dimension.LENGTH, 0.0, 0.1, "mm")
+TILT = Range(Dimension.ANGLE, 0.0, 80.0, "deg")
+INERTIA = Range(Dimension.NUMBER, 0.0, 1.0, "1", open_low=True)
+ALPHA = Range(Dimension.NUMBER, 0.0, 1.0, "1")
+GAMMA = Range(Dimension.NUMBER, 0.0, 1e6, "1")
+_LONGEST_NAME = 32
+
+
+@dataclass(frozen=True, slots=True)
+class _Described:
+    """A chain's mapping with what it inherits already in it."""
+
+    node: Mapping
+    base: str | None
+    given_name: Place
+
+
+def read_chains(node: Node, faults: Faults, *, seen_by_gates: bool) -> dict[str, RodChain] | None:
+    """Read the ``chains`` mapping.
+
+    Parameters
+    ----------
+    node
+        The value of ``chains``.
+    faults
+        Where problems go.
+    seen_by_gates
+        Whether light beams measure the rods, so that their diameters are needed.
+
+    Returns
+    -------
+    dict of str to RodChain, or None
+        In file order; ``None`` if any chain is faulty.
+    """
+    outer = fields.mapping(node, "chains", faults)
+    if outer is None:
+        return None
+    _, entries = fields.unique_entries(outer, "chains", faults)
+    described = {name: _named(outer, name, value, faults) for name, value in entries.items()}
+    if not 1 <= len(entries) <= 2:
+        faults.add(outer.place, "chains", f"found {len(entries)} chains; one or two are wanted")
+    built: dict[str, RodChain | None] = {}
+    for name in _bases_first(described, faults):
+        one = described[name]
+        if one is None:
+            built[name] = None
+            continue
+        inherited = _inherit(one, described)
+        lenient = one.base is not None and built.get(one.base) is None
+        section = Section(inherited, fields.join("chains", name), faults, CHAIN_KEYS,
+                          lenient=lenient)  # fmt: skip
+        built[name] = _chain(name, section, seen_by_gates=seen_by_gates)
+    result = {name: chain for name in entries if (chain := built.get(name)) is not None}
+    return result if result and len(result) == len(entries) else None
+
+
+def _named(outer: Mapping, name: str, node: Node, faults: Faults) -> _Described | None:
+    """Check a chain's name and the name behind its ``like``."""
+    path = fields.join("chains", name)
+    place = next(key.place for key, _ in outer.entries if getattr(key, "text", None) == name)
+    if not name.isidentifier() or len(name) > _LONGEST_NAME:
+        faults.add(place, path, "a chain's name is one word of letters and digits, e.g. A")
+    inner = fields.mapping(node, path, faults)
+    if inner is None:
+        return None
+    for key, value in inner.entries:
+        if getattr(key, "text", None) == "like":
+            base = fields.string(value, f"{path}.like", faults)
+            return _Described(inner, base, value.place)
+    return _Described(inner, None, inner.place)
+
+
+def _bases_first(described: dict[str, _Described | None], faults: Faults) -> list[str]:
+    """Order the names so that a chain comes after the one it is like; drop what cannot be."""
+    order: list[str] = []
+    for name, one in described.items():
+        if one is None or one.base is None:
+            order.append(name)
+    for name, one in described.items():
+        if one is None or one.base is None:
+            continue
+        path = f"{fields.join('chains', name)}.like"
+        others = tuple(other for other in described if other != name)
+        if one.base not in others:
+            close = fields.did_you_mean(one.base, others)
+            accepted = ", ".join(map(quoted, others)) or "no other chain is there"
+            message = f"found {quoted(one.base)}; {close}accepted: {accepted}"
+            faults.add(one.given_name, path, message)
+        elif one.base not in order:
+            message = "goes round in a circle; describe one of the chains in full"
+            faults.add(one.given_name, path, message)
+        order.append(name)
+    return order
+
+
+def _inherit(one: _Described, described: dict[str, _Described | None]) -> Mapping:
+    """Return the chain's own entries, then those of its base that it does not override."""
+    base = described.get(one.base) if one.base is not None else None
+    if base is None or base is one:
+        return one.node
+    own = {getattr(key, "text", None) for key, _ in one.node.entries}
+    taken: set[str | None] = set(own) | {"like"}
+    entries = list(one.node.entries)
+    for key, value in base.node.entries:
+        text = getattr(key, "text", None)
+        if text not in taken:
+            taken.add(text)
+            entries.append((key, value))
+    return Mapping(one.node.place, entries, one.node.size)
+
+
+def _chain(name: str, section: Section, *, seen_by_gates: bool) -> RodChain | None:
+    """Build one chain from its fields."""
+    rods = read_rods(section, seen_by_gates=seen_by_gates)
+    length = section.take("length", fields.exact(LENGTH), required="1165 mm")
+    rod_length = section.take("rod_length", fields.exact(ROD_LENGTH), math.nan)
+    tilt = section.take("tilt", fields.exact(TILT), 0.0)
+    spacing = section.take("spacing", fields.choice("equal-pitch", "equal-gaps"), "equal-pitch")
+    inertia = section.take("inertia", fields.exact(INERTIA), UNIFORM_ROD_INERTIA)
+    alpha = section.take("alpha", fields.quantity(ALPHA), Quantity(math.nan))
+    gamma = section.take("gamma", fields.exact(GAMMA), math.nan)
+    position_u = section.take("position_uncertainty", fields.exact(UNCERTAINTY), 0.0003)
+    width_u = section.take("width_uncertainty", fields.exact(UNCERTAINTY), 0.0001)
+    if rods is None or length is None or rod_length is None or tilt is None or spacing is None:
+        return None
+    if inertia is None or alpha is None or gamma is None or position_u is None or width_u is None:
+        return None
+    widths = tuple(d / math.cos(math.radians(tilt)) for d in rods.diameters)
+    heights = _heights(rods, length, spacing)
+    if not _fits(section, heights, widths, rod_length * math.sin(math.radians(tilt))):
+        return None
+    chain = Chain(
+        masses=rods.masses,
+        heights=heights,
+        inertia=inertia,
+        alpha=None if math.isnan(alpha.value) else alpha,
+        gamma=None if math.isnan(gamma) else gamma,
+    )
+    return RodChain(name, chain, widths, tilt, position_u, width_u)
+
+
+def _heights(rods: Rods, length: float, spacing: str) -> tuple[float, ...]:
+    """Return the heights of the rods' middles above the bottom rod's, m.
+
+    Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, the gap being whatever
+    makes the whole chain `length` long.
+    """
+    last = len(rods.diameters) - 1
+    if spacing == "equal-pitch":
+        return tuple(length * rod / last for rod in range(last + 1))
+    halves = [(lower + upper) / 2 for lower, upper in pairwise(rods.diameters)]
+    gap = (length - math.fsum(halves)) / last
+    # The top is set, not summed, so that the length is exactly what the file says.
+    return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)
+
+
+def _fits(
+    section: Section, heights: tuple[float, ...], widths: tuple[float, ...], rise: float
+) -> bool:
+    """Check that no two neighbours overlap as seen from the side, nor touch with their ends."""
+    for rod, ((low, high), (lower, upper)) in enumerate(
+        zip(pairwise(heights), pairwise(widths), strict=True), start=1
+    ):
+        pitch, needed = high - low, (lower + upper) / 2
+        if not pitch > needed:
+            apart, thick = (format_quantity(Quantity(x), "mm") for x in (pitch, needed))
+            message = f"rods {rod} and {rod + 1} overlap: {apart} apart but {thick} thick"
+            section.fault("length", message)
+            return False
+        if rise >= pitch:  # never true of an unknown rod length, which is a NaN
+            shown = format_quantity(Quantity(rise), "mm")
+            message = f"tilted ends rise {shown}, so rods {rod} and {rod + 1} would touch"
+            section.fault("rod_length", message)
+            return False
+    return True

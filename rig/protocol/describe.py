@@ -1,0 +1,168 @@
+"""A scene in words: what it has, what follows from it, and what was left out."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rig.protocol.plan import runs
+from rig.protocol.scene import SIDES
+from rig.units import Quantity, format_quantity
+
+if TYPE_CHECKING:
+    from rig.protocol.scene import Gate, Protocol, RodChain
+
+DEVICE_EVENTS = 1024
+"""Events the timer holds before the host must have read them."""
+
+
+def describe(protocol: Protocol) -> str:
+    """Describe a protocol in plain text.
+
+    Parameters
+    ----------
+    protocol
+        A checked protocol.
+
+    Returns
+    -------
+    str
+        Title and sections ``Scene``, ``Gates``, ``What follows`` and ``Left out``; empty sections
+        do not appear. Ends without a newline.
+    """
+    sections = {
+        "Scene": _scene(protocol),
+        "Gates": _gates(protocol),
+        "What follows": _consequences(protocol),
+        "Left out": _left_out(protocol),
+    }
+    blocks = [protocol.title]
+    blocks += ["\n".join([name, *(f"  {line}" for line in lines)])
+               for name, lines in sections.items() if lines]  # fmt: skip
+    return "\n\n".join(blocks)
+
+
+def _number(value: float, unit: str) -> str:
+    return format_quantity(Quantity(value), unit)
+
+
+def _scene(protocol: Protocol) -> list[str]:
+    """Say what is there."""
+    names = " and ".join(protocol.chains)
+    if protocol.surface is None:
+        lines = [f"free fall of {names}; nothing is struck"]
+    elif protocol.two_chains:
+        lines = [f"two chains, {names}: one strikes the surface, the other falls beside it"]
+    else:
+        lines = [f"one chain, {names}, strikes the surface"]
+    lines += [_chain(chain) for chain in protocol.chains.values()]
+    surface = protocol.surface
+    if surface is not None and _uses_surface(protocol):
+        restitution = format_quantity(surface.restitution, "1")
+        text = (
+            f"surface: restitution {restitution}, friction {format_quantity(surface.friction, '1')}"
+        )
+        if surface.pile is not None:
+            pile = format_quantity(surface.pile.restitution, "1")
+            text += f"; below {_number(surface.pile.below_deg, 'deg')} a pile, restitution {pile}"
+        lines.append(text)
+    lines.append(f"gravity: {format_quantity(protocol.gravity, 'm/s^2')}")
+    if surface is not None or protocol.gates is not None:
+        datum = "contact point" if surface is not None else "datum of the gates"
+        lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {datum}")
+    return lines
+
+
+def _chain(rods: RodChain) -> str:
+    """Describe one chain on one line."""
+    chain = rods.chain
+    text = f"{rods.name}: {chain.rods} rods, {_number(chain.length, 'mm')} long"
+    thin, thick = min(rods.widths), max(rods.widths)
+    if thick > 0:
+        span = f"{thin * 1e3:.1f}" if thin == thick else f"{thin * 1e3:.1f} to {thick * 1e3:.1f}"
+        text += f", {span} mm wide in the beam"
+    if min(chain.masses) != max(chain.masses):
+        ratio = max(chain.masses) / min(chain.masses)
+        text += f", graded: heaviest rod {ratio:.3g} times the lightest"
+    if chain.alpha is not None:
+        text += f", α given as {format_quantity(chain.alpha, '1')}"
+    return text
+
+
+def _passing(protocol: Protocol, gate: Gate) -> dict[str, int]:
+    """Return for each chain how many rods pass a gate: those that hang above it."""
+    drop = protocol.drop.value
+    return {
+        name: sum(drop + height > gate.height for height in rods.chain.heights)
+        for name, rods in protocol.chains.items()
+    }
+
+
+def _gates(protocol: Protocol) -> list[str]:
+    """List the gates with the rods that pass each."""
+    lines = []
+    for gate in protocol.gates.gates if protocol.gates else ():
+        passing = _passing(protocol, gate)
+        rods = []
+        for name, number in passing.items():
+            total = protocol.chains[name].chain.rods
+            rods.append(f"{name} {total - number + 1}–{total}")
+        place = f"{gate.side:6}  channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm"
+        lines.append(f"{place}  rods {', '.join(rods)}")
+    return lines
+
+
+def _consequences(protocol: Protocol) -> list[str]:
+    """Say what follows: runs, edges and time."""
+    planned, plan = runs(protocol), protocol.plan
+    lines = ["1 run" if len(planned) == 1 else f"{len(planned)} runs"]
+    if protocol.surface is not None:
+        angles = ", ".join(f"{angle:g}" for angle in plan.inclines)
+        lines[0] += f": {plan.repeats} at each incline ({angles} deg)"
+    if protocol.two_chains:
+        first = next(iter(protocol.chains))
+        share = sum(run.impact == first for run in planned)
+        lines.append(f"order {plan.order}: chain {first} strikes in {share} runs of {len(planned)}")
+        period = {"ABBA": 4, "alternate": 2, "fixed": 1}[plan.order]
+        if plan.repeats % period:
+            lines.append(
+                f"note: {plan.order} is balanced only if repeats is a multiple of {period}"
+            )
+    if protocol.gates is None:
+        return lines
+    edges = 0
+    for side in SIDES:
+        per_chain = [_passing(protocol, gate) for gate in protocol.gates.on(side)]
+        edges += 2 * max(sum(each[name] for each in per_chain) for name in protocol.chains)
+    fits = "fits" if edges <= DEVICE_EVENTS else "does not fit"
+    lines.append(f"at most {edges} edges a drop; {fits} the timer's memory of {DEVICE_EVENTS}")
+    reach = max(rods.chain.length for rods in protocol.chains.values()) + protocol.drop.value
+    fall = math.sqrt(2 * reach / protocol.gravity.value)
+    minutes = len(planned) * (plan.settle + protocol.release.pulse + fall) / 60
+    lines.append(f"about {minutes:.0f} min, settling {plan.settle:g} s before each drop; "
+                 "hanging the chains comes on top")  # fmt: skip
+    return lines
+
+
+def _uses_surface(protocol: Protocol) -> bool:
+    """Whether any impact coefficient follows from the surface."""
+    return any(rods.chain.alpha is None for rods in protocol.chains.values())
+
+
+def _left_out(protocol: Protocol) -> list[str]:
+    """Say what the scene does not have, and what is therefore not computed."""
+    lines = []
+    if protocol.surface is None:
+        lines.append("no surface: no impact, no Δz, no V; the drop measures gravity")
+    else:
+        if len(protocol.chains) == 1:
+            lines.append("no second chain: no free fall beside it, no Δz and no release skew")
+        if not _uses_surface(protocol):
+            lines.append("α is given: restitution, friction and inclination are not used")
+        elif max(protocol.plan.inclines) == 0:
+            lines.append("level surface: no friction, no inclination")
+        elif protocol.surface.friction == Quantity(0.0):
+            lines.append("no friction given: taken as 0 at every incline")
+    if protocol.gates is None:
+        lines.append("no gates: nothing is measured, the scene is only predicted")
+    return lines

@@ -1,0 +1,75 @@
+"""From a plan to the list of runs, in the order in which they are carried out."""
+
+from __future__ import annotations
+
+import random
+from typing import TYPE_CHECKING, TypeVar
+
+from rig.protocol.scene import Run
+
+if TYPE_CHECKING:
+    from rig.protocol.scene import Order, Protocol
+
+T = TypeVar("T")
+
+# Which chain is on the impact side, repeating. ABBA cancels a drift that is linear in time.
+_PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0, 1), "fixed": (0,)}
+
+
+def runs(protocol: Protocol) -> tuple[Run, ...]:
+    """Lay out every run of a protocol.
+
+    Within each incline the impact chain of runs 1, 2, 3, 4 … is A, B, B, A … (``ABBA``),
+    A, B, A, B … (``alternate``) or always A (``fixed``), A being the chain named first.
+    ``randomize: incline`` shuffles the order of the inclines and leaves each block whole;
+    ``randomize: all`` shuffles the runs themselves, so each chain keeps its number of impacts at
+    each incline.
+
+    Parameters
+    ----------
+    protocol
+        A checked protocol.
+
+    Returns
+    -------
+    tuple of Run
+        ``len(inclines) × repeats`` runs, numbered from 1 in the order of execution. The same
+        protocol gives the same runs on every machine.
+    """
+    plan = protocol.plan
+    inclines = list(plan.inclines)
+    if plan.randomize == "incline":
+        inclines = _shuffled(inclines, plan.seed)
+    pattern = _PATTERNS[plan.order]
+    drops = [
+        (incline, *_sides(protocol, pattern[repeat % len(pattern)]))
+        for incline in inclines
+        for repeat in range(plan.repeats)
+    ]
+    if plan.randomize == "all":
+        drops = _shuffled(drops, plan.seed)
+    return tuple(Run(number, *drop) for number, drop in enumerate(drops, start=1))
+
+
+def _sides(protocol: Protocol, first: int) -> tuple[str | None, str | None]:
+    """Return the names of the chains on the impact and the free side."""
+    names = list(protocol.chains)
+    if protocol.surface is None:
+        return None, names[0]
+    if len(names) == 1:
+        return names[0], None
+    return names[first], names[1 - first]
+
+
+def _shuffled(items: list[T], seed: int) -> list[T]:
+    """Return a Fisher–Yates shuffle that is the same everywhere.
+
+    Python promises the sequence of ``random()`` for a given seed across versions and platforms,
+    but not what ``shuffle()`` makes of it.
+    """
+    source = random.Random(seed)  # noqa: S311 - a reproducible order, not a secret
+    result = list(items)
+    for last in range(len(result) - 1, 0, -1):
+        other = int(source.random() * (last + 1))
+        result[last], result[other] = result[other], result[last]
+    return result

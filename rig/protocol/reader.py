@@ -1,0 +1,209 @@
+"""From a protocol file to a checked `Protocol`, or to every problem in it at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig.protocol import fields
+from rig.protocol.chains import read_chains
+from rig.protocol.fields import Faults, Range, Section
+from rig.protocol.gates import check_clear, read_gates
+from rig.protocol.scene import Accept, Plan, Protocol, Release
+from rig.protocol.settings import read_accept, read_plan, read_release
+from rig.protocol.site import gravity_at
+from rig.protocol.surface import read_surface
+from rig.protocol.yamltree import Mapping, Place, Scalar, load
+from rig.units import Dimension, Quantity
+
+if TYPE_CHECKING:
+    import os
+
+    from rig.protocol.fields import Converter
+    from rig.protocol.scene import RodChain
+    from rig.protocol.yamltree import Node
+
+MAX_BYTES = 1_000_000
+KEYS = (
+    "protocol", "title", "chains", "surface", "drop", "gravity", "site",
+    "gates", "release", "plan", "accept", "notes",
+)  # fmt: skip
+DROP = Range(Dimension.LENGTH, 0.0, 100.0, "m")
+GRAVITY = Range(Dimension.ACCELERATION, 1e-3, 1000.0, "m/s^2")
+LATITUDE = Range(Dimension.ANGLE, -90.0, 90.0, "deg")
+HEIGHT = Range(Dimension.LENGTH, -500.0, 9000.0, "m")
+
+
+def read(path: str | os.PathLike[str]) -> Protocol:
+    """Read a protocol file.
+
+    Parameters
+    ----------
+    path
+        The file; UTF-8, at most `MAX_BYTES`.
+
+    Returns
+    -------
+    Protocol
+        Checked; lengths in metres, times in seconds, angles in degrees.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or with every problem found in it.
+    """
+    source = str(path)
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        hint = "ready protocols are in protocols/"
+        raise InputError(f"{source}: there is no such file", hint) from None
+    except IsADirectoryError:
+        raise InputError(f"{source}: is a folder; name a file in it") from None
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{source!r}: cannot be read: {reason}") from None
+    if len(data) > MAX_BYTES:
+        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a page of text")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = data[: error.start]
+        line = before.count(b"\n") + 1
+        column = len(before[before.rfind(b"\n") + 1 :].decode("utf-8")) + 1
+        faults = Faults(source)
+        faults.add(Place(line, column), "", "not UTF-8 text; save the file as UTF-8")
+        raise InputError(problems=faults.problems.values()) from None
+    return parse(text, source)
+
+
+def parse(text: str, source: str = "protocol") -> Protocol:
+    """Read a protocol from its text.
+
+    Parameters
+    ----------
+    text
+        The file's text.
+    source
+        Its name, for messages and for the session.
+
+    Returns
+    -------
+    Protocol
+        Checked, with `text` and `source` in it.
+
+    Raises
+    ------
+    InputError
+        With every problem found.
+    """
+    if len(text) > MAX_BYTES:
+        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a page of text")
+    faults = Faults(source)
+    protocol = _protocol(load(text, source), faults, text)
+    if faults.problems or protocol is None:
+        raise InputError(problems=faults.problems.values())
+    return protocol
+
+
+def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
+    """Read the root mapping; ``None`` (and faults) if anything is wrong."""
+    root = fields.mapping(node, "", faults)
+    if root is None:
+        return None
+    top = Section(root, "", faults, KEYS)
+    top.take("protocol", _version, required="1")
+    title = top.take("title", fields.string, Path(faults.source).stem)
+    top.take("notes", fields.string, "")
+    gravity = _gravity(top)
+    has_surface, has_gates = "surface" in top, "gates" in top
+    chains = top.take("chains", _chains(seen_by_gates=has_gates), required="{A: {rods: 25, …}}")
+    count = _count(top.values.get("chains"))
+    if not has_surface and count > 1:
+        message = f"found {count} chains; a scene with no surface has one"
+        top.fault("chains", message)
+    surface = None
+    if has_surface:
+        # Of a chain that could not be read nobody knows whether it gives its α.
+        needed = chains is not None and any(c.chain.alpha is None for c in chains.values())
+        surface = read_surface(top.values["surface"], faults, needs_restitution=needed)
+    example = "180 mm ± 2 mm" if has_surface or has_gates else ""
+    drop = top.take("drop", fields.quantity(DROP), Quantity(0.0), required=example)
+    release = top.take("release", read_release, Release())
+    plan = top.take("plan", read_plan(surface=has_surface), Plan())
+    accept = top.take("accept", read_accept, Accept())
+    gates = None
+    if has_gates:
+        found = read_gates(top.values["gates"], faults, surface=has_surface, chains=count)
+        if found is not None:
+            gates, located = found
+            if chains is not None and drop is not None and "drop" in top:
+                check_clear(located, chains.values(), drop, faults, surface=has_surface)
+    if title is None or chains is None or gravity is None or drop is None:
+        return None
+    if release is None or plan is None or accept is None:
+        return None
+    return Protocol(
+        title=title,
+        chains=chains,
+        gravity=gravity,
+        drop=drop,
+        surface=surface,
+        gates=gates,
+        release=release,
+        plan=plan,
+        accept=accept,
+        text=text,
+        source=faults.source,
+    )
+
+
+def _version(node: Node, key: str, faults: Faults) -> int | None:
+    """Convert the version of the file format: there is one so far."""
+    if isinstance(node, Scalar) and node.plain and node.text == "1":
+        return 1
+    faults.add(node.place, key, f"found {node}; this software reads protocol: 1")
+    return None
+
+
+def _chains(*, seen_by_gates: bool) -> Converter[dict[str, RodChain]]:
+    """Return the converter to the chains."""
+
+    def convert(node: Node, _key: str, faults: Faults) -> dict[str, RodChain] | None:
+        return read_chains(node, faults, seen_by_gates=seen_by_gates)
+
+    return convert
+
+
+def _count(node: Node | None) -> int:
+    """Return how many chains the file names, whether or not they can be read."""
+    if not isinstance(node, Mapping):
+        return 1
+    return len({key.text for key, _ in node.entries if isinstance(key, Scalar)})
+
+
+def _gravity(top: Section) -> Quantity | None:
+    """Read ``gravity`` or ``site``, exactly one of which is wanted."""
+    if "gravity" in top and "site" in top:
+        first, second = sorted(("gravity", "site"), key=lambda key: top.keys[key])
+        message = f"{first} is given too, on line {top.keys[first].line}; keep one of them"
+        top.fault(second, message, at_key=True)
+    elif "gravity" not in top and "site" not in top:
+        message = "missing; write gravity: 9.81 m/s^2, or site: {latitude: 61.19 deg, height: 30 m}"
+        top.fault("gravity", message)
+    site = top.take("site", _site)
+    given = top.take("gravity", fields.quantity(GRAVITY))
+    return given if "gravity" in top else site
+
+
+def _site(node: Node, key: str, faults: Faults) -> Quantity | None:
+    """Convert latitude and height to gravity."""
+    inner = fields.mapping(node, key, faults)
+    if inner is None:
+        return None
+    section = Section(inner, key, faults, ("latitude", "height"))
+    latitude = section.take("latitude", fields.exact(LATITUDE), required="61.19 deg")
+    height = section.take("height", fields.exact(HEIGHT), required="30 m")
+    return None if latitude is None or height is None else gravity_at(latitude, height)

@@ -1,0 +1,168 @@
+"""What a protocol file says, as plain data: the scene, the gates and the plan of runs.
+
+Lengths are metres, times seconds, angles degrees. Whatever a scene does not have is ``None`` or
+empty, and every later stage leaves it out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from rig.model.chain import Chain
+    from rig.model.surface import Surface
+    from rig.units import Quantity
+
+Side = Literal["impact", "free"]
+Order = Literal["ABBA", "alternate", "fixed"]
+SIDES: tuple[Side, ...] = ("impact", "free")
+
+
+@dataclass(frozen=True, slots=True)
+class RodChain:
+    """One physical chain: the mechanics of it and what a light beam sees.
+
+    Attributes
+    ----------
+    name
+        The label on the chain, ``A`` or ``B``.
+    chain
+        Masses, heights and inertia for the model.
+    widths
+        Height of each rod as a level beam sees it, ``d / cos(tilt)``, m; bottom up.
+    tilt_deg
+        Mean tilt of the rods from horizontal.
+    position_u
+        Standard uncertainty of each rod's place on the string, m.
+    width_u
+        Standard uncertainty of the effective width common to the rods, m.
+    """
+
+    name: str
+    chain: Chain
+    widths: tuple[float, ...]
+    tilt_deg: float = 0.0
+    position_u: float = 0.0003
+    width_u: float = 0.0001
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """One photogate: a level beam at a height above the contact point."""
+
+    channel: int
+    height: float
+    side: Side
+
+
+@dataclass(frozen=True, slots=True)
+class Gates:
+    """The photogate array.
+
+    Attributes
+    ----------
+    gates
+        All gates, impact side first, in the order of the file.
+    height_u
+        Standard uncertainty of each beam height, m.
+    """
+
+    gates: tuple[Gate, ...]
+    height_u: float
+
+    def on(self, side: Side) -> tuple[Gate, ...]:
+        """Gates of one side, in file order."""
+        return tuple(gate for gate in self.gates if gate.side == side)
+
+    @property
+    def mask(self) -> int:
+        """Bit mask of the channels in use."""
+        return sum(1 << gate.channel for gate in self.gates)
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """The actuator: its channel and the length of the pulse in seconds."""
+
+    channel: int = 0
+    pulse: float = 0.080
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How the runs are laid out; `rig.protocol.plan.runs` expands it."""
+
+    inclines: tuple[float, ...] = (0.0,)
+    repeats: int = 1
+    order: Order = "ABBA"
+    randomize: Literal["none", "incline", "all"] = "none"
+    seed: int = 0
+    settle: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Accept:
+    """Limits beyond which a run is void; fixed before any result is seen."""
+
+    release_skew: float = 0.005
+    missed_edges: float = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """One protocol file, checked.
+
+    Attributes
+    ----------
+    chains
+        By name. One chain: a single-chain or free-fall scene. Two: the two-chain experiment.
+    surface
+        `None` where nothing is struck: the rig's calibration drop.
+    drop
+        Height of the bottom rod's middle above the contact point (with no surface: above the
+        datum of the gate heights) before release; `None` where no gates measure it.
+    gates
+        `None` for a scene that is only predicted.
+    text
+        The file as read, kept word for word in the session.
+    """
+
+    title: str
+    chains: dict[str, RodChain]
+    gravity: Quantity
+    drop: Quantity
+    surface: Surface | None = None
+    gates: Gates | None = None
+    release: Release = field(default_factory=Release)
+    plan: Plan = field(default_factory=Plan)
+    accept: Accept = field(default_factory=Accept)
+    text: str = ""
+    source: str = ""
+
+    @property
+    def two_chains(self) -> bool:
+        """Whether a free chain falls beside the impact chain."""
+        return self.surface is not None and len(self.chains) > 1
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One planned drop.
+
+    Attributes
+    ----------
+    number
+        1, 2, 3 … in the order of execution.
+    incline_deg
+        Surface inclination; 0 where there is no surface.
+    impact
+        Name of the chain on the impact side; `None` where there is no surface.
+    free
+        Name of the chain on the free side; `None` where only one chain falls.
+    """
+
+    number: int
+    incline_deg: float
+    impact: str | None
+    free: str | None

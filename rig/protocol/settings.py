@@ -1,0 +1,110 @@
+"""The ``release``, ``plan`` and ``accept`` of a protocol."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, cast
+
+from rig.protocol import fields
+from rig.protocol.fields import Range, Section
+from rig.protocol.scene import Accept, Order, Plan, Release
+from rig.protocol.yamltree import Scalar
+from rig.units import Dimension
+
+if TYPE_CHECKING:
+    from rig.protocol.fields import Converter, Faults
+    from rig.protocol.yamltree import Node
+
+# A coil that is held longer than this burns; one pulsed shorter does not pull.
+PULSE = Range(Dimension.TIME, 0.001, 2.0, "ms")
+RELEASE_CHANNELS = 8
+INCLINE = Range(Dimension.ANGLE, 0.0, 90.0, "deg")
+SETTLE = Range(Dimension.TIME, 0.0, 3600.0, "s")
+MOST_REPEATS = 10_000
+MOST_RUNS = 100_000
+LARGEST_SEED = 2**63 - 1
+RELEASE_SKEW = Range(Dimension.TIME, 0.0, 10.0, "ms", open_low=True)
+MISSED_EDGES = Range(Dimension.NUMBER, 0.0, 1.0, "%")
+
+
+def read_release(node: Node, key: str, faults: Faults) -> Release | None:
+    """Convert to the release actuator."""
+    inner = fields.mapping(node, key, faults)
+    if inner is None:
+        return None
+    section = Section(inner, key, faults, ("channel", "pulse"))
+    usual = Release()
+    channel = section.take("channel", fields.whole(0, RELEASE_CHANNELS - 1), usual.channel)
+    pulse = section.take("pulse", fields.exact(PULSE), usual.pulse)
+    return None if channel is None or pulse is None else Release(channel, pulse)
+
+
+def read_accept(node: Node, key: str, faults: Faults) -> Accept | None:
+    """Convert to the limits of a valid run."""
+    inner = fields.mapping(node, key, faults)
+    if inner is None:
+        return None
+    section = Section(inner, key, faults, ("release_skew", "missed_edges"))
+    usual = Accept()
+    skew = section.take("release_skew", fields.exact(RELEASE_SKEW), usual.release_skew)
+    missed = section.take("missed_edges", fields.exact(MISSED_EDGES), usual.missed_edges)
+    return None if skew is None or missed is None else Accept(skew, missed)
+
+
+def read_plan(*, surface: bool) -> Converter[Plan]:
+    """Return a converter to the plan; without a surface there is nothing to incline."""
+
+    def convert(node: Node, key: str, faults: Faults) -> Plan | None:
+        inner = fields.mapping(node, key, faults)
+        if inner is None:
+            return None
+        accepted = ("incline", "repeats", "order", "randomize", "seed", "settle")
+        section = Section(inner, key, faults, accepted)
+        if "incline" in section and not surface:
+            message = "the scene has no surface, so nothing is inclined; leave it out"
+            section.fault("incline", message, at_key=True)
+        usual = Plan()
+        inclines = section.take("incline", _inclines, usual.inclines)
+        repeats = section.take("repeats", fields.whole(1, MOST_REPEATS), usual.repeats)
+        order = section.take("order", fields.choice("ABBA", "alternate", "fixed"), usual.order)
+        mixed = fields.choice("none", "incline", "all")
+        randomize = section.take("randomize", mixed, usual.randomize)
+        seed = section.take("seed", fields.whole(0, LARGEST_SEED), usual.seed)
+        settle = section.take("settle", fields.exact(SETTLE), usual.settle)
+        if inclines is None or repeats is None or order is None:
+            return None
+        if randomize is None or seed is None or settle is None:
+            return None
+        if len(inclines) * repeats > MOST_RUNS:
+            message = f"makes {len(inclines) * repeats} runs; at most {MOST_RUNS} are accepted"
+            section.fault("repeats", message)
+            return None
+        return Plan(
+            inclines=inclines,
+            repeats=repeats,
+            order=cast("Order", order),
+            randomize=cast('Literal["none", "incline", "all"]', randomize),
+            seed=seed,
+            settle=settle,
+        )
+
+    return convert
+
+
+def _inclines(node: Node, key: str, faults: Faults) -> tuple[float, ...] | None:
+    """Convert one angle or a list of different angles, degrees."""
+    convert = fields.exact(INCLINE)
+    if isinstance(node, Scalar):
+        angle = convert(node, key, faults)
+        return None if angle is None else (angle,)
+    listed = fields.sequence(node, key, faults)
+    if listed is None:
+        return None
+    lines: dict[float, int] = {}
+    for i, item in enumerate(listed.items):
+        angle = convert(item, f"{key}[{i}]", faults)
+        if angle in lines:
+            message = f"found {item} again (line {lines[angle]}); repeats says how often"
+            faults.add(item.place, f"{key}[{i}]", message)
+        elif angle is not None:
+            lines[angle] = item.place.line
+    return tuple(lines) if len(lines) == len(listed.items) else None

@@ -1,0 +1,86 @@
+"""What a drop leaves behind, as plain data: edges, pings, certificates.
+
+These are the words in which link, session and analysis speak to each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class Edge(NamedTuple):
+    """One change of one gate.
+
+    `tick` counts device ticks from the fire stamp (imports: from the first whole second of the
+    run); `blocked` is the state after the change.
+    """
+
+    tick: int
+    channel: int
+    blocked: bool
+
+
+class Ping(NamedTuple):
+    """One clock sample: host time before and after, and the device's tick between (u32)."""
+
+    host_send_ns: int
+    host_recv_ns: int
+    tick: int
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """The device's own account of a drop.
+
+    Attributes
+    ----------
+    events
+        Number of snapshots recorded.
+    crc32
+        CRC-32 over their six-byte records in order.
+    overflows
+        Snapshots lost because the memory was full.
+    glitches
+        Pulses too short to be stamped.
+    late
+        Stamps that may be late by more than the usual latency.
+    """
+
+    events: int
+    crc32: int
+    overflows: int = 0
+    glitches: int = 0
+    late: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """The raw record of one drop.
+
+    Attributes
+    ----------
+    run, attempt
+        The planned run, and which attempt at it (1, 2, …).
+    tick_hz
+        Nominal tick rate.
+    fire_tick
+        Device tick (u32) of the release; `None` for imported edges.
+    initial_state
+        Gate mask when armed.
+    edges
+        In order of time.
+    certificate
+        `None` for imported edges.
+    faults
+        Why the record is not whole (empty when it is): a void run says these as its reasons.
+    """
+
+    run: int
+    attempt: int
+    tick_hz: int
+    edges: tuple[Edge, ...]
+    fire_tick: int | None = None
+    initial_state: int = 0
+    certificate: Certificate | None = None
+    faults: tuple[str, ...] = ()

@@ -1,0 +1,224 @@
+"""The report: one HTML page that needs nothing but itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from html import escape
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from rig.files import write_atomic
+from rig.report.columns import AUDIT, RUNS, SUMMARY, Column, filled
+from rig.report.embed import dark_figure_css, embedded
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from rig.report.embed import Picture
+
+
+@dataclass(frozen=True, slots=True)
+class ReportContext:
+    """Everything a report says; what a scene does not have stays empty and is left out.
+
+    Attributes
+    ----------
+    title
+        Of the protocol.
+    analysis
+        What ``rig analyze --json`` prints; runs may also carry ``budget``, a list of ``{"name",
+        "quantity", "u"}``.
+    simulated
+        Whether to stamp the page.
+    figures
+        See `rig.report.pictures.pictures`.
+    protocol_text, protocol_source, protocol_sha256
+        The protocol file word for word, its name and digest.
+    provenance
+        Further facts in order, such as session file, creation time, versions, origin.
+    identities
+        What each device said it is.
+    clock
+        The clock calibration, in words or numbers by name.
+    notes
+        Sentences for the reader: warnings, what was left out.
+    """
+
+    title: str
+    analysis: Mapping[str, Any]
+    simulated: bool
+    figures: Sequence[Picture] = ()
+    protocol_text: str = ""
+    protocol_source: str = ""
+    protocol_sha256: str = ""
+    provenance: Mapping[str, object] = field(default_factory=dict)
+    identities: Sequence[Mapping[str, object]] = ()
+    clock: Mapping[str, object] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+
+
+def write_report(path: str | os.PathLike[str], context: ReportContext) -> None:
+    """Write `report_html` to a file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    write_atomic(path, report_html(context))
+
+
+def report_html(context: ReportContext) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    context
+        What to say. All text is escaped; figures are trusted.
+    """
+    title = escape(context.title)
+    stamp = '<p class="stamp">SIMULATED DATA</p>' if context.simulated else ""
+    mark = "SIMULATED – " if context.simulated else ""
+    parts = [
+        f"<header><h1>{title}</h1>{_subtitle(context)}{stamp}</header>",
+        _notes(context),
+        _summary(context.analysis),
+        "".join(embedded(picture, number) for number, picture in enumerate(context.figures, 1)),
+        _runs(context.analysis),
+        _budget(context.analysis),
+        _provenance(context),
+    ]
+    css = files("rig.report").joinpath("page.css").read_text(encoding="utf-8") + dark_figure_css()
+    body = "\n".join(filter(None, parts))
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        # Should anything slip through the escaping, nothing runs and nothing is fetched.
+        '<meta http-equiv="Content-Security-Policy" '
+        "content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
+        f"<title>{mark}{title}</title>\n<style>\n{css}</style>\n</head>\n"
+        f"<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def _subtitle(context: ReportContext) -> str:
+    runs = context.analysis.get("runs") or ()
+    verdicts = [str(run.get("verdict")) for run in runs]
+    counts = [
+        f"{verdicts.count(verdict)} {verdict}"
+        for verdict in ("accepted", "marginal", "void", "rejected")
+        if verdict in verdicts
+    ]
+    noun = "run" if len(runs) == 1 else "runs"
+    words = f"{len(runs)} {noun}" + (f": {', '.join(counts)}" if counts else "")
+    return f'<p class="sub">{escape(words)}</p>'
+
+
+def _notes(context: ReportContext) -> str:
+    return "".join(f'<p class="note">{escape(note)}</p>' for note in context.notes)
+
+
+def _summary(analysis: Mapping[str, Any]) -> str:
+    lines = analysis.get("summary") or ()
+    if not lines:
+        return "<h2>Summary</h2><p>No accepted runs, so no summary.</p>"
+    note = "U is the expanded uncertainty of the mean (95 %)."
+    if any(line.get("normalized_error") is not None for line in lines):
+        note += (
+            " Eₙ is the difference from the prediction over its expanded uncertainty: within ±1 "
+            "they agree."
+        )
+    return f'<h2>Summary</h2>{_table(SUMMARY, lines)}<p class="note">{note}</p>'
+
+
+def _runs(analysis: Mapping[str, Any]) -> str:
+    html = ""
+    if analysis.get("runs"):
+        html += f"<h2>Runs</h2>{_table(RUNS, analysis['runs'])}"
+        if any(run.get("separation_raw_m") for run in analysis["runs"]):
+            html += (
+                '<p class="note">Δz is corrected to simultaneous release, raw Δz is as it '
+                "happened. Skew is the free chain's release less the impact chain's.</p>"
+            )
+        if any(run.get("edges") for run in analysis["runs"]):
+            html += f'<p class="note">Edges: {" / ".join(AUDIT)}.</p>'
+    if analysis.get("superseded"):
+        html += f"<h2>Earlier attempts</h2>{_table(RUNS, analysis['superseded'])}"
+    return html
+
+
+def _budget(analysis: Mapping[str, Any]) -> str:
+    lines = [
+        {**line, "run": run.get("run")}
+        for run in analysis.get("runs") or ()
+        for line in run.get("budget") or ()
+    ]
+    if not lines:
+        return ""
+    columns = (
+        Column("run", lambda line: str(line["run"])),
+        Column("source", lambda line: str(line.get("name", "")), numeric=False),
+        Column("quantity", lambda line: str(line.get("quantity", "")), numeric=False),
+        Column("standard uncertainty (SI)", lambda line: f"{line['u']:.2g}"),
+    )
+    return (
+        "<h2>Uncertainty budget</h2><details><summary>Standard uncertainty of each run by source"
+        f"</summary>{_table(columns, lines)}</details>"
+    )
+
+
+def _table(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> str:
+    kept, rows = filled(columns, records)
+    sides = [' class="num"' if column.numeric else "" for column in kept]
+    head = "".join(
+        f'<th scope="col"{side}>{escape(column.heading)}</th>'
+        for column, side in zip(kept, sides, strict=True)
+    )
+    body = ""
+    for record, row in zip(records, rows, strict=True):
+        off = ' class="off"' if record.get("verdict") in {"void", "rejected"} else ""
+        cells = "".join(
+            _cell(column, text, side) for column, text, side in zip(kept, row, sides, strict=True)
+        )
+        body += f"<tr{off}>{cells}</tr>\n"
+        reasons = "; ".join(map(str, record.get("reasons") or ()))
+        if reasons:  # a line of their own: sentences do not fit beside so many numbers
+            body += f'<tr class="why"><td colspan="{len(kept)}">{escape(reasons)}</td></tr>\n'
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{body}</tbody></table></div>"
+    )
+
+
+def _cell(column: Column, text: str, side: str) -> str:
+    if column.heading == "verdict":
+        side = f' class="{escape(text)}"'
+    return f"<td{side}>{escape(text)}</td>"
+
+
+def _provenance(context: ReportContext) -> str:
+    facts: list[tuple[str, object]] = list(context.provenance.items())
+    if context.protocol_sha256:
+        facts.append(("protocol SHA-256", context.protocol_sha256))
+    facts += [("device", identity) for identity in context.identities]
+    facts += [(f"clock: {name}", value) for name, value in context.clock.items()]
+    html = "".join(
+        f"<dt>{escape(str(name))}</dt><dd>{escape(_plain(value))}</dd>" for name, value in facts
+    )
+    html = f"<dl>{html}</dl>" if html else ""
+    if context.protocol_text:
+        name = escape(context.protocol_source or "the protocol")
+        html += (
+            f"<details open><summary>{name}</summary>"
+            f"<pre>{escape(context.protocol_text)}</pre></details>"
+        )
+    return f"<h2>Provenance</h2>{html}" if html else ""
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_plain(item)}" for key, item in value.items())
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)

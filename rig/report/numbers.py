@@ -1,0 +1,74 @@
+"""Numbers as a physicist writes them: the uncertainty decides the digits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+MINUS = "−"
+
+
+def value_of(quantity: object) -> float | None:
+    """Best estimate of a quantity object, a bare number, or `None` where there is none."""
+    if isinstance(quantity, Mapping):
+        quantity = quantity.get("value")
+    if isinstance(quantity, bool) or not isinstance(quantity, (int, float)):
+        return None
+    return float(quantity) if math.isfinite(quantity) else None
+
+
+def expanded(quantity: object) -> float | None:
+    """Return the expanded uncertainty U95 of a quantity object, `None` where it has none."""
+    return value_of(quantity.get("U95")) if isinstance(quantity, Mapping) else None
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """Write a number with that many decimals and a true minus sign; nothing for `None`."""
+    if value is None:
+        return ""
+    text = f"{value:.{decimals}f}"
+    if not text.strip("-0."):
+        text = text.lstrip("-")
+    return text.replace("-", MINUS)
+
+
+def decimals_for(uncertainty: float | None, default: int = 3) -> int:
+    """Decimals that show two significant digits of an uncertainty (GUM 7.2.6)."""
+    if uncertainty is None or uncertainty <= 0:
+        return default
+    digits = 1 - math.floor(math.log10(uncertainty))
+    if round(uncertainty, digits) >= 10 ** (2 - digits):  # 0.0996 is written 0.10
+        digits -= 1
+    return min(max(digits, 0), 9)
+
+
+def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
+    """Write ``value ± U95`` with the digits U95 deserves; nothing where there is no value.
+
+    Parameters
+    ----------
+    quantity
+        ``{"value", "u", "U95"}``, a bare number or `None`.
+    scale
+        Factor to the unit of the column, for example 100 from m to cm.
+    default
+        Decimals where there is no uncertainty.
+    """
+    value, uncertainty = value_of(quantity), expanded(quantity)
+    if value is None:
+        return ""
+    if uncertainty is None:
+        return fixed(value * scale, default)
+    decimals = decimals_for(uncertainty * scale, default)
+    return f"{fixed(value * scale, decimals)} ± {fixed(uncertainty * scale, decimals)}"
+
+
+def nested(record: Mapping[str, Any], *path: str) -> Any:
+    """Return a member of a member, `None` where the way ends early."""
+    found: Any = record
+    for key in path:
+        if not isinstance(found, Mapping):
+            return None
+        found = found.get(key)
+    return found

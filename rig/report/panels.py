@@ -1,0 +1,133 @@
+"""Panels whose horizontal axis counts the runs: points, limits and marks."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND
+from rig.report.numbers import expanded, value_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+
+COUNTED = ("accepted", "marginal")
+"""Verdicts of runs that enter the mean."""
+
+_CHAIN_STYLES = (("o", MODEL, MODEL), ("s", SECOND, PAPER), ("^", INK, INK), ("D", MUTED, PAPER))
+
+
+def run_points(
+    axes: Axes,
+    runs: Sequence[Mapping[str, Any]],
+    key: str,
+    scale: float,
+    references: Mapping[float, float] | None = None,
+) -> None:
+    """Plot a quantity of every run, a marker for each chain, a cross for runs that do not count."""
+    chains = sorted({str(run.get("impact_chain") or "") for run in runs})
+    groups: dict[tuple[str, bool], list[tuple[int, float, float]]] = {}
+    for run in runs:
+        value = value_of(run.get(key))
+        reference = 0.0
+        if references is not None:
+            found = references.get(float(run.get("incline_deg") or 0.0))
+            value, reference = (None, 0.0) if found is None else (value, found)
+        if value is None:
+            continue
+        counts = run.get("verdict") in COUNTED
+        group = (str(run.get("impact_chain") or "") if counts else "", counts)
+        bar = (expanded(run[key]) or 0.0) * scale
+        groups.setdefault(group, []).append((run["run"], (value - reference) * scale, bar))
+    for (chain, counts), points in sorted(groups.items(), key=lambda item: not item[0][1]):
+        numbers, values, bars = zip(*points, strict=True)
+        if not counts:
+            # Plotted last, on the scale of the runs that count: one lost edge can put a void run
+            # a metre off.
+            low, high = axes.get_ylim()
+            if len(groups) > 1 and key != "release_skew_s":
+                axes.set_ylim(low, high)
+            else:
+                low, high = min(values), max(values)
+            beyond = sum(not low <= value <= high for value in values)
+            label = f"void or rejected ({beyond} off the scale)" if beyond else "void or rejected"
+            axes.plot(numbers, values, "x", color=MUTED, label=label, markersize=5)
+            continue
+        marker, color, face = _CHAIN_STYLES[chains.index(chain) % len(_CHAIN_STYLES)]
+        axes.errorbar(
+            numbers,
+            values,
+            yerr=bars,
+            fmt=marker,
+            color=color,
+            markerfacecolor=face,
+            markersize=4.2,
+            elinewidth=0.8,
+            capsize=0,
+            label=f"chain {chain} on the surface" if chain else "run ± U (95 %)",
+            zorder=4,
+        )
+
+
+def limit_lines(axes: Axes, limit_ms: float) -> None:
+    """Draw limits on both sides of zero and keep them in sight."""
+    for sign in (-1, 1):
+        axes.axhline(sign * limit_ms, color=SECOND, linewidth=1.0, linestyle=(0, (5, 2.5)))
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(low, -1.15 * limit_ms), max(high, 1.15 * limit_ms))
+    axes.annotate(
+        f"limit ±{limit_ms:g} ms",
+        (0.995, limit_ms),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 3),
+        textcoords="offset points",
+        color=SECOND,
+        fontsize=8,
+        ha="right",
+    )
+
+
+def legend_above(axes: Axes) -> None:
+    """Put the legend above the panel, where no point can hide behind it."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            handles, labels, loc="lower left", bbox_to_anchor=(0, 1.08), ncols=4, borderaxespad=0
+        )
+
+
+def run_axis(axes: Axes) -> None:
+    """Label the axis of run numbers with whole numbers."""
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - see canvas
+
+    axes.set_xlabel("run")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+    axes.margins(x=0.02)
+
+
+def mark_inclines(panels: Sequence[Axes], runs: Sequence[Mapping[str, Any]]) -> None:
+    """Mark where the inclination changes, as long as the marks stay readable."""
+    blocks = [
+        (incline, [run["run"] for run in block])
+        for incline, block in groupby(runs, key=lambda run: run.get("incline_deg"))
+    ]
+    if not 1 < len(blocks) <= 16:
+        return
+    for place, (incline, numbers) in enumerate(blocks):
+        low, high = numbers[0] - 0.5, numbers[-1] + 0.5
+        for axes in panels:
+            if place:
+                axes.axvline(low, color=MUTED, linewidth=0.6, alpha=0.6)
+        panels[0].annotate(
+            f"{incline:g}°",
+            ((low + high) / 2, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=8,
+            color=MUTED,
+        )

@@ -1,0 +1,74 @@
+"""Which figures a report gets: those its scene has data for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rig.report.embed import Picture
+from rig.report.figures import gravity_figure, incline_figure, runs_figure
+from rig.report.numbers import value_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def pictures(
+    analysis: Mapping[str, Any],
+    curves: Mapping[str, Any] | None = None,
+    simulated: bool = False,
+    *,
+    skew_limit_s: float | None = None,
+    site_m_s2: object = None,
+) -> list[Picture]:
+    """Draw the figures of a report.
+
+    Parameters
+    ----------
+    analysis
+        What ``rig analyze --json`` prints.
+    curves
+        The model, see `incline_figure`.
+    simulated
+        Whether to stamp them.
+    skew_limit_s
+        Beyond which a run is void, s.
+    site_m_s2
+        Expected gravity, for scenes without a surface.
+
+    Raises
+    ------
+    InputError
+        If there is something to draw and matplotlib is not installed.
+    """
+    runs = analysis.get("runs") or ()
+
+    def measured(key: str) -> bool:
+        return any(value_of(run.get(key)) is not None for run in runs)
+
+    found = []
+    if measured("separation_m") or measured("speed_m_s"):
+        found.append(
+            Picture(
+                incline_figure(analysis, curves, simulated),
+                "Separation and end speed against inclination",
+                "Separation of the top rods and speed of the impact chain's end just before it "
+                "reaches the surface, against inclination; lines are the model.",
+            )
+        )
+    if measured("separation_m"):
+        found.append(
+            Picture(
+                runs_figure(analysis, simulated, skew_limit_s),
+                "Runs in order",
+                "Every run in the order of execution. Bars are expanded uncertainties (95 %).",
+            )
+        )
+    if measured("gravity_m_s2"):
+        found.append(
+            Picture(
+                gravity_figure(analysis, simulated, site_m_s2),
+                "Acceleration of each run",
+                "Acceleration in free fall, run by run. Bars are expanded uncertainties (95 %).",
+            )
+        )
+    return found

@@ -1,0 +1,1 @@
+"""The session file: everything that happened, in one SQLite database."""

@@ -1,0 +1,152 @@
+"""Making and opening the SQLite file under a session, and knowing a foreign one."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from contextlib import closing
+from typing import TYPE_CHECKING
+
+from rig.errors import SessionError
+from rig.files import sync_directory
+from rig.session.faults import not_a_session, translated
+from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_BUSY_S = 2.0  # only a program other than this one can hold the database for longer
+
+
+def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text: str) -> None:
+    """Make a new session file, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        Where; the caller holds its lock and has seen that nothing is there.
+    meta, protocol_source, protocol_text
+        The first rows.
+
+    Raises
+    ------
+    SessionError
+        If the place cannot be written.
+    """
+    # Built under another name: a crash here must not leave a half-made session under the real one.
+    temporary = path.with_name(f".{path.name[:40]}.{os.getpid()}.new")
+    try:
+        temporary.unlink(missing_ok=True)
+        with translated(path), closing(_connect(temporary, "rwc")) as connection:
+            connection.execute("PRAGMA synchronous = FULL")
+            connection.executescript(f"BEGIN;\n{CREATE}")
+            connection.executemany("INSERT INTO meta VALUES (?, ?)", meta.items())
+            connection.execute(
+                "INSERT INTO protocol VALUES (1, ?, ?)", (protocol_source, protocol_text)
+            )
+            connection.execute("COMMIT")
+        temporary.replace(path)
+    except SessionError:
+        raise
+    except OSError as error:
+        raise SessionError(
+            f"cannot make {path}: {error.strerror or error}", "choose a folder you may write to"
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+    sync_directory(path.parent)
+
+
+def check_free(path: Path) -> None:
+    """Refuse to make a session where something already is.
+
+    Raises
+    ------
+    SessionError
+        If the path exists.
+    """
+    if path.exists():
+        raise SessionError(
+            f"{path} already exists", "choose another name, or continue that session"
+        )
+
+
+def check_place(path: Path) -> None:
+    """Refuse what cannot be a session before SQLite touches it.
+
+    Raises
+    ------
+    SessionError
+        For a missing file, a folder or an empty file.
+    """
+    if path.is_dir():
+        raise not_a_session(path, "it is a folder")
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise SessionError(
+            f"no session at {path}: {error.strerror or error}",
+            "rig run, rig import and rig daemon make one",
+        ) from error
+    if size == 0:  # SQLite would take it for an empty database
+        raise not_a_session(path, "it is empty")
+
+
+def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
+    """Open an existing session file and check that it is one.
+
+    Raises
+    ------
+    SessionError
+        If it is something else, newer than this program, damaged or not permitted.
+    """
+    # Never read the header by hand: closing a second handle on the file would drop the POSIX
+    # locks of a writer in this very process.
+    with translated(path):
+        connection = _connect(path, _reading_mode(path) if readonly else "rw")
+        try:
+            _check_format(path, connection)
+            connection.execute("PRAGMA foreign_keys = ON")
+            connection.execute("PRAGMA recursive_triggers = ON")
+            if readonly:
+                connection.execute("PRAGMA query_only = ON")
+            else:
+                connection.execute("PRAGMA journal_mode = WAL")
+                connection.execute("PRAGMA synchronous = FULL")
+                # macOS: fsync alone leaves data in the drive's cache.
+                connection.execute("PRAGMA fullfsync = ON")
+                connection.execute("PRAGMA checkpoint_fullfsync = ON")
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    uri = f"{path.as_uri()}?mode={mode}"
+    return sqlite3.connect(uri, uri=True, timeout=_BUSY_S, isolation_level=None)
+
+
+def _reading_mode(path: Path) -> str:
+    # WAL keeps a log and shared memory beside the database. A read-only handle would make them
+    # and could not take them away again, so where writing is allowed the guard is query_only.
+    if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK):
+        return "rw"
+    # Without a log nobody is writing: on a CD or a write-protected share the file may be read
+    # as it stands.
+    return "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
+
+
+def _check_format(path: Path, connection: sqlite3.Connection) -> None:
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    if application != APPLICATION_ID:
+        raise not_a_session(path, "it is another program's SQLite database")
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version < 1:
+        raise not_a_session(path, "it was never finished")
+    if version > SCHEMA_VERSION:
+        raise SessionError(
+            f"{path} was written by a newer rig (format {version}, this one knows up to "
+            f"{SCHEMA_VERSION})",
+            "update rig to open it",
+        )

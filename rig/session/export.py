@@ -1,0 +1,169 @@
+"""Results and raw records as CSV files for other programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.errors import InputError
+from rig.files import write_atomic
+from rig.session.edges_csv import write_edges
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Mapping, Sequence
+    from fractions import Fraction
+
+    from rig.session.reading import Reader
+
+_UNITS = {
+    "_deg": "degrees",
+    "_m_s2": "m/s²",
+    "_m_s": "m/s",
+    "_m": "m",
+    "_ns": "ns, host clock",
+    "_s": "s",
+}
+_MEANINGS = {
+    "run": "number of the planned run",
+    "attempt": "which attempt at the run",
+    "superseded": "1 where a later attempt replaces this one",
+    "incline_deg": "inclination of the surface",
+    "impact_chain": "chain on the impact side",
+    "separation_m": "height of the free chain's top rod over the impact chain's when that one "
+    "reaches the surface, corrected to simultaneous release",
+    "separation_raw_m": "the same as it happened",
+    "separation_sd_m": "standard deviation between runs",
+    "speed_m_s": "speed of the impact chain's top rod just before it reaches the surface",
+    "release_skew_s": "release of the free chain less that of the impact chain; positive: the "
+    "free chain left later",
+    "gravity_m_s2": "acceleration of the falling chain",
+    "verdict": "accepted, marginal, void or rejected",
+    "reasons": "why, separated by semicolons",
+    "n": "number of runs",
+    "normalized_error": "difference from the prediction over its expanded uncertainty; within ±1 "
+    "they agree",
+    "channel": "gate",
+    "time_s": "time since the release (imported edges: since a whole second)",
+    "state": "of the run; in edges.csv 1 is a blocked beam, 0 a clear one",
+    "tick": "device clock, 32 bits",
+}
+
+
+def export_csv(
+    directory: str | os.PathLike[str],
+    session: Reader,
+    analysis: Mapping[str, Any],
+    tick_hz: Mapping[int, float | Fraction] | None = None,
+) -> None:
+    """Write ``runs.csv``, ``summary.csv``, ``edges.csv``, ``states.csv``, ``pings.csv``, a README.
+
+    Columns are those the scene has; ``edges.csv`` is in the import format. Each file is replaced
+    as a whole.
+
+    Parameters
+    ----------
+    directory
+        Made where it does not exist.
+    session
+        Open, for the raw records.
+    analysis
+        What ``rig analyze --json`` prints.
+    tick_hz
+        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    place = Path(directory)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {place}: {error.strerror or error}") from error
+    superseded = analysis.get("superseded", [])
+    runs = [flatten(run) for run in analysis.get("runs", [])]
+    if superseded:
+        runs = [{**run, "superseded": 0} for run in runs]
+        runs += [{**flatten(run), "superseded": 1} for run in superseded]
+        runs.sort(key=lambda run: (run.get("run", 0), run.get("attempt", 0)))
+    tables = {
+        "runs.csv": runs,
+        "summary.csv": [flatten(line) for line in analysis.get("summary", [])],
+        "states.csv": [
+            {**entry._asdict(), "reasons": "; ".join(entry.reasons)} for entry in session.states()
+        ],
+        "pings.csv": [ping._asdict() for ping in session.pings()],
+    }
+    for name, rows in tables.items():
+        write_atomic(place / name, _csv(rows))
+    write_edges(place / "edges.csv", session.latest_drops(), tick_hz)
+    write_atomic(place / "README.txt", _readme(session, tables))
+
+
+def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
+    """Spread a JSON object over columns.
+
+    A quantity ``x`` becomes ``x``, ``x_u`` and ``x_U95``; members of other objects get its name
+    in front; lists of text are joined with semicolons; lists of objects are left out.
+    """
+    columns: dict[str, object] = {}
+    for key, value in record.items():
+        name = prefix + key
+        if isinstance(value, dict) and "value" in value:
+            columns[name] = value["value"]
+            columns |= {f"{name}_{part}": value[part] for part in ("u", "U95") if part in value}
+        elif isinstance(value, dict):
+            columns |= flatten(value, f"{name}_")
+        elif isinstance(value, (list, tuple)):
+            if not any(isinstance(item, dict) for item in value):
+                columns[name] = "; ".join(map(str, value))
+        else:
+            columns[name] = value
+    return columns
+
+
+def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
+    """All columns in order of appearance; a void run may lack some that later runs have."""
+    fullest = sorted(rows, key=len, reverse=True)
+    return list(dict.fromkeys(key for row in fullest for key in row))
+
+
+def _csv(rows: Sequence[Mapping[str, object]]) -> str:
+    text = io.StringIO()
+    # Python writes floats with the digits that give the same float back.
+    writer = csv.DictWriter(text, _columns(rows), restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]]) -> str:
+    lines = ["SIMULATED DATA: no chain fell.", ""] if session.simulated else []
+    lines += [
+        f"Session made {session.meta['created']} from {session.meta['origin']}",
+        f"Protocol {session.protocol_source}, SHA-256 {session.meta['protocol_sha256']}",
+        "",
+        "Text is UTF-8, numbers have a decimal point, an empty value was not measured.",
+        "Units stand at the ends of names. Behind a quantity, _u is its standard uncertainty and",
+        "_U95 its expanded uncertainty (95 %), in the same unit.",
+        "edges.csv is in the format that rig import reads and holds the last attempt at each run.",
+    ]
+    described = {name: _columns(rows) for name, rows in tables.items()}
+    described["edges.csv"] = ["run", "channel", "time_s", "state"]
+    for name, columns in sorted(described.items()):
+        lines += ["", name]
+        lines += [f"  {column}{_describe(column)}" for column in columns]
+    return "\n".join(lines) + "\n"
+
+
+def _describe(column: str) -> str:
+    if column.endswith(("_u", "_U95")):
+        return ""
+    unit = next((unit for end, unit in _UNITS.items() if column.endswith(end)), "")
+    meaning = _MEANINGS.get(column, "")
+    told = " ".join(filter(None, [f"[{unit}]" if unit else "", meaning]))
+    return f": {told}" if told else ""

@@ -1,0 +1,144 @@
+"""Writes that wait in memory until the disk has them, so that a full disk costs no data."""
+
+from __future__ import annotations
+
+import sqlite3
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.errors import SessionError
+from rig.session.faults import as_session_error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+class Statement(NamedTuple):
+    """One SQL statement and the rows it is run with."""
+
+    sql: str
+    rows: Sequence[Sequence[object]]
+
+
+_BAD_ROW = (
+    sqlite3.IntegrityError,
+    sqlite3.DataError,
+    sqlite3.InterfaceError,
+    sqlite3.ProgrammingError,
+    OverflowError,  # a number beyond 64 bits
+    ValueError,
+    TypeError,
+)
+"""Errors of the row itself: trying again cannot help. All others are the disk's."""
+
+
+class Journal:
+    """The open transaction, and a copy of it that survives a failed commit.
+
+    SQLite rolls the whole transaction back when the disk is full. The rows are still here then,
+    and the next `commit` writes them; only the end of the process loses them.
+
+    Parameters
+    ----------
+    connection
+        In manual transaction mode (``isolation_level=None``).
+    path
+        For messages.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+        self._connection = connection
+        self._path = path
+        self._pending: list[tuple[Statement, ...]] = []
+        self._applied = 0  # how many of the pending the open transaction holds
+        self._failed = False
+
+    def __len__(self) -> int:
+        """Count the records not yet on the disk."""
+        return len(self._pending)
+
+    def add(self, *statements: Statement) -> None:
+        """Put statements into the open transaction, all or none of them.
+
+        Raises
+        ------
+        SessionError
+            If the rows are refused (they are forgotten) or the disk fails (they are kept).
+        """
+        self._pending.append(statements)
+        # After a failure wait for commit(): trying the whole backlog at every row would be
+        # quadratic, and the caller already knows.
+        if not self._failed:
+            self._run()
+
+    def commit(self) -> None:
+        """Make everything added so far durable.
+
+        Raises
+        ------
+        SessionError
+            If the disk fails; nothing is forgotten and a later call tries again.
+        """
+        if not self._pending:
+            return
+        refusal: SessionError | None = None
+        try:
+            self._run()
+        except SessionError as error:
+            if self._failed:
+                raise
+            refusal = error
+        try:
+            if self._connection.in_transaction:
+                self._connection.execute("COMMIT")
+        except sqlite3.Error as error:
+            self._give_up()
+            raise as_session_error(self._path, error) from error
+        self._pending.clear()
+        self._applied = 0
+        if refusal is not None:
+            raise refusal
+
+    def _run(self) -> None:
+        """Apply what is pending; refused records are left out and reported after the rest."""
+        refusal: Exception | None = None
+        try:
+            if not self._connection.in_transaction:
+                self._applied = 0
+                self._connection.execute("BEGIN IMMEDIATE")
+            while self._applied < len(self._pending):
+                try:
+                    self._apply(self._pending[self._applied])
+                except _BAD_ROW as error:
+                    del self._pending[self._applied]
+                    refusal = error
+                else:
+                    self._applied += 1
+        except sqlite3.Error as error:
+            self._give_up()
+            raise as_session_error(self._path, error) from error
+        self._failed = False
+        if isinstance(refusal, sqlite3.Error):
+            raise as_session_error(self._path, refusal) from refusal
+        if refusal is not None:
+            raise SessionError(f"{self._path} refuses this record ({refusal})") from refusal
+
+    def _apply(self, statements: tuple[Statement, ...]) -> None:
+        # Even one executemany can fail half-way through its rows.
+        self._connection.execute("SAVEPOINT record")
+        try:
+            for statement in statements:
+                self._connection.executemany(statement.sql, statement.rows)
+        except _BAD_ROW:
+            self._connection.execute("ROLLBACK TO record")
+            raise
+        finally:
+            # When the disk failed SQLite has already rolled everything back, savepoint included.
+            if self._connection.in_transaction:
+                self._connection.execute("RELEASE record")
+
+    def _give_up(self) -> None:
+        self._failed = True
+        self._applied = 0
+        if self._connection.in_transaction:
+            self._connection.rollback()

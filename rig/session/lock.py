@@ -1,0 +1,78 @@
+"""One writer at a time: an advisory lock that no crash can leave behind."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rig.errors import SessionError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class WriterLock:
+    """An exclusive ``flock`` on ``FILE.lock`` beside the session.
+
+    The kernel drops the lock when its process ends, however it ends, so a killed writer blocks
+    nobody. The lock has a file of its own because closing any second handle on the database
+    would silently drop the POSIX locks SQLite holds on it in this process.
+
+    Raises
+    ------
+    SessionError
+        If another process (or another `Session` here) holds it, or the folder cannot be written.
+    """
+
+    def __init__(self, session: Path) -> None:
+        self.path = session.with_name(session.name + ".lock")
+        self._handle: int | None = None
+        try:
+            self._handle = self._acquire(session)
+        except OSError as error:
+            if isinstance(error, SessionError):
+                raise
+            raise SessionError(
+                f"cannot lock {session}: {error.strerror or error}",
+                "a session needs a folder you may write to; copy it to one, or only read it",
+            ) from error
+
+    def _acquire(self, session: Path) -> int:
+        while True:
+            handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if self._is_current(handle):
+                    os.ftruncate(handle, 0)
+                    os.write(handle, f"{os.getpid()}\n".encode())
+                    return handle
+            except BlockingIOError:
+                owner = os.pread(handle, 32, 0).decode("ascii", "replace").strip()
+                os.close(handle)
+                holder = f"process {owner}" if owner else "another process"
+                raise SessionError(
+                    f"{session} is being written by {holder}",
+                    "stop that one first, use its daemon, or open the session read-only",
+                ) from None
+            except BaseException:
+                os.close(handle)
+                raise
+            os.close(handle)
+
+    def _is_current(self, handle: int) -> bool:
+        # The holder before us may have removed the file between our open and our lock; what we
+        # hold would then be a lock on a name nobody else can see.
+        with suppress(FileNotFoundError):
+            return os.path.samestat(os.fstat(handle), self.path.stat())
+        return False
+
+    def release(self) -> None:
+        """Give the lock up and take its file away; further calls do nothing."""
+        if self._handle is None:
+            return
+        with suppress(OSError):  # a folder made read-only meanwhile: a stale *file* blocks nobody
+            self.path.unlink(missing_ok=True)  # while still locked, see _is_current
+        os.close(self._handle)
+        self._handle = None

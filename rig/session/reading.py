@@ -1,0 +1,156 @@
+"""Reading a session: raw records, the log of states, results and facts."""
+
+from __future__ import annotations
+
+import json
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from rig.errors import SessionError
+from rig.records import Certificate, Drop, Edge, Ping
+from rig.session.faults import translated
+from rig.session.schema import RunState
+
+if TYPE_CHECKING:
+    import sqlite3
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+Direction = Literal["rx", "tx"]
+"""``rx``: from the device to the host; ``tx``: from the host to the device."""
+
+
+class StateEntry(NamedTuple):
+    """One line of the log of run states."""
+
+    run: int
+    attempt: int
+    state: RunState
+    host_ns: int
+    reasons: tuple[str, ...]
+
+
+class ByteChunk(NamedTuple):
+    """Bytes as one read or write moved them."""
+
+    host_ns: int
+    direction: Direction
+    data: bytes
+
+
+class Reader:
+    """Everything that can be asked of an open session.
+
+    Parameters
+    ----------
+    path
+        For messages.
+    connection
+        Checked to be a session.
+    """
+
+    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
+        self.path = path
+        self._connection: sqlite3.Connection | None = connection
+        self._meta: Mapping[str, str] = MappingProxyType(
+            dict(self._rows("SELECT key, value FROM meta"))
+        )
+
+    @property
+    def meta(self) -> Mapping[str, str]:
+        """Facts fixed when the file was made: created, rig_version, origin and more."""
+        return self._meta
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the data come from a simulation."""
+        return self._meta["simulated"] == "true"
+
+    @property
+    def protocol_text(self) -> str:
+        """The protocol file word for word."""
+        return str(self._one("SELECT text FROM protocol"))
+
+    @property
+    def protocol_source(self) -> str:
+        """The protocol file's name when the session was made."""
+        return str(self._one("SELECT source FROM protocol"))
+
+    def identities(self) -> list[tuple[int, dict[str, Any]]]:
+        """Host time and content of every identity, in order."""
+        rows = self._rows("SELECT host_ns, json FROM identity ORDER BY id")
+        return [(host_ns, json.loads(text)) for host_ns, text in rows]
+
+    def byte_log(self) -> Iterator[ByteChunk]:
+        """All bytes in both directions, in order, read as they are asked for."""
+        for row in self._rows("SELECT host_ns, direction, data FROM bytes ORDER BY id"):
+            yield ByteChunk(*row)
+
+    def pings(self) -> list[Ping]:
+        """All clock samples in order."""
+        rows = self._rows("SELECT host_send_ns, host_recv_ns, tick FROM ping ORDER BY id")
+        return [Ping(*row) for row in rows]
+
+    def drops(self) -> Iterator[Drop]:
+        """Every attempt at every run, in the order of recording."""
+        yield from map(self._drop, list(self._rows('SELECT * FROM "drop" ORDER BY id')))
+
+    def latest_drops(self) -> list[Drop]:
+        """Return the last attempt at each run, by run."""
+        rows = self._rows(
+            'SELECT * FROM "drop" AS d WHERE attempt = '
+            '(SELECT max(attempt) FROM "drop" WHERE run = d.run) ORDER BY run'
+        )
+        return [self._drop(row) for row in list(rows)]
+
+    def states(self) -> list[StateEntry]:
+        """Return the whole log of run states, in order."""
+        rows = self._rows("SELECT run, attempt, state, host_ns, reasons FROM run_state ORDER BY id")
+        return [_state(row) for row in rows]
+
+    def latest_state(self, run: int) -> StateEntry | None:
+        """Where a run stands; `None` when the log does not name it."""
+        rows = self._rows(
+            "SELECT run, attempt, state, host_ns, reasons FROM run_state WHERE run = ? "
+            "ORDER BY id DESC LIMIT 1",
+            run,
+        )
+        return next(map(_state, rows), None)
+
+    def results(self) -> list[dict[str, Any]]:
+        """Return derived results as last put, by run and attempt."""
+        rows = self._rows("SELECT json FROM result ORDER BY run, attempt")
+        return [json.loads(text) for (text,) in rows]
+
+    def _opened(self) -> sqlite3.Connection:
+        if self._connection is None:
+            raise SessionError(f"{self.path} is closed", "open it again")
+        return self._connection
+
+    def _rows(self, sql: str, *values: object) -> Iterator[tuple[Any, ...]]:
+        with translated(self.path):
+            yield from self._opened().execute(sql, values)
+
+    def _one(self, sql: str) -> Any:
+        return next(self._rows(sql))[0]
+
+    def _drop(self, row: tuple[Any, ...]) -> Drop:
+        number, run, attempt, tick_hz, fire_tick, initial_state, events, *counts = row[:11]
+        edges = self._rows(
+            'SELECT tick, channel, blocked FROM edge WHERE "drop" = ? ORDER BY idx', number
+        )
+        return Drop(
+            run=run,
+            attempt=attempt,
+            tick_hz=tick_hz,
+            edges=tuple(Edge(tick, channel, bool(blocked)) for tick, channel, blocked in edges),
+            fire_tick=fire_tick,
+            initial_state=initial_state,
+            certificate=None if events is None else Certificate(events, *counts),
+            faults=tuple(json.loads(row[11])),
+        )
+
+
+def _state(row: tuple[Any, ...]) -> StateEntry:
+    run, attempt, state, host_ns, reasons = row
+    return StateEntry(run, attempt, RunState(state), host_ns, tuple(json.loads(reasons)))

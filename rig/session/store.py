@@ -1,0 +1,283 @@
+"""The session: one SQLite file that holds everything that happened, in order."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import sqlite3
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from rig import __version__
+from rig.errors import SessionError
+from rig.session.database import build, check_free, check_place, connect
+from rig.session.journal import Journal, Statement
+from rig.session.lock import WriterLock
+from rig.session.reading import Direction, Reader
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rig.records import Drop, Ping
+    from rig.session.schema import RunState
+
+
+class Session(Reader):
+    """An open session file; make one with `create` or `open`.
+
+    Whatever is added waits in one open transaction until `commit`, which returns when the disk
+    has it. Raw records can be added, never altered. One thread uses a session; any number of
+    read-only sessions may be open on the same file.
+    """
+
+    def __init__(self, path: Path, connection: sqlite3.Connection, lock: WriterLock | None) -> None:
+        super().__init__(path, connection)
+        self._lock = lock
+        self._journal = Journal(connection, path)
+        # Counted here, not by SQLite, so that a commit tried again writes the same rows.
+        self._last_drop = int(self._one('SELECT coalesce(max(id), 0) FROM "drop"'))
+
+    @classmethod
+    def create(
+        cls,
+        path: str | os.PathLike[str],
+        protocol_text: str,
+        protocol_source: str,
+        *,
+        simulated: bool,
+        origin: str,
+    ) -> Session:
+        """Make a new session file and open it for writing.
+
+        Parameters
+        ----------
+        path
+            Must not exist yet.
+        protocol_text, protocol_source
+            The protocol file word for word, and its name.
+        simulated
+            Whether the data come from a simulation; kept for good and stamped on every result.
+        origin
+            The port's URL, or the name of the imported file.
+
+        Raises
+        ------
+        SessionError
+            If something is already there or the place cannot be written.
+        """
+        place = Path(os.path.realpath(path))
+        lock = WriterLock(place)
+        try:
+            check_free(place)
+            meta = {
+                "created": datetime.now(UTC).isoformat(timespec="seconds"),
+                "rig_version": __version__,
+                "python_version": platform.python_version(),
+                "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
+                "simulated": "true" if simulated else "false",
+                "origin": origin,
+            }
+            build(place, meta, protocol_source, protocol_text)
+            return cls(place, connect(place, readonly=False), lock)
+        except BaseException:
+            lock.release()
+            raise
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Session:
+        """Open an existing session.
+
+        Parameters
+        ----------
+        path
+            The file.
+        readonly
+            Works beside a writer and on write-protected files.
+
+        Raises
+        ------
+        SessionError
+            If it is missing, something else, newer than this program, damaged, or already being
+            written by another process.
+        """
+        place = Path(os.path.realpath(path))
+        check_place(place)
+        lock = None if readonly else WriterLock(place)
+        try:
+            connection = connect(place, readonly=readonly)
+            try:
+                return cls(place, connection, lock)
+            except BaseException:
+                connection.close()
+                raise
+        except BaseException:
+            if lock is not None:
+                lock.release()
+            raise
+
+    # ------------------------------------------------------------------ life
+
+    @property
+    def readonly(self) -> bool:
+        """Whether nothing can be added."""
+        return self._lock is None
+
+    @property
+    def pending(self) -> int:
+        """Number of records that no `commit` has made durable yet."""
+        return len(self._journal)
+
+    def commit(self) -> None:
+        """Return when everything added so far is on the disk.
+
+        Raises
+        ------
+        SessionError
+            If the disk is full or fails. The records are kept in memory; call again.
+        """
+        self._writable().commit()
+
+    def close(self) -> None:
+        """Commit and close; further calls do nothing.
+
+        Raises
+        ------
+        SessionError
+            If the last commit fails; the file is closed nevertheless.
+        """
+        if self._connection is None:
+            return
+        connection = self._connection
+        try:
+            if not self.readonly:
+                self._journal.commit()
+                # Leaves one file to copy even while a reader keeps the log from being removed.
+                with suppress(sqlite3.Error):
+                    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        finally:
+            self._connection = None
+            connection.close()
+            if self._lock is not None:
+                self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()  # also after an error: what was measured stays measured
+
+    # ------------------------------------------------------------------ adding
+
+    def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
+        """Add bytes exchanged with the device, as they came or went."""
+        self._add(
+            "INSERT INTO bytes (host_ns, direction, data) VALUES (?, ?, ?)",
+            (host_ns, direction, bytes(data)),
+        )
+
+    def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None:
+        """Add what a device said it is, each time it says so."""
+        self._add(
+            "INSERT INTO identity (host_ns, json) VALUES (?, ?)",
+            (host_ns, json.dumps(dict(identity))),
+        )
+
+    def add_ping(self, ping: Ping) -> None:
+        """Add one clock sample."""
+        self.add_pings([ping])
+
+    def add_pings(self, pings: Iterable[Ping]) -> None:
+        """Add clock samples, all or none."""
+        self._add(
+            "INSERT INTO ping (host_send_ns, host_recv_ns, tick) VALUES (?, ?, ?)",
+            *map(tuple, pings),
+        )
+
+    def add_drop(self, drop: Drop, *, host_ns: int | None = None, provenance: str = "") -> None:
+        """Add the raw record of one drop with its edges, all or nothing.
+
+        Parameters
+        ----------
+        drop
+            A new pair of run and attempt.
+        host_ns
+            Host time at which the record was complete, where known.
+        provenance
+            How the record came here, for example ``device`` or the imported file.
+        """
+        journal = self._writable()
+        self._last_drop += 1
+        number = self._last_drop
+        certificate = drop.certificate
+        fields = (
+            (None,) * 5
+            if certificate is None
+            else (
+                certificate.events,
+                certificate.crc32,
+                certificate.overflows,
+                certificate.glitches,
+                certificate.late,
+            )
+        )
+        head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
+        tail = (json.dumps(drop.faults, ensure_ascii=False), host_ns, provenance)
+        journal.add(
+            Statement(
+                'INSERT INTO "drop" VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)',
+                [(*head, *fields, *tail)],
+            ),
+            Statement(
+                "INSERT INTO edge VALUES (?, ?, ?, ?, ?)",
+                [
+                    (number, index, edge.tick, edge.channel, int(edge.blocked))
+                    for index, edge in enumerate(drop.edges)
+                ],
+            ),
+        )
+
+    def add_state(
+        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[str] = ()
+    ) -> None:
+        """Add one line to the log of run states."""
+        self._add(
+            "INSERT INTO run_state (run, attempt, state, reasons, host_ns) VALUES (?, ?, ?, ?, ?)",
+            (run, attempt, str(state), json.dumps(list(reasons), ensure_ascii=False), host_ns),
+        )
+
+    def put_results(self, results: Iterable[Mapping[str, Any]], analysis_version: str) -> None:
+        """Replace all derived results in the open transaction.
+
+        Parameters
+        ----------
+        results
+            One JSON object an attempt, each with ``run`` and ``attempt``.
+        analysis_version
+            Of the program that made them.
+        """
+        rows = [
+            (
+                result["run"],
+                result["attempt"],
+                analysis_version,
+                json.dumps(dict(result), ensure_ascii=False, allow_nan=False),
+            )
+            for result in results
+        ]
+        self._writable().add(
+            Statement("DELETE FROM result", [()]),
+            Statement("INSERT INTO result VALUES (?, ?, ?, ?)", rows),
+        )
+
+    def _writable(self) -> Journal:
+        self._opened()
+        if self.readonly:
+            raise SessionError(f"{self.path} is open read-only", "open it for writing")
+        return self._journal
+
+    def _add(self, sql: str, *rows: Sequence[object]) -> None:
+        self._writable().add(Statement(sql, rows))

@@ -1,0 +1,253 @@
+"""Quantities as people write them in files: ``48.5 mm``, ``0.50 ± 0.05``, ``9.81 m/s^2``.
+
+The number is scaled by an exact fraction and rounded once, so ``48.5 mm`` is the float nearest to
+0.0485 and not the product of two floats.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import Enum
+from fractions import Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A value with its standard uncertainty, both in the same base unit.
+
+    Base units are SI, except angles, which stay in degrees so that ``40 deg`` is exactly 40.
+
+    Attributes
+    ----------
+    value
+        Best estimate.
+    u
+        Standard uncertainty (GUM, k = 1); what a file writes behind ``±``. Zero when not stated.
+    """
+
+    value: float
+    u: float = 0.0
+
+
+class UnitError(ValueError):
+    """A text is not the quantity that was asked for; says what was found and what is accepted."""
+
+
+class Dimension(Enum):
+    """What a quantity measures: its name with the article, and an example to follow."""
+
+    LENGTH = ("a length", "180 mm")
+    TIME = ("a time", "80 ms")
+    ANGLE = ("an angle", "40 deg")
+    ACCELERATION = ("an acceleration", "9.81 m/s^2")
+    SPEED = ("a speed", "5.2 m/s")
+    MASS = ("a mass", "35 g")
+    FREQUENCY = ("a frequency", "1 Hz")
+    NUMBER = ("a plain number", "0.50 ± 0.05")
+
+    @property
+    def noun(self) -> str:
+        """Name with its article."""
+        return str(self.value[0])
+
+    @property
+    def example(self) -> str:
+        """An example of a quantity of this kind."""
+        return str(self.value[1])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Accepted units in their canonical spelling."""
+        return tuple(unit for unit, (dimension, _) in UNITS.items() if dimension is self)
+
+
+# 180/π to 50 digits: the only factor that no fraction gives exactly.
+_DEGREES_PER_RADIAN = Fraction("57.295779513082320876798154814105170332405472466564")
+_FOOT = Fraction("0.3048")  # international foot and inch, exact since 1959
+
+UNITS: dict[str, tuple[Dimension, Fraction]] = {
+    "m": (Dimension.LENGTH, Fraction(1)),
+    "mm": (Dimension.LENGTH, Fraction(1, 1000)),
+    "cm": (Dimension.LENGTH, Fraction(1, 100)),
+    "µm": (Dimension.LENGTH, Fraction(1, 10**6)),
+    "km": (Dimension.LENGTH, Fraction(1000)),
+    "in": (Dimension.LENGTH, _FOOT / 12),
+    "ft": (Dimension.LENGTH, _FOOT),
+    "s": (Dimension.TIME, Fraction(1)),
+    "ms": (Dimension.TIME, Fraction(1, 1000)),
+    "µs": (Dimension.TIME, Fraction(1, 10**6)),
+    "ns": (Dimension.TIME, Fraction(1, 10**9)),
+    "min": (Dimension.TIME, Fraction(60)),
+    "h": (Dimension.TIME, Fraction(3600)),
+    "deg": (Dimension.ANGLE, Fraction(1)),
+    "rad": (Dimension.ANGLE, _DEGREES_PER_RADIAN),
+    "mrad": (Dimension.ANGLE, _DEGREES_PER_RADIAN / 1000),
+    "m/s^2": (Dimension.ACCELERATION, Fraction(1)),
+    "cm/s^2": (Dimension.ACCELERATION, Fraction(1, 100)),
+    "ft/s^2": (Dimension.ACCELERATION, _FOOT),
+    "m/s": (Dimension.SPEED, Fraction(1)),
+    "cm/s": (Dimension.SPEED, Fraction(1, 100)),
+    "km/h": (Dimension.SPEED, Fraction(5, 18)),
+    "kg": (Dimension.MASS, Fraction(1)),
+    "g": (Dimension.MASS, Fraction(1, 1000)),
+    "mg": (Dimension.MASS, Fraction(1, 10**6)),
+    "Hz": (Dimension.FREQUENCY, Fraction(1)),
+    "kHz": (Dimension.FREQUENCY, Fraction(1000)),
+    "1": (Dimension.NUMBER, Fraction(1)),
+    "%": (Dimension.NUMBER, Fraction(1, 100)),
+    "ppm": (Dimension.NUMBER, Fraction(1, 10**6)),
+}
+# The micro sign and the Greek letter look alike and both come off keyboards.
+_SPELLINGS = str.maketrans({"μ": "µ", "²": "^2", "°": "deg"})
+_ALIASES = {"um": "µm", "us": "µs", "m/s2": "m/s^2", "cm/s2": "cm/s^2", "ft/s2": "ft/s^2"}
+_RELATIVE = ("%", "ppm")
+
+_NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_UNIT = r"(?:(?<=\s)1|[^\s0-9.,±+()-][^±+()]*?)"
+_PLUS_MINUS = r"(?:±|\+/-|\+-)"
+_LAST_DIGITS = r"(?:\((?P<last>[0-9]+)\))?"
+_PLAIN = re.compile(
+    rf"(?P<value>{_NUMBER}){_LAST_DIGITS}\s*(?P<unit>{_UNIT})?\s*"
+    rf"(?:{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*(?P<u_unit>{_UNIT})?)?"
+)
+_BRACKETED = re.compile(
+    rf"\(\s*(?P<value>{_NUMBER})\s*{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*\)\s*(?P<unit>{_UNIT})?"
+)
+_LONGEST = 100
+_LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction
+
+
+def quoted(text: str, limit: int = 40) -> str:
+    """Return `text` for a one-line message: in quotes, control characters escaped, cut short."""
+    return repr(text if len(text) <= limit else text[:limit] + "…")
+
+
+def parse(text: str | float, dimension: Dimension) -> Quantity:
+    """Read a quantity of a given dimension.
+
+    Parameters
+    ----------
+    text
+        ``180 mm``, ``180 ± 2 mm``, ``1.2 m +/- 2 mm``, ``(180 ± 2) mm``, ``180(2) mm``. A number
+        without a unit is accepted only where a plain number is wanted.
+    dimension
+        What the text must measure.
+
+    Returns
+    -------
+    Quantity
+        In base units (SI; angles in degrees), each number correctly rounded.
+
+    Raises
+    ------
+    UnitError
+        If the text is no such quantity; the message says what was found and what is accepted.
+    """
+    text = repr(text) if isinstance(text, float) else str(text)
+    wanted = f"{dimension.noun} is wanted, e.g. {dimension.example}"
+    clean = " ".join(text.split()).replace("−", "-")
+    if len(clean) > _LONGEST:
+        raise UnitError(f"found a text of {len(clean)} characters; {wanted}")
+    match = _BRACKETED.fullmatch(clean) or _PLAIN.fullmatch(clean)
+    if match is None:
+        raise UnitError(f"found {quoted(text)}; {wanted}")
+    found = match.groupdict()
+    unit, u_unit = found["unit"], found.get("u_unit")
+    if found["u"] is not None and match.re is _PLAIN:
+        unit, u_unit = _shared_unit(clean, unit, u_unit)
+    factor = _factor(unit, dimension, clean)
+    value = _scaled(found["value"], factor, clean)
+    if found.get("last"):
+        if found["u"] is not None:
+            raise UnitError(f"found {quoted(text)} with two uncertainties; {wanted}")
+        digits = Decimal(found["value"]).as_tuple().exponent
+        return Quantity(value, _scaled(f"{found['last']}e{digits}", factor, clean))
+    if found["u"] is None:
+        return Quantity(value)
+    u = _scaled(found["u"], _factor(u_unit or unit, dimension, clean), clean)
+    if u < 0:
+        raise UnitError(f"found {quoted(text)}; an uncertainty is not negative")
+    return Quantity(value, u)
+
+
+def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:
+    """Return the units of a value and of what stands behind its ``±``."""
+    if unit is not None and u_unit is None:
+        raise UnitError(f"found {quoted(text)}; the part behind ± needs its unit too")
+    if unit is None and u_unit in _RELATIVE:
+        # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
+        raise UnitError(
+            f"found {quoted(text)}, which can be read in two ways; "
+            f"write both parts in the same unit, e.g. 0.50 ± 0.05 or 50 % ± 5 %"
+        )
+    return unit or u_unit, u_unit
+
+
+def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
+    """Return what one `unit` is in base units, if it measures `dimension`."""
+    name = "".join((unit or "1").split()).translate(_SPELLINGS).replace("**", "^")
+    name = _ALIASES.get(name, name)
+    accepted = f"{dimension.noun} is written in {', '.join(dimension.units)}"
+    if name not in UNITS:
+        near = {known.casefold(): known for known in dimension.units}
+        close = difflib.get_close_matches(name.casefold(), near, n=1, cutoff=0.5)
+        guess = f"did you mean {near[close[0]]}? " if close else ""
+        raise UnitError(f"found the unit {quoted(unit or '')}, not known; {guess}{accepted}")
+    found, factor = UNITS[name]
+    if found is not dimension:
+        if unit is None:
+            raise UnitError(
+                f"found {quoted(text)} without a unit; {accepted}, e.g. {dimension.example}"
+            )
+        raise UnitError(
+            f"{text} is {found.noun}; {dimension.noun} is wanted, e.g. {dimension.example}"
+        )
+    return factor
+
+
+def _scaled(number: str, factor: Fraction, text: str) -> float:
+    """Return ``number × factor``, rounded once."""
+    try:
+        exact = Decimal(number)
+        if exact == 0:
+            return 0.0
+        if abs(exact.adjusted()) > _LARGEST_EXPONENT:
+            raise OverflowError
+        result = float(Fraction(exact) * factor)
+    except ArithmeticError:
+        result = 0.0
+    if result == 0:
+        raise UnitError(f"found {quoted(text)}, which is beyond what a number can hold")
+    return result
+
+
+def format_quantity(quantity: Quantity, unit: str) -> str:
+    """Write a quantity for a table or a message.
+
+    Parameters
+    ----------
+    quantity
+        In base units.
+    unit
+        One of `UNITS`; ``1`` writes no unit.
+
+    Returns
+    -------
+    str
+        ``180.0 ± 2.0 mm``: the uncertainty to two significant digits and the value to the same
+        place; without an uncertainty the value to six significant digits.
+    """
+    factor = float(UNITS[unit][1])
+    value, u = quantity.value / factor, quantity.u / factor
+    suffix = "" if unit == "1" else f" {unit}"
+    if not (u > 0 and math.isfinite(u) and math.isfinite(value)):
+        return f"{value:.6g}{suffix}"
+    places = 1 - int(f"{u:.1e}".partition("e")[2])  # after rounding: 0.0996 is 0.10, not 0.100
+    shown, shown_u = (f"{round(x, places):.{max(places, 0)}f}" for x in (value, u))
+    if unit in _RELATIVE:
+        return f"({shown} ± {shown_u}){suffix}"
+    return f"{shown} ± {shown_u}{suffix}"

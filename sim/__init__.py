@@ -1,0 +1,1 @@
+"""Simulated rig: falling chains behind a virtual microcontroller, opened as ``sim://``."""

@@ -1,0 +1,227 @@
+"""The virtual microcontroller: the same conversation as the firmware, in virtual time.
+
+It is a state machine over a list of things that will happen: bytes that arrive, gates that
+change, a recording that ends. `advance` lets them happen up to a moment. Nothing here waits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import random
+from collections import deque
+from typing import TYPE_CHECKING
+
+from rig.link import messages as wire
+from rig.link.frames import DELIMITER, Decoder, crc16
+from sim.controller import Controller
+from sim.counter import Counter
+from sim.transmitter import Transmitter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from sim.lab_interface import Lab
+
+CAPACITY = 1024
+MAX_PULSE_US = 500_000
+EXTERNAL_RESET = 2  # the AVR's EXTRF in MCUSR
+_EXECUTION_NS = 60_000  # from a request's last byte to its execution
+_BATCH = 16  # events worth a frame of their own
+_OLDEST_NS = 10_000_000  # an event waits no longer than this for company
+_BOOT_NS = 300_000_000
+_CHANNELS = " ".join([f"PB{n}" for n in range(8)] + [f"PK{n}" for n in range(8)])
+
+
+class VirtualBoard:
+    """A microcontroller in front of a lab.
+
+    Parameters
+    ----------
+    lab
+        What the gates see.
+    seed
+        Chooses unique id, tokens and the counter's start.
+    tick_hz, ppm
+        Nominal rate, and how far the true rate is off.
+    baudrate
+        Of the line.
+    capacity
+        Events that fit its memory.
+    start_tick
+        The counter at virtual time 0; by default from the seed.
+    protocol_version
+        What it claims to speak.
+    """
+
+    def __init__(
+        self,
+        lab: Lab,
+        seed: int = 0,
+        *,
+        tick_hz: int = 16_000_000,
+        ppm: float = 0.0,
+        baudrate: int = 500_000,
+        capacity: int = CAPACITY,
+        start_tick: int | None = None,
+        protocol_version: int = wire.PROTOCOL_VERSION,
+    ) -> None:
+        self.lab = lab
+        self.line = Transmitter(baudrate)
+        self.identity = wire.Identity(
+            protocol_version=protocol_version,
+            board="virtual",
+            firmware="sim",
+            unique_id=hashlib.sha256(f"virtual board {seed}".encode()).digest()[:8],
+            tick_hz=tick_hz,
+            gates=16,
+            releases=4,
+            max_pulse_us=MAX_PULSE_US,
+            capacity=capacity,
+            channels=_CHANNELS,
+        )
+        self._random = random.Random(f"board {seed}")  # noqa: S311 - a simulation, not secrets
+        start = self._random.getrandbits(32) if start_tick is None else start_tick
+        self.counter = Counter(tick_hz, ppm, start)
+        self._now_ns = 0
+        self._boot_ns: int | None = None
+        self._boot_cause = EXTERNAL_RESET
+        self._forget()
+
+    def receive(self, start_ns: int, data: bytes) -> None:
+        """Take bytes from the host.
+
+        Parameters
+        ----------
+        start_ns
+            When the first begins to arrive; they follow each other at line rate.
+        data
+            The bytes.
+        """
+        at = start_ns
+        for piece in data.split(DELIMITER):
+            at += (len(piece) + 1) * self.line.byte_ns
+            self._inbox.append((at, piece + DELIMITER))
+        # The last piece has no delimiter behind it.
+        at, piece = self._inbox.pop()
+        if piece != DELIMITER:
+            self._inbox.append((at - self.line.byte_ns, piece[:-1]))
+
+    def reset(self, at_ns: int, cause: int = EXTERNAL_RESET) -> None:
+        """Restart, as opening the port does to a Mega; all is forgotten, the drop too.
+
+        Parameters
+        ----------
+        at_ns
+            When.
+        cause
+            For the BOOT frame.
+        """
+        self.advance(at_ns)
+        self.line.clear(at_ns)
+        self._forget()
+        self.counter.start = self._random.getrandbits(32)
+        self._boot_ns = at_ns + _BOOT_NS
+        self._boot_cause = cause
+
+    def touch(self, gates: int) -> None:
+        """Change the beams by hand, now (arming asks the lab again).
+
+        Parameters
+        ----------
+        gates
+            Mask of the blocked ones from now on.
+        """
+        self._controller.touch(gates)
+
+    def advance(self, until_ns: int) -> None:
+        """Let happen what happens until a moment."""
+        while (upcoming := self._upcoming()) is not None and upcoming[0] <= until_ns:
+            self._now_ns = max(self._now_ns, upcoming[0])
+            upcoming[1]()
+        self._now_ns = max(self._now_ns, until_ns)
+
+    def next_ns(self) -> int | None:
+        """Say when something will happen next, or `None` when nothing will."""
+        upcoming = self._upcoming()
+        return None if upcoming is None else upcoming[0]
+
+    def _forget(self) -> None:
+        self._decoder = Decoder()
+        self._inbox: deque[tuple[int, bytes]] = deque()
+        self._last: tuple[int, int, int] | None = None  # type, seq and CRC of the last request
+        self._answer = b""
+        self._controller = Controller(self.lab, self.counter, self.identity, self._random)
+        self._oldest_ns = 0
+
+    def _upcoming(self) -> tuple[int, Callable[[], None]] | None:
+        """Find what happens next. Sending is polled: meanwhile only interrupts happen."""
+        if self._boot_ns is not None:
+            return self._boot_ns, self._boot
+        found: list[tuple[int, Callable[[], None]]] = []
+        free_ns = self.line.free_ns
+        state = self._controller
+        if state.coming:
+            found.append((state.coming[0].when_ns, self._gate_changes))
+        if state.end_ns is not None:
+            found.append((max(state.end_ns, free_ns), self._close))
+            if state.drop is not None and state.drop.unsent:
+                full = state.drop.unsent >= _BATCH
+                due_ns = self._now_ns if full else self._oldest_ns + _OLDEST_NS
+                found.append((max(due_ns, free_ns), self._stream))
+        if state.order is not None:
+            found.append((max(state.deadline_ns, free_ns), self._time_out))
+        if self._inbox:
+            found.append((max(self._inbox[0][0] + _EXECUTION_NS, free_ns), self._listen))
+        return min(found, key=lambda item: item[0]) if found else None
+
+    def _boot(self) -> None:
+        self._boot_ns = None
+        self._inbox.clear()  # nobody listened
+        self.line.send(self._now_ns, DELIMITER)  # the reset may have cut a frame short
+        self._send(wire.Boot(self._boot_cause))
+
+    def _gate_changes(self) -> None:
+        state = self._controller
+        change = state.coming.popleft()
+        if state.drop is not None:
+            state.gates = state.gates & ~state.drop.order.gates | change.state
+            if not state.drop.unsent:
+                self._oldest_ns = change.when_ns
+            state.drop.store(change.tick, change.state)
+
+    def _stream(self) -> None:
+        drop = self._controller.drop
+        if drop is not None:
+            part = drop.part(drop.sent, wire.EVENTS_PER_FRAME)
+            drop.sent += len(part.events)
+            self._oldest_ns = self._now_ns
+            self._send(part)
+
+    def _close(self) -> None:
+        state = self._controller
+        state.end_ns = None
+        state.coming.clear()
+        if state.drop is not None:
+            while state.drop.unsent:
+                self._stream()
+            self._send(state.drop.certificate())
+
+    def _time_out(self) -> None:
+        disarmed = self._controller.time_out()
+        if disarmed is not None:
+            self._send(disarmed)
+
+    def _send(self, message: wire.DeviceMessage) -> None:
+        self.line.send(self._now_ns, self.line.frame(message, ack=0))
+
+    def _listen(self) -> None:
+        _, data = self._inbox.popleft()
+        for frame in self._decoder.feed(data):
+            this = (frame.type, frame.seq, crc16(bytes(frame[:3]) + frame.payload))
+            if frame.seq == 0:
+                continue  # could not be answered
+            if this != self._last:
+                self._last = this
+                answer = self._controller.answer(frame, self._now_ns)
+                self._answer = self.line.frame(answer, ack=frame.seq)
+            self.line.send(self._now_ns, self._answer)

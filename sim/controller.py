@@ -1,0 +1,231 @@
+"""What the virtual board decides: the answer to every request, without any timing of its own."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.link import messages as wire
+from rig.link.messages import Phase, Reason
+from sim.recording import Recording
+from sim.snapshots import take_snapshots
+
+if TYPE_CHECKING:
+    import random
+
+    from rig.link.frames import Frame
+    from sim.counter import Counter
+    from sim.lab_interface import Lab
+
+
+class Coming(NamedTuple):
+    """A snapshot the board is going to take."""
+
+    when_ns: int
+    tick: int
+    state: int
+
+
+class Controller:
+    """The board's state between requests.
+
+    Parameters
+    ----------
+    lab
+        What the gates see.
+    counter
+        The device's time.
+    identity
+        What it says it is and can do.
+    tokens
+        Where tokens come from.
+
+    Attributes
+    ----------
+    gates
+        Mask of the beams blocked now.
+    order, deadline_ns
+        While armed: the ARM request, and when it lapses.
+    drop
+        While recording or holding.
+    coming, end_ns
+        While recording: what the gates are going to do, and when the recording ends.
+    """
+
+    def __init__(
+        self, lab: Lab, counter: Counter, identity: wire.Identity, tokens: random.Random
+    ) -> None:
+        self.gates = 0
+        self.order: wire.Arm | None = None
+        self.deadline_ns = 0
+        self.drop: Recording | None = None
+        self.coming: deque[Coming] = deque()
+        self.end_ns: int | None = None
+        self._lab = lab
+        self._counter = counter
+        self._identity = identity
+        self._random = tokens
+        self._token = 0
+        self._changed = 0  # armed gates that moved since ARM
+        self._now_ns = 0
+
+    @property
+    def phase(self) -> Phase:
+        """What the board is doing."""
+        if self.order is not None:
+            return Phase.ARMED
+        if self.end_ns is not None:
+            return Phase.RECORDING
+        return Phase.IDLE if self.drop is None else Phase.HOLDING
+
+    def touch(self, gates: int) -> None:
+        """Change the beams by hand (arming asks the lab again)."""
+        if self.order is not None:
+            self._changed |= (self.gates ^ gates) & self.order.gates
+        self.gates = gates
+
+    def time_out(self) -> wire.Disarmed | None:
+        """Disarm, when armed."""
+        order, self.order = self.order, None
+        return wire.Disarmed(order.label, wire.DisarmReason.TIMEOUT) if order else None
+
+    def answer(self, frame: Frame, now_ns: int) -> wire.DeviceMessage:
+        """Execute a request.
+
+        Parameters
+        ----------
+        frame
+            As received.
+        now_ns
+            When.
+
+        Returns
+        -------
+        DeviceMessage
+            The answer, perhaps a refusal.
+        """
+        self._now_ns = now_ns
+        if frame.type >= 0x80 or frame.type not in wire.TABLE:
+            return wire.Refused(Reason.UNKNOWN_MESSAGE, frame.type)
+        try:
+            request = wire.unpack(frame.type, frame.payload)
+        except wire.MessageError:
+            return wire.Refused(Reason.BAD_PARAMETER, 0)
+        match request:
+            case wire.Identify():
+                return self._identify(request)
+            case wire.Ping():
+                return wire.Pong(self._counter.tick_at(self._now_ns))
+            case wire.Status():
+                return self._status()
+            case wire.Arm():
+                return self._arm(request)
+            case wire.Fire():
+                return self._fire(request)
+            case wire.Abort():
+                return self._abort()
+            case wire.Read():
+                return self._read(request)
+            case wire.Acknowledge():
+                return self._acknowledge(request)
+        raise AssertionError(request)
+
+    def _identify(self, request: wire.Identify) -> wire.DeviceMessage:
+        version = self._identity.protocol_version
+        if request.protocol_version != version:
+            return wire.Refused(Reason.VERSION, version)
+        return self._identity
+
+    def _status(self) -> wire.State:
+        order = self.order
+        if self.drop is not None:
+            order = self.drop.order
+        events = len(self.drop) if self.drop is not None else 0
+        return wire.State(self.phase, self.gates, order.label if order else 0, events)
+
+    def _arm(self, order: wire.Arm) -> wire.DeviceMessage:
+        held = self.drop
+        if self.end_ns is not None:
+            return wire.Refused(Reason.BUSY, 0)
+        if held is not None and not (held.aborted and held.order.label == order.label):
+            return wire.Refused(Reason.HOLDING_A_DROP, held.order.label & 0xFFFF)
+        if not (
+            order.label
+            and 0 < order.gates < 1 << self._identity.gates
+            and order.release < 1 << self._identity.releases
+            and order.pulse_us <= self._identity.max_pulse_us
+            and bool(order.release) == bool(order.pulse_us)
+            and order.timeout_ms
+            and order.record_ms
+        ):
+            return wire.Refused(Reason.BAD_PARAMETER, 0)
+        self.gates = self._lab.rest(order.label)
+        if blocked := self.gates & order.gates:
+            return wire.Refused(Reason.GATE_BLOCKED, blocked)
+        self.drop = None
+        self.order = order
+        self._changed = 0
+        self._token = self._random.randrange(1, 2**32)
+        self.deadline_ns = self._now_ns + order.timeout_ms * 10**6
+        return wire.Armed(self._token)
+
+    def _fire(self, request: wire.Fire) -> wire.DeviceMessage:
+        order = self.order
+        if order is None:
+            return wire.Refused(Reason.NOT_ARMED, 0)
+        if request.token != self._token:
+            return wire.Refused(Reason.WRONG_TOKEN, 0)
+        if blocked := self.gates & order.gates:
+            return wire.Refused(Reason.GATE_BLOCKED, blocked)
+        if self._changed:
+            return wire.Refused(Reason.GATE_UNSTEADY, self._changed)
+        tick = self._counter.tick_at(self._now_ns)
+        changes = self._lab.drop(order.label)
+        snapshots, glitches = take_snapshots(changes, 0, order.gates, self._counter.hz)
+        self.coming.extend(
+            Coming(
+                self._now_ns + round(s.ticks / self._counter.hz * 1e9),
+                (tick + s.ticks) % 2**32,
+                s.state,
+            )
+            for s in snapshots
+        )
+        self.drop = Recording(order, tick, self._identity.capacity, glitches)
+        self.end_ns = self._now_ns + order.record_ms * 10**6
+        self.order = None
+        return wire.Fired(tick)
+
+    def _abort(self) -> wire.DeviceMessage:
+        self.order = None
+        if self.drop is not None:
+            self.drop.aborted = True
+        if self.end_ns is not None:
+            self.end_ns = self._now_ns
+        return wire.Done()
+
+    def _read(self, request: wire.Read) -> wire.DeviceMessage:
+        refused = self._not_held(request.label)
+        if refused is not None or self.drop is None:
+            return refused or wire.Refused(Reason.NO_SUCH_DROP, 0)
+        if request.count == 0:
+            return self.drop.certificate()
+        if request.first >= len(self.drop):
+            return wire.Refused(Reason.BAD_PARAMETER, 0)
+        return self.drop.part(request.first, request.count)
+
+    def _acknowledge(self, request: wire.Acknowledge) -> wire.DeviceMessage:
+        refused = self._not_held(request.label)
+        if refused is not None or self.drop is None:
+            return refused or wire.Refused(Reason.NO_SUCH_DROP, 0)
+        if request.crc32 != self.drop.certificate().crc32:
+            return wire.Refused(Reason.WRONG_CRC, 0)
+        self.drop = None
+        return wire.Done()
+
+    def _not_held(self, label: int) -> wire.Refused | None:
+        """Say why a label's drop cannot be given, or `None`."""
+        if self.end_ns is not None:
+            return wire.Refused(Reason.BUSY, 0)
+        if self.drop is None or self.drop.order.label != label:
+            return wire.Refused(Reason.NO_SUCH_DROP, 0)
+        return None

@@ -1,0 +1,125 @@
+"""Every disturbance of the simulated rig, as one named dial."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig.units import Dimension, UnitError, parse
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True, slots=True)
+class Dials:
+    """Sizes of all disturbances; every ``_sd`` is a standard deviation.
+
+    Attributes
+    ----------
+    skew_sd
+        Scatter of the free chain's release time about the impact chain's, s.
+    delay, delay_sd
+        From the fire stamp to the impact chain's release, s.
+    hang_sd
+        Scatter of each hanging height from run to run, m.
+    drop_error
+        How far the drop is off its stated value, in its own standard uncertainties; one draw a
+        session, this is its standard deviation.
+    rod_sd
+        Rods off their nominal places on the string, m; the same in every run of that chain.
+    width_sd
+        Effective rod width off its nominal value, m; one draw a chain.
+    gate_sd
+        Beam heights off their stated values, m; the same in every run.
+    beam_sd
+        Beams off the rods' middle, m: shifts edges by x·tan(tilt), up and down rod by rod.
+    impulse_sd
+        Relative scatter of single impulses about Eq. 9.
+    jitter_sd
+        Scatter of each edge in time, s.
+    missed
+        Share of edges that leave no trace.
+    chatter
+        Share of edges at which the comparator flickers.
+    string
+        Chance for each gap between rods that the string flickers in the beam.
+    bounce
+        Chance for each struck rod to bounce back through the lowest beam.
+    clock
+        Error of the device's clock, relative.
+    latency_sd
+        Mean of the exponential delay of the host's reads, s.
+    restitution, friction
+        True coefficients; not-a-number takes the protocol's.
+    """
+
+    skew_sd: float = 2e-3
+    delay: float = 20e-3
+    delay_sd: float = 1e-3
+    hang_sd: float = 0.1e-3
+    drop_error: float = 0.5
+    rod_sd: float = 0.3e-3
+    width_sd: float = 0.1e-3
+    gate_sd: float = 0.2e-3
+    beam_sd: float = 0.5e-3
+    impulse_sd: float = 0.02
+    jitter_sd: float = 2e-6
+    missed: float = 0.01
+    chatter: float = 0.005
+    string: float = 0.002
+    bounce: float = 0.05
+    clock: float = -1300e-6
+    latency_sd: float = 0.3e-3
+    restitution: float = math.nan
+    friction: float = math.nan
+
+    @classmethod
+    def quiet(cls) -> Dials:
+        """All disturbances off: the model itself, on a perfect rig."""
+        return cls(**{name: 0.0 for name in _NAMES if name not in _KEPT})
+
+
+_NAMES = tuple(field.name for field in fields(Dials))
+_KEPT = {"delay", "restitution", "friction"}
+_TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency_sd"}
+_LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
+
+
+def read_dials(settings: Mapping[str, str]) -> Dials:
+    """Dials from a URL's query, for example ``skew_sd=2ms&clock=-1300 ppm``.
+
+    ``quiet=1`` starts from `Dials.quiet` instead of the defaults.
+
+    Raises
+    ------
+    InputError
+        An unknown dial or a value that is not a quantity of its dimension.
+    """
+    rest = dict(settings)
+    dials = Dials.quiet() if rest.pop("quiet", "0") == "1" else Dials()
+    changes: dict[str, float] = {}
+    for name, text in rest.items():
+        if name not in _NAMES:
+            close = get_close_matches(name, _NAMES, 1)
+            raise InputError(
+                f"sim://: unknown dial {name!r}",
+                f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(_NAMES)}",
+            )
+        dimension = (
+            Dimension.TIME
+            if name in _TIMES
+            else Dimension.LENGTH
+            if name in _LENGTHS
+            else Dimension.NUMBER
+        )
+        try:
+            changes[name] = parse(text, dimension).value
+        except UnitError as error:
+            raise InputError(f"sim://: {name}: {error}") from None
+        if changes[name] < 0.0 and name not in {"clock", "restitution"}:
+            raise InputError(f"sim://: {name}: {text} is negative; zero or more is accepted")
+    return replace(dials, **changes)

@@ -1,0 +1,240 @@
+"""The simulated lab: real chains with their faults, hung, released and seen by real beams."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.link.messages import unpack_label
+from rig.model.chain import Chain
+from rig.model.fall import hits, kicks
+from rig.model.impact import impact_on
+from rig.protocol.plan import runs
+from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive
+from sim.camera import camera_reading
+from sim.path import Path
+from sim.truth import Truth
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rig.protocol.scene import Gate, Protocol, RodChain, Run, Side
+    from sim.dials import Dials
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A chain as it really is: rods off their places, rods wider than stated."""
+
+    spec: RodChain
+    offsets: np.ndarray  # height of each rod's middle above the nominal bottom rod's place, m
+    widths: np.ndarray
+
+
+class ChainLab:
+    """Everything behind the gates, reproducible from one seed.
+
+    What belongs to a chain or to the rig is drawn once; what happens in a drop is drawn from the
+    drop's own label, so a drop comes out the same whenever and however often it is asked for.
+
+    Parameters
+    ----------
+    protocol
+        The scene and its plan.
+    dials
+        Sizes of all disturbances.
+    seed
+        Chooses the rig, the chains and all drops.
+    tell
+        Called with the hidden truth of each drop.
+    """
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        dials: Dials,
+        seed: int,
+        tell: Callable[[Truth], None] = lambda _: None,
+    ) -> None:
+        self.protocol = protocol
+        self.dials = dials
+        self.seed = seed
+        self.tell = tell
+        self.runs = {run.number: run for run in runs(protocol)}
+        self.gates = protocol.gates.gates if protocol.gates else ()
+        rig = self._rng("rig")
+        self.hang_height = protocol.drop.value + protocol.drop.u * dials.drop_error * rig.normal()
+        self.bodies = {name: self._body(spec) for name, spec in protocol.chains.items()}
+        self.heights = {
+            gate.channel: gate.height + dials.gate_sd * self._rng("gate", gate.channel).normal()
+            for gate in self.gates
+        }
+        self.beams = {
+            gate.channel: dials.beam_sd * self._rng("beam", gate.channel).normal()
+            for gate in self.gates
+        }
+
+    def _rng(self, *what: object) -> np.random.Generator:
+        """Give each thing that is drawn a stream of its own."""
+        digest = hashlib.sha256(repr((self.seed, *what)).encode()).digest()
+        return np.random.default_rng(int.from_bytes(digest[:16], "little"))
+
+    def _body(self, spec: RodChain) -> Body:
+        rng = self._rng("chain", spec.name)
+        places = np.array(spec.chain.heights)
+        return Body(
+            spec,
+            places + self.dials.rod_sd * rng.normal(size=places.size),
+            np.array(spec.widths) + self.dials.width_sd * rng.normal(),
+        )
+
+    def _run(self, label: int) -> tuple[Run, int]:
+        number, attempt = unpack_label(label)
+        if number not in self.runs:
+            raise KeyError(f"the plan has no run {number}")
+        return self.runs[number], attempt
+
+    def rest(self, label: int) -> int:
+        """Mask of the beams that the hanging chains block."""
+        run, _ = self._run(label)
+        mask = 0
+        for gate in self.gates:
+            name = run.impact if gate.side == "impact" else run.free
+            if name is None:
+                continue
+            body = self.bodies[name]
+            middles = self.hang_height + body.offsets + self._shift(body, gate)
+            if np.any(np.abs(middles - self.heights[gate.channel]) < body.widths / 2):
+                mask |= 1 << gate.channel
+        return mask
+
+    def drop(self, label: int) -> list[tuple[float, int, bool]]:
+        """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
+        run, attempt = self._run(label)
+        rng = self._rng("drop", run.number, attempt)
+        dials = self.dials
+        release = dials.delay + dials.delay_sd * float(rng.normal())
+        skew = dials.skew_sd * float(rng.normal())
+        hang = dials.hang_sd * rng.normal(size=2)
+        paths: dict[Side, tuple[Body, Path]] = {}
+        if run.impact is not None:
+            body = self.bodies[run.impact]
+            start = self.hang_height + float(hang[0])
+            paths["impact"] = body, self._impact_path(body, run.incline_deg, release, start, rng)
+        if run.free is not None:
+            start = self.hang_height + float(hang[1])
+            # A chain that falls alone has nothing to be late against.
+            late = skew if paths else 0.0
+            gravity = self.protocol.gravity.value
+            paths["free"] = self.bodies[run.free], Path(release + late, start, gravity)
+        edges = [
+            edge
+            for gate in self.gates
+            if gate.side in paths
+            for edge in receive(
+                self._shadows(gate, *paths[gate.side], rng), gate.channel, dials, rng
+            )
+        ]
+        edges.sort(key=lambda edge: edge.time_s)
+        self.tell(self._truth(run, attempt, paths, edges, rng))
+        return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
+
+    def _impact_path(
+        self, body: Body, incline: float, release: float, start: float, rng: np.random.Generator
+    ) -> Path:
+        """Compute the fall of the impact chain by the model, with its own rods and impulses."""
+        surface = self.protocol.surface
+        assert surface is not None
+        dials, chain = self.dials, body.spec.chain
+        impact = impact_on(
+            surface,
+            chain,
+            incline,
+            restitution=None if math.isnan(dials.restitution) else dials.restitution,
+            friction=None if math.isnan(dials.friction) else dials.friction,
+        )
+        alphas = impact.alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
+        bottom = float(body.offsets[0])
+        actual = Chain(chain.masses, tuple((body.offsets - bottom).tolist()), chain.inertia)
+        gains = kicks(actual, alphas.tolist(), impact.gamma)
+        gravity = self.protocol.gravity.value
+        events = hits(actual, gains, start + bottom, gravity)
+        return Path(release, start, gravity, events, tuple((-body.offsets).tolist()))
+
+    def _shift(self, body: Body, gate: Gate) -> np.ndarray:
+        """How far each rod's crossing is shifted because the beam is off its middle, m."""
+        slope = self.beams[gate.channel] * math.tan(math.radians(body.spec.tilt_deg))
+        return slope * (-1.0) ** np.arange(body.widths.size)
+
+    def _shadows(
+        self, gate: Gate, body: Body, path: Path, rng: np.random.Generator
+    ) -> list[Shadow]:
+        """Everything that darkens one beam."""
+        height = self.heights[gate.channel]
+        middles = body.offsets + self._shift(body, gate)
+        shadows: list[Shadow] = []
+        for rod, (middle, width) in enumerate(zip(middles, body.widths, strict=True)):
+            if path.start + middle < height:
+                continue  # it hangs below the beam
+            shadows.append(
+                Shadow(
+                    path.time_at(height - middle + width / 2),
+                    path.time_at(height - middle - width / 2),
+                    rod,
+                )
+            )
+        gaps = [(a.end, b.start) for a, b in itertools.pairwise(shadows)]
+        for start, end in gaps:
+            if rng.random() < self.dials.string:
+                at = float(rng.uniform(start, end))
+                shadows.append(Shadow(at, at + float(rng.uniform(30e-6, 200e-6)), NOT_A_ROD))
+        if path.hits and gate.height == min(g.height for g in self.gates if g.side == gate.side):
+            for hit in path.hits:
+                if rng.random() < self.dials.bounce:
+                    at = path.release_s + hit.time_s + float(rng.uniform(4e-3, 30e-3))
+                    shadows.append(Shadow(at, at + float(rng.uniform(2e-3, 10e-3)), NOT_A_ROD))
+        return shadows
+
+    def _truth(
+        self,
+        run: Run,
+        attempt: int,
+        paths: dict[Side, tuple[Body, Path]],
+        edges: Sequence[SeenEdge],
+        rng: np.random.Generator,
+    ) -> Truth:
+        """Write down what really happened, for the judge of the analysis alone."""
+        truth = Truth(
+            run=run.number,
+            attempt=attempt,
+            incline_deg=run.incline_deg,
+            impact_chain=run.impact,
+            gravity_m_s2=self.protocol.gravity.value,
+            edges=[(e.time_s, e.channel, e.blocked, e.rod) for e in edges],
+        )
+        if "impact" not in paths:
+            return truth
+        body, path = paths["impact"]
+        hit_s = path.release_s + path.hits[-1].time_s
+        truth.speed_m_s = path.hits[-1].speed_before
+        truth.fall_time_s = path.hits[-1].time_s
+        if "free" not in paths:
+            return truth
+        other, fallen = paths["free"]
+        top = float(other.offsets[-1])
+        skew = fallen.release_s - path.release_s
+        truth.release_skew_s = skew
+        truth.separation_raw_m = fallen.height_at(hit_s) + top
+        truth.separation_m = fallen.height_at(hit_s + skew) + top
+        truth.camera_separation_m, truth.camera_speed_m_s = camera_reading(
+            lambda t: path.height_at(t) + float(body.offsets[-1]),
+            lambda t: fallen.height_at(t) + top,
+            hit_s,
+            rng,
+        )
+        return truth

@@ -1,0 +1,66 @@
+"""Where a falling chain is at any time: the way down, leg by leg."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.model.fall import Hit
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Height of a chain's reference point against time.
+
+    Attributes
+    ----------
+    release_s
+        When it was let go.
+    start
+        Height before release, m.
+    gravity
+        m/s².
+    hits
+        Impacts, with times counted from release; empty in free fall.
+    hit_heights
+        Height of the reference point at each impact, falling.
+    """
+
+    release_s: float
+    start: float
+    gravity: float
+    hits: Sequence[Hit] = ()
+    hit_heights: Sequence[float] = ()
+
+    def time_at(self, height: float) -> float:
+        """When the reference point comes down to `height`, s."""
+        # hit_heights falls, so its negative rises and can be searched.
+        done = bisect_left(self.hit_heights, -height, key=lambda z: -z)
+        time, top, speed = self.release_s, self.start, 0.0
+        if done:
+            hit = self.hits[done - 1]
+            time += hit.time_s
+            top, speed = self.hit_heights[done - 1], hit.speed_after
+        distance = top - height
+        if distance <= 0.0:
+            return time
+        arrival = math.sqrt(speed * speed + 2.0 * self.gravity * distance)
+        return time + 2.0 * distance / (speed + arrival)
+
+    def height_at(self, time_s: float) -> float:
+        """Height of the reference point at a time, m."""
+        since = time_s - self.release_s
+        if since <= 0.0:
+            return self.start
+        done = bisect_left(self.hits, since, key=lambda hit: hit.time_s)
+        if not done:
+            return self.start - 0.5 * self.gravity * since * since
+        hit = self.hits[done - 1]
+        since -= hit.time_s
+        top = self.hit_heights[done - 1]
+        return top - (hit.speed_after + 0.5 * self.gravity * since) * since

@@ -1,0 +1,38 @@
+"""The hidden truth of simulated drops, kept apart from the data."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(slots=True)
+class Truth:
+    """What really happened in one drop; `None` for what the scene does not have.
+
+    Each of `edges` is (seconds after fire, channel, blocked, rod), rod −1 for what was no rod.
+    """
+
+    run: int
+    attempt: int
+    incline_deg: float
+    impact_chain: str | None
+    gravity_m_s2: float
+    edges: list[tuple[float, int, bool, int]] = field(default_factory=list)
+    separation_m: float | None = None
+    separation_raw_m: float | None = None
+    speed_m_s: float | None = None
+    fall_time_s: float | None = None
+    release_skew_s: float | None = None
+    camera_separation_m: float | None = None
+    camera_speed_m_s: float | None = None
+
+
+def append_truth(path: Path, truth: Truth) -> None:
+    """Add one drop's truth as a line of JSON."""
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(asdict(truth)) + "\n")

@@ -1,0 +1,33 @@
+"""Any message of the wire's table, for hypothesis."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from rig.link import messages as wire
+from rig.link.wiretypes import Chars, Event, Raw, Scalar, Tail
+
+WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
+
+
+def values(field) -> st.SearchStrategy:
+    match field.wire:
+        case Scalar() if field.python is not int:
+            return st.sampled_from(list(field.python))
+        case Scalar(size=size):
+            return st.integers(0, 2 ** (8 * size) - 1)
+        case Raw(size=size):
+            return st.binary(min_size=size, max_size=size)
+        case Chars(limit=limit):
+            return st.text(max_size=limit // 4)
+        case Tail():
+            event = st.builds(Event, LONG, WORD)
+            return st.lists(event, max_size=wire.EVENTS_PER_FRAME).map(tuple)
+    raise AssertionError(field)
+
+
+def messages_of(kind) -> st.SearchStrategy:
+    return st.builds(kind, **{f.name: values(f) for f in wire.FIELDS[kind]})
+
+
+MESSAGES = st.one_of([messages_of(kind) for kind in wire.TABLE.values()])

@@ -1,0 +1,316 @@
+"""What the client does when a device or a port misbehaves; the rest is in the conformance suite."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+import serial
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.errors import DeviceError, DeviceTimeoutError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.clock import SystemClock
+from rig.link.frames import Decoder, Frame, encode
+from rig.link.port import open_port, port_clock
+from rig.link.transcript import Received, Transcript
+from rig.records import Drop, Ping
+from tests.link.strategies import MESSAGES
+
+SMALL = st.integers(0, 3)
+
+
+class FakeClock:
+    def __init__(self) -> None:
+        self.ns = 0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep(self, seconds: float) -> None:
+        self.ns += round(seconds * 1e9)
+
+
+class FakePort:
+    """Answers each request by a table from its type to messages; `None` is a broken cable."""
+
+    def __init__(self, clock: FakeClock, answers: dict) -> None:
+        self.clock, self.answers = clock, answers
+        self.decoder, self.out = Decoder(), b""
+        self.written: list[bytes] = []
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self.out)
+
+    def read(self, size: int = 1) -> bytes:
+        self.clock.sleep(0.001 if self.out else 0.02)
+        data, self.out = self.out[:size], self.out[size:]
+        return data
+
+    def write(self, data: bytes) -> int:
+        self.written.append(data)
+        for frame in self.decoder.feed(data):
+            request = wire.unpack(frame.type, frame.payload)
+            answer = self.answers.get(type(request), [])
+            if answer is None:
+                raise serial.SerialException("device reports readiness to read but is gone")
+            for message in answer:
+                code, payload = wire.pack(message)
+                self.out += encode(Frame(code, 1, frame.seq, payload))
+        return len(data)
+
+
+@pytest.fixture
+def clock() -> FakeClock:
+    return FakeClock()
+
+
+def device(clock: FakeClock, answers: dict, **options) -> Device:
+    return Device(FakePort(clock, answers), clock, **options)
+
+
+IDENTITY = wire.Identity(1, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, "")
+
+
+def test_the_first_byte_is_a_delimiter(clock):
+    port = FakePort(clock, {wire.Identify: [IDENTITY]})
+    assert Device(port, clock).connect() == IDENTITY
+    assert port.written[0] == b"\0"
+
+
+def test_repeats_have_the_same_seq_and_back_off(clock):
+    port = FakePort(clock, {})
+    with pytest.raises(DeviceTimeoutError, match="did not answer Ping"):
+        Device(port, clock, tries=6).ping()
+    assert len(port.written) == 6
+    assert len(set(port.written)) == 1
+    assert 1.5 < clock.ns * 1e-9 < 3
+
+
+def test_seq_wraps_around_zero(clock):
+    port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
+    one = Device(port, clock)
+    for _ in range(300):
+        one.ping()
+    seqs = [frame.seq for data in port.written for frame in Decoder().feed(data)]
+    assert seqs == [n % 255 + 1 for n in range(300)]
+
+
+def test_an_older_identity_is_refused(clock):
+    old = wire.Identity(0, "mega2560", "0.9", bytes(8), 16_000_000, 16, 2, 1, 1024, "")
+    with pytest.raises(DeviceError, match="protocol version 0, this program version 1"):
+        device(clock, {wire.Identify: [old]}).connect()
+
+
+def test_nonsense_is_said_to_be_nonsense(clock):
+    with pytest.raises(DeviceError, match="answered Status with Pong"):
+        device(clock, {wire.Status: [wire.Pong(1)]}).status()
+
+
+def test_a_broken_cable_is_a_lost_connection(clock):
+    with pytest.raises(DeviceError, match="connection lost") as caught:
+        device(clock, {wire.Status: None}).status()
+    assert not isinstance(caught.value, DeviceTimeoutError)
+
+
+def test_reading_from_a_closed_port_is_a_lost_connection(clock):
+    port = FakePort(clock, {})
+    port.read = lambda size=1: (_ for _ in ()).throw(serial.PortNotOpenError())
+    with pytest.raises(DeviceError, match="connection lost"):
+        Device(port, clock).poll()
+
+
+def test_the_tap_comes_before_everything(clock):
+    seen = []
+    port = FakePort(clock, {wire.Ping: [wire.Pong(5)]})
+
+    def tap(direction, host_ns, data):
+        # What is written is tapped before the port has it.
+        assert direction == "rx" or data not in port.written
+        seen.append((direction, host_ns, data))
+
+    ping = Device(port, clock, tap).ping()
+    assert ping == Ping(seen[0][1], seen[-1][1], 5)
+    assert b"".join(data for direction, _, data in seen if direction == "tx") == port.written[0]
+
+
+def certificate(label: int, events: int, crc32: int = 0) -> wire.DropCertificate:
+    return wire.DropCertificate(label, 100, 0xFFFF, 0, events, crc32, 0, 0, 0)
+
+
+def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
+    events = wire.EventsFrame(1, 0, (wire.Event(150, 1),))
+
+    class Liar(FakePort):
+        def write(self, data):
+            (frame,) = Decoder().feed(data)
+            count = wire.unpack(frame.type, frame.payload).count
+            self.answers[wire.Read] = [events] if count else [certificate(1, 1, 77)]
+            return super().write(data)
+
+    port = Liar(clock, {wire.Identify: [IDENTITY]})
+    drop = Device(port, clock).fetch(1)
+    assert len(port.written) == 3  # certificate, events, events once more
+    assert "the events do not match the certificate's CRC-32" in drop.faults
+
+
+def test_a_device_that_never_gives_the_events_is_faulty(clock):
+    class Liar(FakePort):
+        def write(self, data):
+            (frame,) = Decoder().feed(data)
+            count = wire.unpack(frame.type, frame.payload).count
+            empty = wire.EventsFrame(1, 0, ())
+            self.answers[wire.Read] = [empty] if count else [certificate(1, 5)]
+            return super().write(data)
+
+    with pytest.raises(DeviceError, match="did not send the events"):
+        Device(Liar(clock, {}), clock).fetch(1)
+
+
+def test_a_recording_without_end_is_a_time_out(clock):
+    state = wire.State(wire.Phase.RECORDING, 0, 1, 3)
+    with pytest.raises(DeviceTimeoutError, match="never ends"):
+        device(clock, {wire.Status: [state]}).collect(1, timeout=1)
+    assert clock.ns < 80e9
+
+
+# -- the transcript alone
+
+
+def say(transcript: Transcript, direction, message, *, seq=0, ack=0, ns=0) -> list:
+    code, payload = wire.pack(message)
+    return transcript.feed(direction, ns, encode(Frame(code, seq, ack, payload)))
+
+
+def test_a_gap_in_the_events_invents_no_edge():
+    transcript = Transcript()
+    say(transcript, "rx", IDENTITY)
+    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
+    say(transcript, "rx", wire.EventsFrame(1, 3, (wire.Event(140, 2), wire.Event(150, 3))))
+    say(transcript, "rx", certificate(1, 5))
+    drop = transcript.pending(1)
+    assert drop.edges == ((10, 0, True), (50, 0, True))
+    assert drop.faults == ("2 of 5 events missing, from number 1",)
+    assert transcript.assembly(1).missing() == [(1, 2)]
+
+
+def test_a_drop_is_given_out_once_when_acknowledged():
+    transcript = Transcript()
+    say(transcript, "rx", IDENTITY)
+    say(transcript, "rx", certificate(1, 0))
+    pending = transcript.pending(1)
+    assert transcript.unfinished() == [pending]
+    assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == [pending]
+    assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == []
+    say(transcript, "rx", certificate(1, 0))  # a late repeat
+    assert transcript.unfinished() == []
+    with pytest.raises(KeyError):
+        transcript.pending(1)
+
+
+def test_a_drop_fetched_again_by_another_session_is_given_out_again():
+    transcript = Transcript()
+    say(transcript, "rx", IDENTITY)
+    say(transcript, "rx", certificate(1, 0))
+    (drop,) = say(transcript, "tx", wire.Acknowledge(1, 0), seq=4)
+    say(transcript, "tx", wire.Read(1, 0, 0), seq=5)
+    say(transcript, "rx", certificate(1, 0), ack=5)
+    assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=6) == [drop]
+
+
+def test_arming_again_begins_anew_but_a_repeated_answer_does_not():
+    transcript = Transcript()
+    order = wire.Arm(1, 0x00FF, 0, 0, 1, 1)
+    say(transcript, "tx", order, seq=1)
+    say(transcript, "rx", wire.Armed(9), ack=1)
+    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
+    say(transcript, "rx", wire.Armed(9), ack=1)
+    assert transcript.assembly(1).begun
+    say(transcript, "tx", order, seq=2)
+    say(transcript, "rx", wire.Armed(9), ack=2)
+    assert not transcript.assembly(1).begun
+
+
+def test_half_a_frame_before_a_reconnect_swallows_nothing():
+    transcript = Transcript()
+    code, payload = wire.pack(certificate(1, 0))
+    transcript.feed("rx", 0, encode(Frame(code, 1, 0, payload))[:9])
+    transcript.feed("tx", 1, b"\0")
+    assert say(transcript, "rx", IDENTITY, ack=1) == [Received(0, 1, IDENTITY)]
+
+
+def test_edges_before_the_fire_stamp_are_negative():
+    transcript = Transcript()
+    events = (wire.Event(2**32 - 50, 1), wire.Event(90, 0), wire.Event(200, 4))
+    say(transcript, "rx", wire.EventsFrame(1, 0, events))
+    say(transcript, "rx", certificate(1, 3))
+    assert [edge.tick for edge in transcript.pending(1).edges] == [-150, -10, 100]
+
+
+def test_without_identity_or_certificate_the_drop_says_so():
+    transcript = Transcript()
+    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
+    drop = transcript.pending(1)
+    assert isinstance(drop, Drop)
+    assert drop.edges == ()
+    assert len(drop.faults) == 2
+
+
+def test_what_is_no_message_is_counted():
+    transcript = Transcript()
+    assert transcript.feed("rx", 0, encode(Frame(0xEE, 1, 0, b""))) == []
+    assert transcript.unreadable == 1
+    assert say(transcript, "rx", wire.Done(), ack=3, ns=8) == [Received(8, 3, wire.Done())]
+
+
+@given(st.lists(st.tuples(st.sampled_from(["tx", "rx"]), MESSAGES, SMALL, SMALL), max_size=30))
+def test_any_conversation_is_survived(said):
+    transcript = Transcript()
+    for direction, message, seq, ack in said:
+        say(transcript, direction, message, seq=seq, ack=ack)
+    for drop in transcript.unfinished():
+        assert drop == transcript.pending(drop.run | drop.attempt << 16)
+
+
+# -- ports
+
+
+def test_a_real_port_has_the_computer_s_clock():
+    port = open_port("loop://")
+    assert isinstance(port_clock(port), SystemClock)
+    assert port.timeout == pytest.approx(0.02)
+    assert serial.protocol_handler_packages.count("sim") == 1
+    port.close()
+    open_port("loop://").close()
+    assert serial.protocol_handler_packages.count("sim") == 1
+
+
+@pytest.mark.parametrize("url", ["/dev/there-is-no-such-port", "nonsense://x"])
+def test_a_port_that_cannot_be_opened_has_a_hint(url):
+    with pytest.raises(DeviceError, match="cannot open") as caught:
+        open_port(url)
+    assert "rig ports" in caught.value.hint
+
+
+def test_a_port_belongs_to_one_program():
+    controller, line = os.openpty()
+    try:
+        first = open_port(os.ttyname(line))
+        with pytest.raises(DeviceError, match="another program uses it"):
+            open_port(os.ttyname(line))
+        first.close()
+    finally:
+        os.close(controller)
+        os.close(line)
+
+
+def test_the_link_alone_loads_neither_numpy_nor_sim():
+    code = "import sys, rig.link.client, rig.link.port; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert not loaded & {"numpy", "sim", "yaml", "rig.model"}

@@ -1,0 +1,208 @@
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rig.errors import InputError
+from rig.protocol.describe import describe
+from rig.protocol.reader import parse, read
+
+READY = sorted((Path(__file__).parents[2] / "protocols").glob("*.yaml"))
+GOOD = """\
+protocol: 1
+title: on
+chains:
+  A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg}
+  B: {like: A}
+surface: {restitution: 0.50 ± 0.05}
+drop: 180 mm ± 2 mm
+gravity: 9.81 m/s^2
+gates:
+  impact: [{channel: 0, height: 25 mm}]
+  free: [{channel: 8, height: 20 mm}]
+plan: {incline: [0 deg, 40 deg], repeats: 4}
+"""
+
+
+def problems(text):
+    with pytest.raises(InputError) as caught:
+        parse(text, "f")
+    assert caught.value.exit_code == 2
+    return [str(problem) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
+def test_ready_protocols_are_read_and_described(path):
+    protocol = read(path)
+    text = describe(protocol)
+    assert text.startswith(protocol.title)
+    assert protocol.text == path.read_text("utf-8")
+
+
+def test_ready_protocols_are_there():
+    assert len(READY) >= 5
+
+
+def test_yaml_1_2_scalars():
+    protocol = parse(GOOD)
+    assert protocol.title == "on"
+    changed = GOOD.replace("0.50 ± 0.05", "1e-3").replace("repeats: 4", "repeats: 0o17")
+    protocol = parse(changed)
+    assert protocol.surface.restitution.value == 1e-3
+    assert protocol.plan.repeats == 15
+
+
+def test_a_chain_inherits_and_overrides():
+    protocol = parse(GOOD.replace("{like: A}", "{like: A, rods: 20, length: 1 m}"))
+    a, b = protocol.chains.values()
+    assert (b.chain.rods, b.chain.length) == (20, 1.0)
+    assert b.tilt_deg == a.tilt_deg
+    assert b.widths[0] == a.widths[0]
+
+
+def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
+    rods = next(iter(read(next(p for p in READY if "graded" in p.stem)).chains.values()))
+    diameters = [d for d in (0.032, 0.025, 0.019, 0.013, 0.0063) for _ in range(4)]
+    heights = rods.chain.heights
+    edges = [heights[i + 1] - heights[i] - (diameters[i] + diameters[i + 1]) / 2 for i in range(19)]
+    assert edges == pytest.approx([edges[0]] * 19, abs=1e-15)
+    assert rods.chain.length == 1.165
+    assert rods.chain.masses == pytest.approx([(d / 0.032) ** 2 for d in diameters])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "start"),
+    [
+        ("protocol: 1", "protocol: 2", "f:1:11: protocol: found 2; this software reads"),
+        ("title: on", "titel: on", "f:2:1: titel: unknown key; did you mean title?"),
+        ("title: on", "title: true", "f:2:8: title: found true, which is a boolean"),
+        ("title: on", "title: a\ntitle: b", "f:3:1: title: repeated key, first given on line 2"),
+        ("rods: 25", "rods: 1", "f:4:13: chains.A.rods: found 1; a whole number from 2 to"),
+        ("rods: 25, ", "", "f:4:6: chains.A.rods: missing"),
+        ("1165 mm", "1165", "f:4:25: chains.A.length: found '1165' without a unit"),
+        ("1165 mm", "1165 ± 1 mm", "f:4:25: chains.A.length: found '1165 ± 1 mm'; no uncert"),
+        ("1165 mm", "300 mm", "f:4:25: chains.A.length: rods 1 and 2 overlap"),
+        ("diameter: 12.7 mm, ", "", "f:4:6: chains.A.diameter: missing"),
+        ("like: A", "like: C", "f:5:13: chains.B.like: found 'C'; accepted: 'A'"),
+        ("like: A", "like: B", "f:5:13: chains.B.like: found 'B'; accepted: 'A'"),
+        ("0.50 ± 0.05", "30 cm", "f:6:24: surface.restitution: 30 cm is a length; a plain"),
+        ("0.50 ± 0.05", "2", "f:6:24: surface.restitution: found 2; accepted: -1 to 1"),
+        ("restitution: 0.50 ± 0.05", "", "f:6:10: surface.restitution: missing"),
+        ("drop: 180 mm ± 2 mm\n", "", "f:1:1: drop: missing"),
+        ("drop: 180", "drop:\t180", "f:7:6: found a tab; use spaces"),
+        ("gravity: 9.81 m/s^2\n", "", "f:1:1: gravity: missing; write gravity:"),
+        ("gravity:", "site: {latitude: 45 deg, height: 0 m}\ngravity:",
+         "f:9:1: gravity: site is given too, on line 8"),
+        ("  free: [{channel: 8, height: 20 mm}]\n", "", "f:10:3: gates.free: missing"),
+        ("channel: 8", "channel: 0", "f:11:20: gates.free[0].channel: channel 0 is already in"),
+        ("channel: 8", "channel: 16", "f:11:20: gates.free[0].channel: found 16; a whole"),
+        ("20 mm", "230 mm", "f:11:31: gates.free[0].height: found 230.0 mm, which rod 2 of"),
+        ("20 mm", "2 mm", "f:11:31: gates.free[0].height: found 2.0 mm; a rod at rest"),
+        ("20 mm", "1.4 m", "f:11:31: gates.free[0].height: found 1400.0 mm; no rod passes"),
+        ("40 deg", "91 deg", "f:12:25: plan.incline[1]: found 91 deg; accepted: 0 deg to 90"),
+        ("40 deg", "0 deg", "f:12:25: plan.incline[1]: found '0 deg' again"),
+        ("repeats: 4", "order: abab", "f:12:41: plan.order: found 'abab'; did you mean ABBA?"),
+        ("repeats: 4", "repeats: 4.0", "f:12:43: plan.repeats: found 4.0; a whole number"),
+        ("repeats: 4", "repeats: 4]", "f:12:44: not YAML: while parsing a flow mapping"),
+        ("title: on", "title: !!python/name:os.system x", "f:2:8: found the tag"),
+        ("title: on", "title: *x", "f:2:8: found the alias 'x'"),
+        ("title: on", 'title: "\\ud800"', "f:2:8: found half of a surrogate pair"),
+        ("title: on", 'title: "\\e[2J"', "f:2:8: title: found '\\x1b[2J' with control"),
+        ("title: on", "title: \x07", "f:2:8: found the control character U+0007"),
+        ("title: on", "notes: " + "[" * 40, "f:2:39: nested more than 32 deep"),
+        ("plan:", "---\nplan:", "f:12:1: found a second document"),
+    ],
+)  # fmt: skip
+def test_each_fault_is_found_at_its_place(old, new, start):
+    assert old in GOOD
+    found = problems(GOOD.replace(old, new, 1))
+    assert len(found) == 1, found
+    assert found[0].startswith(start)
+    assert "\n" not in found[0]
+
+
+def test_all_faults_come_at_once_and_an_inherited_one_comes_once():
+    text = GOOD.replace("1165 mm", "1165").replace("9.81 m/s^2", "9.81").replace("4}", "x, sed: 1}")
+    assert [line.split(": ")[0] for line in problems(text)] == ["f:4:25", "f:8:10", "f:12:43",
+                                                               "f:12:46"]  # fmt: skip
+
+
+def test_circular_like():
+    text = GOOD.replace("A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg}",
+                        "A: {like: B}")  # fmt: skip
+    assert problems(text)[0].startswith("f:4:13: chains.A.like: goes round in a circle")
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "---\n", "[]", "3"])
+def test_what_is_no_protocol_at_all(text):
+    assert problems(text)
+
+
+def test_alias_bomb_is_refused():
+    lines = ["a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [
+        f"{b}: &{b} [{', '.join(['*' + a] * 9)}]" for a, b in zip("abcdef", "bcdefg", strict=True)
+    ]
+    assert "more than 10000 values" in problems("\n".join(lines))[0]
+
+
+def test_scenes_without_a_surface():
+    text = GOOD.replace("surface: {restitution: 0.50 ± 0.05}\n", "")
+    lines = problems(text)
+    assert [line.split(": ")[1] for line in lines] == ["chains", "gates.impact", "plan.incline"]
+
+
+def test_one_chain_has_no_free_side():
+    (line,) = problems(GOOD.replace("  B: {like: A}\n", ""))
+    assert line.startswith("f:10:3: gates.free: the scene has one chain")
+
+
+def test_proposed_heights_are_clear():
+    (line,) = problems(GOOD.replace("20 mm", "230 mm"))
+    for height in line.rpartition("heights are ")[2].split(" or "):
+        parse(GOOD.replace("20 mm", height))
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    big, binary = tmp_path / "big", tmp_path / "binary"
+    big.write_bytes(b"#" * 1_000_001)
+    binary.write_bytes("a: µ\nb: ".encode() + b"\xff")
+    for path, said in [
+        (tmp_path, "is a folder"),
+        (tmp_path / "none", "there is no such file"),
+        (big, "larger than"),
+        (binary, "binary:2:4: not UTF-8"),
+        ("a\0b", "cannot be read"),
+    ]:
+        with pytest.raises(InputError, match=said):
+            read(path)
+
+
+@given(st.binary(max_size=300))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_bytes_give_an_input_error(tmp_path, data):
+    path = tmp_path / "any"
+    path.write_bytes(data)
+    with pytest.raises(InputError):
+        read(os.fspath(path))
+
+
+PIECES = [
+    *": {}[],-#&*!|>'\"%@`?~\n\\",
+    *(" ", "  ", "\n  ", "1", "e9", "mm", "±", "&a", "*a", "%YAML 9", "---", "..."),
+    *("\\UFFFFFFFF", "\u2028", "\x85"),
+]
+
+
+@given(st.integers(0, len(GOOD)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=8))
+@settings(max_examples=400, deadline=None)
+def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
+    text = GOOD[:start] + "".join(pieces) + GOOD[start + cut :]
+    found = ()
+    try:
+        describe(parse(text))
+    except InputError as error:
+        found = error.problems or ("none named\n",)
+    assert all("\n" not in str(problem) for problem in found)

@@ -1,0 +1,146 @@
+"""The page: whole, self-contained, and no text of a file becomes part of it."""
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import fake_analysis
+
+from rig.report.html import ReportContext, report_html, write_report
+from rig.report.pictures import pictures
+
+TWO = fake_analysis.two_chains(repeats=4)
+CONTEXT = ReportContext(
+    title="Uniform rod chains",
+    analysis=TWO,
+    simulated=True,
+    figures=pictures(TWO, fake_analysis.curves(), True, skew_limit_s=0.005),
+    protocol_text="protocol: 1\n",
+    protocol_source="uniform.yaml",
+    protocol_sha256="ab" * 32,
+    provenance={"session": "a.rig", "created": "2025-01-01T00:00:00+00:00"},
+    identities=[{"serial": "A1", "tick_hz": 2_000_000}],
+    clock={"rate (ppm)": -1330.0},
+    notes=["Air drag is left out."],
+)
+VOID_TAGS = {"meta", "br", "hr", "img", "link"}
+
+
+class Balance(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.ids += [values["id"] or ""] if "id" in values else []
+        self.links += [values[key] or "" for key in ("xlink:href", "href", "src") if key in values]
+        if tag not in VOID_TAGS:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID_TAGS:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def parse(page: str) -> Balance:
+    parser = Balance()
+    parser.feed(page)
+    parser.close()
+    assert not parser.open
+    return parser
+
+
+def test_the_page_is_whole_and_needs_nothing_else() -> None:
+    page = report_html(CONTEXT)
+    parser = parse(page)
+    assert len(parser.ids) == len(set(parser.ids))
+    assert all(link.startswith("#") and link[1:] in parser.ids for link in parser.links)
+    assert set(re.findall(r"url\(#(.*?)\)", page)) <= set(parser.ids)
+    assert "<script" not in page
+    for text in (
+        "SIMULATED DATA",
+        "Eₙ",
+        "ab" * 32,
+        "-1330.0",
+        "serial A1",
+        "Air drag",
+        "226 / 225 / 1 / 0 / 0",
+    ):
+        assert text in page
+    assert page == report_html(CONTEXT)
+
+
+def test_text_is_escaped() -> None:
+    bad = '<script>alert("x")</script>&\'</pre></style>'
+    analysis = {
+        "runs": [
+            {
+                "run": 1,
+                "impact_chain": bad,
+                "verdict": bad,
+                "reasons": [bad],
+                "budget": [{"name": bad, "quantity": bad, "u": 1.0}],
+            }
+        ],
+        "superseded": [{"run": 1, "reasons": [bad]}],
+        "summary": [],
+    }
+    figures = [replace(picture, alt=bad, caption=bad) for picture in CONTEXT.figures]
+    page = report_html(
+        ReportContext(
+            title=bad,
+            analysis=analysis,
+            simulated=True,
+            figures=figures,
+            protocol_text=bad,
+            protocol_source=bad,
+            protocol_sha256=bad,
+            provenance={bad: bad},
+            identities=[{bad: bad}],
+            clock={bad: bad},
+            notes=[bad],
+        )
+    )
+    parser = parse(page)
+    assert parser.ids
+    assert "<script" not in page
+    assert page.count("</style>") == page.count("<style")
+    assert page.count("</pre>") == 1
+
+
+def test_what_is_missing_is_left_out() -> None:
+    analysis = fake_analysis.gravity()
+    page = report_html(ReportContext(title="Picket fence", analysis=analysis, simulated=False))
+    parse(page)
+    for absent in ("SIMULATED", "Δz", "skew", "Provenance", "budget", "Earlier", "impact chain"):
+        assert absent not in page
+    assert "9.8188 ± 0.0028" in page
+    single = fake_analysis.single_chain()
+    page = report_html(ReportContext(title="One chain", analysis=single, simulated=False))
+    assert "raw Δz" not in page
+    assert "skew" not in page.replace("release skew 5.3 ms", "").replace(">release skew<", "")
+
+
+def test_written_whole(tmp_path: Path) -> None:
+    write_report(tmp_path / "r.html", CONTEXT)
+    assert (tmp_path / "r.html").read_text("utf-8") == report_html(CONTEXT)
+
+
+def test_importing_loads_neither_matplotlib_nor_numpy() -> None:
+    code = (
+        "import sys, rig.report.html, rig.report.pictures, rig.report.table, rig.session.export,"
+        "rig.session.store\n"
+        "assert not {'matplotlib', 'numpy'} & set(sys.modules)"
+    )
+    root = str(Path(__file__).parents[2])
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": root})

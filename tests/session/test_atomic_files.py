@@ -1,0 +1,55 @@
+"""Atomic writes: the old file or the new one."""
+
+from pathlib import Path
+
+import pytest
+
+from rig.errors import InputError
+from rig.files import write_atomic
+
+
+def test_replaces_and_leaves_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / ("n" * 255)
+    write_atomic(path, "old")
+    write_atomic(path, "new\r\nµ")
+    assert path.read_bytes() == "new\r\nµ".encode()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    target = tmp_path / "target"
+    target.write_text("old")
+    link = tmp_path / "link"
+    link.symlink_to(target)
+    write_atomic(link, "new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+def test_devices_are_written_through() -> None:
+    write_atomic("/dev/null", "text")
+    assert not Path("/dev/null").is_file()
+
+
+def test_a_failed_write_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text("old")
+
+    def full(_handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("rig.files.os.fsync", full)
+    with pytest.raises(InputError, match="No space left") as caught:
+        write_atomic(path, "new")
+    assert caught.value.hint
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_places_that_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it is a folder"):
+        write_atomic(tmp_path, "x")
+    with pytest.raises(InputError, match="No such file"):
+        write_atomic(tmp_path / "no" / "file", "x")

@@ -1,0 +1,201 @@
+"""Edges as CSV: exact there and back, and every fault at its place."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.errors import InputError, Problem
+from rig.records import Drop, Edge
+from rig.session import edges_csv
+from rig.session.edges_csv import TICK_HZ, read_edges, write_edges
+
+HEADER = "run,channel,time_s,state\n"
+
+
+def read(tmp_path: Path, content: str | bytes) -> list[Drop]:
+    path = tmp_path / "events.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_edges(path)
+
+
+def faults(tmp_path: Path, content: str | bytes) -> list[tuple[int, int, str]]:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, content)
+    assert caught.value.exit_code == 2
+    return [(problem.line, problem.column, problem.key) for problem in caught.value.problems]
+
+
+def test_times_are_exact(tmp_path: Path) -> None:
+    [drop] = read(
+        tmp_path,
+        HEADER + "3,0,1700000000.100000000001,1\n3,1,1700000001.2,1\n3,0,17000000013e-1,0\n",
+    )
+    assert drop.tick_hz == TICK_HZ
+    assert [edge.tick for edge in drop.edges] == [
+        100_000_000_001,
+        1_200_000_000_000,
+        1_300_000_000_000,
+    ]
+    assert (drop.run, drop.attempt, drop.fire_tick, drop.certificate) == (3, 1, None, None)
+
+
+def test_what_people_and_programs_write(tmp_path: Path) -> None:
+    head = "\ufeff# from my timer\r\n\r\n Run , channel,time_s, state\r\n"
+    text = head + '1, 2 ,-0.25,"1"\r\n#\r\n 1,2, .5 ,0'
+    [drop] = read(tmp_path, text)
+    assert drop.edges == (
+        Edge(750_000_000_000, 2, True),
+        Edge(1_500_000_000_000, 2, False),
+    )
+    assert drop.initial_state == 0
+
+
+def test_channels_one_after_another_are_merged_stably(tmp_path: Path) -> None:
+    rows = "1,5,0.2,1\n1,5,0.4,0\n2,0,9.5,0\n1,3,0.1,0\n1,3,0.2,1\n"
+    first, second = read(tmp_path, HEADER + rows)
+    assert [(edge.channel, edge.tick // 10**11) for edge in first.edges] == [
+        (3, 1),
+        (5, 2),
+        (3, 2),
+        (5, 4),
+    ]
+    assert first.initial_state == 1 << 3
+    assert second.edges == (Edge(5 * 10**11, 0, False),)
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "key"),
+    [
+        ("0,0,0,1", 1, "run"),
+        ("-1,0,0,1", 1, "run"),
+        ("1.0,0,0,1", 1, "run"),
+        (",0,0,1", 1, "run"),
+        ("1_0,0,0,1", 1, "run"),
+        ("9999999999999,0,0,1", 1, "run"),
+        ("1,16,0,1", 3, "channel"),
+        ("1,-1,0,1", 3, "channel"),
+        ("1,  x,0,1", 5, "channel"),
+        ("1,0,nan,1", 5, "time_s"),
+        ("1,0,inf,1", 5, "time_s"),
+        ("1,0,,1", 5, "time_s"),
+        ("1,0,.,1", 5, "time_s"),
+        ("1,0,e5,1", 5, "time_s"),
+        ("1,0,1e999,1", 5, "time_s"),
+        ("1,0,1e30,1", 5, "time_s"),
+        ("1,0,0x1,1", 5, "time_s"),
+        ('1,0,"1,5",1', 5, "time_s"),
+        ("1,0,0,2", 7, "state"),
+        ('1,"0",0, blocked', 10, "state"),
+        ("1,0,0", 1, ""),
+        ("1,0,0,1,5", 1, ""),
+        ("1;0;0;1", 1, ""),
+        ('1,0,"0,1', 1, ""),
+        ('1,0,"0\n",1', 1, ""),
+        ("1,0,3601.5,1", 5, "time_s"),
+        ("1,7,0.9,1", 5, "time_s"),
+    ],
+)
+def test_faults_are_located(tmp_path: Path, row: str, column: int, key: str) -> None:
+    good = "1,7,1,1\n"
+    assert faults(tmp_path, f"{HEADER}# note\n{good}{row}\n") == [(4, column, key)]
+
+
+def test_all_faults_at_once(tmp_path: Path) -> None:
+    assert faults(tmp_path, HEADER + "0,99,nan,7\n1,0,0,1\n1,0,0,x\n") == [
+        (2, 1, "run"),
+        (2, 3, "channel"),
+        (2, 6, "time_s"),
+        (2, 10, "state"),
+        (4, 7, "state"),
+    ]
+
+
+def test_many_faults_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "events.csv"
+    path.write_text(HEADER + "1,0,nan,1\n" * 80)
+    with pytest.raises(InputError) as caught:
+        read_edges(path)
+    assert len(caught.value.problems) == 50
+    assert str(caught.value).splitlines()[-1] == f"{path}: and 30 more problems"
+    assert str(caught.value).startswith(f"{path}:2:5: time_s: ")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "# only a note\n",
+        HEADER,
+        "1,0,0.1,1\n",
+        "run;channel;time_s;state\n1;0;0;1\n",
+        HEADER.encode("utf-16"),
+        b"\xff\xfe\x00" * 100,
+        "SQLite format 3\x00" + "\x00" * 100,
+    ],
+)
+def test_other_files(tmp_path: Path, content: str | bytes) -> None:
+    assert faults(tmp_path, content)
+
+
+def test_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(edges_csv, "MAX_BYTES", 10)
+    assert faults(tmp_path, HEADER + "1,0,0,1\n") == [(1, 1, "")]
+
+
+@pytest.mark.parametrize("name", ["", "missing.csv"])
+def test_unreadable(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="cannot read"):
+        read_edges(tmp_path / name)
+
+
+def test_fire_stamped_drops_use_the_calibrated_rate(tmp_path: Path) -> None:
+    path = tmp_path / "edges.csv"
+    drop = Drop(run=4, attempt=2, tick_hz=2_000_000, edges=(Edge(1_000_000, 0, True),), fire_tick=7)
+    write_edges(path, [drop], {4: 1_999_000.5})
+    time = Fraction(path.read_text().splitlines()[1].split(",")[2])
+    assert abs(time - Fraction(1_000_000) / Fraction(1_999_000.5)) < Fraction(1, 10**12)
+    with pytest.raises(ValueError, match="two drops"):
+        write_edges(path, [drop, drop])
+
+
+@st.composite
+def imported_drops(draw: st.DrawFn) -> list[Drop]:
+    drops = []
+    for run in sorted(draw(st.sets(st.integers(1, 10**9 - 1), min_size=1, max_size=4))):
+        ticks = sorted(draw(st.lists(st.integers(0, 3599 * 10**12), min_size=1, max_size=12)))
+        shift = ticks[0] // TICK_HZ * TICK_HZ
+        edges = [
+            Edge(tick - shift, draw(st.integers(0, 15)), draw(st.booleans())) for tick in ticks
+        ]
+        first = {edge.channel: edge.blocked for edge in reversed(edges)}
+        mask = sum(1 << channel for channel, blocked in first.items() if not blocked)
+        drops.append(
+            Drop(run=run, attempt=1, tick_hz=TICK_HZ, edges=tuple(edges), initial_state=mask)
+        )
+    return drops
+
+
+@given(imported_drops())
+def test_round_trip(tmp_path_factory: pytest.TempPathFactory, drops: list[Drop]) -> None:
+    path = tmp_path_factory.mktemp("round") / "edges.csv"
+    write_edges(path, drops)
+    assert read_edges(path) == drops
+
+
+@given(st.binary(max_size=300) | st.text(max_size=300).map(str.encode))
+def test_any_content_gives_edges_or_located_faults(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "edges.csv"
+    for head in (b"", HEADER.encode()):
+        path.write_bytes(head + content)
+        problems: tuple[Problem, ...] = ()
+        drops: list[Drop] = []
+        try:
+            drops = read_edges(path)
+        except InputError as error:
+            problems = error.problems
+        assert bool(drops) != bool(problems)

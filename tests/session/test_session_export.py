@@ -1,0 +1,91 @@
+"""The export: what the scene has, in files other programs read."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.errors import InputError
+from rig.records import Drop, Edge, Ping
+from rig.session.edges_csv import read_edges
+from rig.session.export import export_csv, flatten
+from rig.session.schema import RunState
+from rig.session.store import Session
+
+ANALYSIS: dict[str, Any] = {
+    "runs": [
+        {"run": 1, "attempt": 2, "verdict": "void", "reasons": ["skew 7 ms", 'say "no", twice']},
+        {
+            "run": 2,
+            "attempt": 1,
+            "separation_m": {"value": 0.1, "u": 0.001, "U95": 0.002},
+            "edges": {"received": 50, "missed": 0},
+            "verdict": "accepted",
+            "reasons": [],
+            "budget": [{"name": "skew", "quantity": "separation", "u": 1e-4}],
+        },
+    ],
+    "superseded": [{"run": 1, "attempt": 1, "verdict": "void", "reasons": ["lost edges"]}],
+    "summary": [{"incline_deg": 40.0, "n": 1, "predicted": {"separation_m": 0.11546810526538031}}],
+}
+
+
+@pytest.fixture
+def session(tmp_path: Path):
+    edges = (Edge(100, 0, True), Edge(300, 0, False))
+    with Session.create(
+        tmp_path / "s.rig", "p: 1\n", "p.yaml", simulated=True, origin="sim://"
+    ) as session:
+        session.add_drop(Drop(run=1, attempt=1, tick_hz=1000, edges=()))
+        session.add_drop(Drop(run=1, attempt=2, tick_hz=1000, edges=edges, fire_tick=5))
+        session.add_state(1, 1, RunState.VOID, 10, ["lost edges", "twice"])
+        session.add_ping(Ping(1, 2, 3))
+        yield session
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_all_files(tmp_path: Path, session: Session) -> None:
+    place = tmp_path / "deep" / "out"
+    for _ in range(2):  # the second time replaces
+        export_csv(place, session, ANALYSIS, {1: 1001.0})
+    runs = rows(place / "runs.csv")
+    assert [(row["run"], row["attempt"], row["superseded"]) for row in runs] == [
+        ("1", "1", "1"),
+        ("1", "2", "0"),
+        ("2", "1", "0"),
+    ]
+    assert runs[1]["reasons"] == 'skew 7 ms; say "no", twice'
+    assert runs[2]["separation_m_U95"] == "0.002"
+    assert runs[2]["edges_received"] == "50"
+    [line] = rows(place / "summary.csv")
+    assert float(line["predicted_separation_m"]) == 0.11546810526538031
+    assert rows(place / "states.csv")[0]["reasons"] == "lost edges; twice"
+    assert rows(place / "pings.csv") == [{"host_send_ns": "1", "host_recv_ns": "2", "tick": "3"}]
+    [drop] = read_edges(place / "edges.csv")
+    assert drop.edges[1].tick == round(300 / 1001 * 10**12)
+    readme = (place / "README.txt").read_text()
+    assert readme.startswith("SIMULATED DATA")
+    assert "  separation_m: [m] height" in readme
+    assert sorted(entry.name for entry in place.iterdir()) == sorted(
+        ["README.txt", "edges.csv", "pings.csv", "runs.csv", "states.csv", "summary.csv"]
+    )
+
+
+def test_columns_of_absent_things_are_absent(tmp_path: Path, session: Session) -> None:
+    export_csv(tmp_path / "out", session, {"runs": [{"run": 1, "verdict": "void"}], "summary": []})
+    assert rows(tmp_path / "out" / "runs.csv") == [{"run": "1", "verdict": "void"}]
+
+
+def test_no_place(tmp_path: Path, session: Session) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot make"):
+        export_csv(tmp_path / "file", session, ANALYSIS)
+
+
+def test_flatten_leaves_objects_in_lists_out() -> None:
+    assert flatten({"a": {"b": [1, 2], "c": [{"d": 1}]}}) == {"a_b": "1; 2"}

@@ -1,0 +1,376 @@
+"""The session keeps what it is given, in order, and lets nobody alter it."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import rig
+from rig.errors import SessionError
+from rig.records import Certificate, Drop, Edge, Ping
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
+from rig.session.store import Session
+
+TEXT = "protocol: 1\ntitle: Übung\n"
+DEVICE_DROP = Drop(
+    run=2,
+    attempt=1,
+    tick_hz=2_000_000,
+    edges=(Edge(10, 0, True), Edge(10, 1, True), Edge(900, 0, False)),
+    fire_tick=4_000_000_000,
+    initial_state=0x0100,
+    certificate=Certificate(events=3, crc32=0xFFFF_FFFF, overflows=1, glitches=2, late=3),
+    faults=("1 snapshot lost",),
+)
+IMPORTED = Drop(run=1, attempt=1, tick_hz=10**12, edges=(Edge(5, 15, False),))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "a session #1?.rig"
+
+
+def make(path: Path) -> Session:
+    return Session.create(path, TEXT, "uniform.yaml", simulated=True, origin="sim://")
+
+
+def fill(session: Session) -> None:
+    session.log_bytes("tx", 1, b"\x00\xff")
+    session.log_bytes("rx", 2, b"")
+    session.add_identity({"serial": "A1", "tick_hz": 2_000_000}, 3)
+    session.add_pings([Ping(1, 2, 3), Ping(4, 5, 2**32 - 1)])
+    session.add_drop(DEVICE_DROP, host_ns=99, provenance="device")
+    session.add_drop(IMPORTED)
+    session.add_state(2, 0, RunState.PLANNED, 1)
+    session.add_state(2, 1, RunState.VOID, 2, ["skew 7 ms", "β ≠ 0.5"])
+
+
+def python(code: str, *arguments: object) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stdin=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(rig.__file__).parents[1])},
+    )
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    os.kill(process.pid, signal.SIGKILL)
+    with process:
+        process.wait(30)
+
+
+def test_everything_comes_back_as_it_went_in(path: Path) -> None:
+    with make(path) as session:
+        fill(session)
+        assert session.pending == 8
+        session.commit()
+        assert session.pending == 0
+    with Session.open(path, readonly=True) as session:
+        assert [tuple(chunk) for chunk in session.byte_log()] == [
+            (1, "tx", b"\x00\xff"),
+            (2, "rx", b""),
+        ]
+        assert session.identities() == [(3, {"serial": "A1", "tick_hz": 2_000_000})]
+        assert session.pings() == [Ping(1, 2, 3), Ping(4, 5, 2**32 - 1)]
+        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+        assert session.latest_drops() == [IMPORTED, DEVICE_DROP]
+        assert [entry.state for entry in session.states()] == [RunState.PLANNED, RunState.VOID]
+        last = session.latest_state(2)
+        assert last is not None
+        assert last.reasons == ("skew 7 ms", "β ≠ 0.5")
+        assert session.latest_state(3) is None
+        assert (session.protocol_text, session.protocol_source) == (TEXT, "uniform.yaml")
+        assert session.simulated
+        assert session.meta["origin"] == "sim://"
+        assert len(session.meta["protocol_sha256"]) == 64
+    assert sorted(entry.name for entry in path.parent.iterdir()) == [path.name]
+
+
+def test_latest_drops_are_the_last_attempts(path: Path) -> None:
+    second = Drop(run=1, attempt=2, tick_hz=1000, edges=())
+    with make(path) as session:
+        session.add_drop(second)
+        session.add_drop(IMPORTED)
+        assert session.latest_drops() == [second]
+        assert list(session.drops()) == [second, IMPORTED]
+
+
+def test_results_are_replaced_as_a_whole(path: Path) -> None:
+    with make(path) as session:
+        session.put_results([{"run": 1, "attempt": 1, "x": 1}, {"run": 2, "attempt": 1}], "1")
+        session.put_results([{"run": 1, "attempt": 1, "x": 2}], "2")
+        session.commit()
+        assert session.results() == [{"run": 1, "attempt": 1, "x": 2}]
+        with pytest.raises(ValueError, match="JSON"):
+            session.put_results([{"run": 1, "attempt": 1, "x": float("nan")}], "2")
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        f"{verb} {rest}"
+        for table in (
+            "bytes",
+            "edge",
+            "ping",
+            "run_state",
+            "protocol",
+            "identity",
+            "meta",
+            '"drop"',
+        )
+        for verb, rest in (
+            ("DELETE", f"FROM {table}"),
+            ("INSERT OR REPLACE", f"INTO {table} SELECT * FROM {table}"),
+            ("REPLACE", f"INTO {table} SELECT * FROM {table}"),
+        )
+    ]
+    + [
+        "UPDATE bytes SET data = x'00'",
+        "UPDATE edge SET tick = tick + 1",
+        "UPDATE ping SET tick = 0",
+        "UPDATE run_state SET state = 'accepted'",
+        "UPDATE protocol SET text = ''",
+        "UPDATE \"drop\" SET faults = '[]'",
+        "UPDATE meta SET value = 'false' WHERE key = 'simulated'",
+        'INSERT OR REPLACE INTO "drop" SELECT id + 100, run, attempt, tick_hz, fire_tick, '
+        "initial_state, events, crc32, overflows, glitches, late, '[]', host_ns, provenance "
+        'FROM "drop"',
+    ],
+)
+def test_raw_records_are_never_altered(path: Path, statement: str) -> None:
+    with make(path) as session:
+        fill(session)
+    connection = sqlite3.connect(path)
+    before = list(connection.iterdump())
+    with pytest.raises(sqlite3.IntegrityError, match="never altered"):
+        connection.execute(statement)
+    assert list(connection.iterdump()) == before
+    connection.close()
+
+
+def test_a_refused_record_leaves_the_others(path: Path) -> None:
+    with make(path) as session:
+        session.add_drop(DEVICE_DROP)
+        with pytest.raises(SessionError, match="never altered"):
+            session.add_drop(DEVICE_DROP)
+        half_bad = Drop(run=7, attempt=1, tick_hz=1, edges=(Edge(1, 1, True), Edge(2**70, 1, True)))
+        with pytest.raises(SessionError, match="refuses"):
+            session.add_drop(half_bad)
+        session.add_drop(IMPORTED)
+        session.commit()
+    with Session.open(path, readonly=True) as session:
+        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+
+
+def test_a_full_disk_costs_nothing_once_there_is_room(path: Path) -> None:
+    session = make(path)
+    connection = session._connection
+    assert connection is not None
+    session.log_bytes("rx", 0, b"first")
+    session.commit()
+    (pages,) = connection.execute("PRAGMA page_count").fetchone()
+    connection.execute(f"PRAGMA max_page_count = {pages}")
+    with pytest.raises(SessionError, match="disk is full") as caught:
+        session.log_bytes("rx", 1, bytes(100_000))
+    assert "free some space" in caught.value.hint
+    session.log_bytes("rx", 2, b"kept in memory")
+    session.add_drop(DEVICE_DROP)
+    session.add_drop(IMPORTED)
+    with pytest.raises(SessionError, match="disk is full"):
+        session.commit()
+    assert session.pending == 4
+    connection.execute("PRAGMA max_page_count = 100000")
+    session.commit()
+    session.close()
+    with Session.open(path) as session:
+        assert [chunk.host_ns for chunk in session.byte_log()] == [0, 1, 2]
+        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+
+
+def test_readers_beside_a_writer_see_what_is_committed(path: Path) -> None:
+    with make(path) as writer, Session.open(path, readonly=True) as reader:
+        writer.log_bytes("rx", 1, b"x")
+        assert list(reader.byte_log()) == []
+        writer.commit()
+        assert len(list(reader.byte_log())) == 1
+        with pytest.raises(SessionError, match="read-only"):
+            reader.log_bytes("rx", 1, b"x")
+        with pytest.raises(SessionError, match="read-only"):
+            reader.commit()
+
+
+def test_reader_in_a_write_protected_folder(path: Path) -> None:
+    make(path).close()
+    path.parent.chmod(0o500)
+    try:
+        with Session.open(path, readonly=True) as session:
+            assert session.protocol_text == TEXT
+    finally:
+        path.parent.chmod(0o700)
+
+
+def test_closed_session_says_so(path: Path) -> None:
+    session = make(path)
+    session.close()
+    session.close()
+    with pytest.raises(SessionError, match="closed"):
+        session.pings()
+    with pytest.raises(SessionError, match="closed"):
+        session.commit()
+
+
+def test_an_error_in_the_block_keeps_what_was_measured(path: Path) -> None:
+    def measure_and_fail() -> None:
+        with make(path) as session:
+            session.log_bytes("rx", 1, b"x")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        measure_and_fail()
+    with Session.open(path) as session:
+        assert len(list(session.byte_log())) == 1
+
+
+def test_sigkill_keeps_every_committed_row_and_no_lock(path: Path) -> None:
+    child = python(
+        """
+        import sys
+        from rig.session.store import Session
+        session = Session.create(sys.argv[1], "p", "p", simulated=True, origin="sim://")
+        count = 0
+        while True:
+            session.log_bytes("rx", count, b"0123456789" * 20)
+            session.commit()
+            print(count, flush=True)
+            count += 1
+        """,
+        path,
+    )
+    assert child.stdout is not None
+    for _ in range(200):
+        last = int(child.stdout.readline())
+    with pytest.raises(SessionError, match=f"written by process {child.pid}") as caught:
+        Session.open(path)
+    assert caught.value.hint
+    os.kill(child.pid, signal.SIGKILL)
+    rest, _ = child.communicate(timeout=30)
+    last = max([last, *map(int, rest.split("\n")[:-1])])
+    with Session.open(path) as session:
+        stamps = [chunk.host_ns for chunk in session.byte_log()]
+    # The row after the last announced one may have been committed before the kill.
+    assert stamps in (list(range(last + 1)), list(range(last + 2)))
+
+
+def test_sigkill_before_the_commit_leaves_a_whole_session(path: Path) -> None:
+    child = python(
+        """
+        import sys, time
+        from rig.session.store import Session
+        session = Session.create(sys.argv[1], "p", "p", simulated=True, origin="sim://")
+        session.log_bytes("rx", 1, b"x")
+        print("ready", flush=True)
+        time.sleep(60)
+        """,
+        path,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "ready\n"
+    kill(child)
+    with Session.open(path) as session:
+        assert list(session.byte_log()) == []
+        session.log_bytes("rx", 1, b"goes on")
+
+
+def test_one_writer_even_within_a_process(path: Path) -> None:
+    with make(path):
+        with pytest.raises(SessionError, match="being written"):
+            Session.open(path)
+        with pytest.raises(SessionError, match="being written"):
+            make(path)
+    Session.open(path).close()
+
+
+def test_a_leftover_lock_file_blocks_nobody(path: Path) -> None:
+    make(path).close()
+    path.with_name(path.name + ".lock").write_text("4242\n")
+    Session.open(path).close()
+
+
+def test_create_never_overwrites(path: Path) -> None:
+    path.write_text("precious")
+    with pytest.raises(SessionError, match="already exists"):
+        make(path)
+    assert path.read_text() == "precious"
+
+
+def test_create_in_a_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="No such file"):
+        make(tmp_path / "no" / "such.rig")
+
+
+def foreign_database(path: Path) -> None:
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE TABLE meta (key, value)")
+    connection.commit()
+    connection.close()
+
+
+def newer(path: Path) -> None:
+    make(path).close()
+    connection = sqlite3.connect(path)
+    connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
+    connection.close()
+
+
+def hollow(path: Path) -> None:
+    foreign_database(path)
+    connection = sqlite3.connect(path)
+    connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+    connection.close()
+
+
+def cut(path: Path) -> None:
+    make(path).close()
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+@pytest.mark.parametrize("readonly", [False, True])
+@pytest.mark.parametrize(
+    ("prepare", "words"),
+    [
+        (lambda path: None, "no session at"),
+        (lambda path: path.mkdir(), "folder"),
+        (lambda path: path.write_bytes(b""), "empty"),
+        (lambda path: path.write_text("run,channel,time_s,state\n" * 400), "not a session"),
+        (lambda path: path.write_bytes(b"x"), "not a session"),
+        (foreign_database, "another program's"),
+        (newer, "newer rig"),
+        (hollow, "not a session|cannot be used|damaged"),
+        (cut, "damaged"),
+    ],
+    ids=["missing", "folder", "empty", "text", "byte", "foreign", "newer", "hollow", "cut"],
+)
+def test_what_is_no_session(path: Path, prepare, words: str, readonly: bool) -> None:
+    prepare(path)
+    before = path.read_bytes() if path.is_file() else None
+    with pytest.raises(SessionError, match=words) as caught:
+        Session.open(path, readonly=readonly)
+    assert caught.value.hint
+    assert caught.value.exit_code == 2
+    assert (path.read_bytes() if path.is_file() else None) == before
+    assert not path.with_name(path.name + ".lock").exists()
+
+
+def test_identity_is_json(path: Path) -> None:
+    with make(path) as session:
+        session.add_identity({"board": "µ"}, 1)
+        assert json.dumps(session.identities()[0][1])

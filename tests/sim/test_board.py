@@ -1,0 +1,170 @@
+"""The virtual board against the suite every device must pass, and what is its own."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+import serial
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.link.client import Device
+from rig.link.port import port_clock
+from rig.link.refusals import DeviceRefusedError
+from sim.board import VirtualBoard
+from sim.clock import VirtualClock
+from sim.serial_port import SimulatedSerial
+from sim.snapshots import take_snapshots
+from tests.link.conformance import (
+    LABEL,
+    Bench,
+    DeviceConformance,
+    ScriptedLab,
+    arm,
+    falling_rods,
+)
+
+
+class VirtualBench(Bench):
+    can_preset_tick = True
+
+    def __init__(self, lab: ScriptedLab, **line) -> None:
+        super().__init__(lab)
+        self.board = VirtualBoard(lab, seed=1, ppm=2000)
+        self.serial = SimulatedSerial("test", board=self.board, timeout=0.02, **line)
+
+    def port(self):
+        return self.serial
+
+    def clock(self):
+        return self.serial.clock
+
+    def touch(self, gates):
+        self.board.advance(self.clock().now_ns())
+        self.board.touch(gates)
+
+    def reset(self):
+        self.board.reset(self.clock().now_ns())
+
+    def reopen(self):
+        self.serial.close()
+        self.serial = SimulatedSerial(
+            "test", board=self.board, clock=self.clock(), timeout=0.02, reset_on_open=False
+        )
+
+    def preset_tick(self, seconds_before_wrap):
+        now = self.board.counter.tick_at(self.clock().now_ns())
+        self.board.counter.start += 2**32 - round(seconds_before_wrap * 16e6) - now
+
+
+class TestVirtualBoard(DeviceConformance):
+    def make(self, lab):
+        return VirtualBench(lab)
+
+    def test_edges_are_exact(self, bench, device):
+        drop = self.drop(device)
+        hz = 16e6 * 1.002
+        assert [e.tick for e in drop.edges] == [round(c[0] * hz) for c in bench.lab.changes]
+
+
+def conversation(seed: int, **line) -> tuple[list, list]:
+    bench = VirtualBench(ScriptedLab(changes=falling_rods()), seed=seed, **line)
+    chunks: list = []
+    device = Device(bench.port(), bench.clock(), lambda *c: chunks.append(c), tries=60)
+    device.connect()
+    device.fire(arm(device))
+    drop = device.collect(LABEL)
+    device.acknowledge(LABEL, drop.certificate.crc32)
+    return chunks, list(drop.edges)
+
+
+def test_same_seed_same_bytes():
+    one, two, other = (conversation(seed, corrupt=0.005, lose=0.002) for seed in (1, 1, 2))
+    assert one == two
+    assert one[0] != other[0]
+    assert one[1] == other[1]
+
+
+def test_a_board_of_another_version_is_refused_with_advice():
+    board = VirtualBoard(ScriptedLab(), protocol_version=9)
+    port = SimulatedSerial("test", board=board, timeout=0.02)
+    with pytest.raises(DeviceRefusedError, match="protocol version 9") as caught:
+        Device(port, port.clock).connect()
+    assert "rig flash" in caught.value.hint
+
+
+def test_the_port_brings_its_clock():
+    port = SimulatedSerial(board=VirtualBoard(ScriptedLab()))
+    assert port_clock(port) is port.clock
+
+
+def test_a_read_waits_in_virtual_time_only():
+    port = SimulatedSerial("test", board=VirtualBoard(ScriptedLab()), timeout=0.2)
+    assert port.read(1) == b""
+    assert port.clock.now_ns() == pytest.approx(0.2e9, rel=1e-3)
+    port.timeout = 1
+    assert len(port.read(8)) == 8  # BOOT begins to arrive
+    assert 0.3e9 < port.clock.now_ns() < 0.32e9
+
+
+def test_bytes_arrive_at_line_rate():
+    board = VirtualBoard(ScriptedLab(), baudrate=9600)
+    board.reset(0)
+    board.advance(300_000_000)
+    first = board.line.next_arrival_ns()
+    assert first == 300_000_000 + 10 * 10**9 // 9600
+    assert len(board.line.arrived(first)) == 1
+    assert len(board.line.arrived(first + 3 * board.line.byte_ns)) == 3
+
+
+def test_a_paced_clock_takes_real_time(monkeypatch):
+    slept: list[float] = []
+    monkeypatch.setattr("sim.clock.time.sleep", slept.append)
+    clock = VirtualClock(pace=0.5)
+    clock.sleep(2)
+    clock.advance_to(1_000)
+    assert slept == [1.0]
+    assert clock.now_ns() == 2_000_000_000
+
+
+def test_changes_within_a_tick_are_one_snapshot():
+    changes = [(1e-3, 0, True), (1e-3 + 1e-9, 1, True), (2e-3, 0, False)]
+    assert take_snapshots(changes, 0, 3, 16e6) == ([(16000, 3), (32000, 2)], 0)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0, 0.01), st.integers(0, 3)), max_size=60).map(sorted),
+    st.integers(0, 15),
+)
+def test_snapshots_never_repeat_a_state_and_end_right(toggles, initial):
+    state, changes = initial, []
+    for seconds, channel in toggles:
+        state ^= 1 << channel
+        changes.append((seconds, channel, bool(state >> channel & 1)))
+    snapshots, glitches = take_snapshots(changes, initial, 0xF, 16e6)
+    assert (snapshots[-1].state if snapshots else initial) == state
+    assert all(a.ticks < b.ticks for a, b in pairwise(snapshots))
+    assert len(snapshots) + 2 * glitches <= len(changes)
+
+
+def test_a_url_handler_only_says_which_board():
+    class Serial(SimulatedSerial):
+        def make_board(self):
+            assert self.port == "sim://rig?seed=3"
+            self.disturb(3, jitter_s=0)
+            return VirtualBoard(ScriptedLab(), seed=3)
+
+    port = Serial(None, baudrate=500_000, timeout=0.02, exclusive=True)
+    port.port = "sim://rig?seed=3"
+    port.open()
+    assert Device(port, port_clock(port)).connect().unique_id == port.board.identity.unique_id
+    port.close()
+    with pytest.raises(serial.PortNotOpenError):
+        port.read(1)
+
+
+def test_waiting_for_ever_in_virtual_time_is_an_error():
+    port = SimulatedSerial("test", board=VirtualBoard(ScriptedLab()), reset_on_open=False)
+    with pytest.raises(serial.SerialException, match="silent"):
+        port.read(1)
