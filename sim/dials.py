@@ -51,8 +51,10 @@ class Dials:
         Chance for each struck rod to bounce back through the lowest beam.
     clock
         Error of the device's clock, relative.
-    latency_sd
+    latency
         Mean of the exponential delay of the host's reads, s.
+    corrupt, lose
+        Share of bytes on the line, either way, that are changed or lost.
     restitution, friction
         True coefficients; not-a-number takes the protocol's.
     """
@@ -73,7 +75,9 @@ class Dials:
     string: float = 0.002
     bounce: float = 0.05
     clock: float = -1300e-6
-    latency_sd: float = 0.3e-3
+    latency: float = 0.3e-3
+    corrupt: float = 0.0
+    lose: float = 0.0
     restitution: float = math.nan
     friction: float = math.nan
 
@@ -85,8 +89,9 @@ class Dials:
 
 _NAMES = tuple(field.name for field in fields(Dials))
 _KEPT = {"delay", "restitution", "friction"}
-_TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency_sd"}
+_TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency"}
 _LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
+_SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose"}
 
 
 def read_dials(settings: Mapping[str, str]) -> Dials:
@@ -100,7 +105,10 @@ def read_dials(settings: Mapping[str, str]) -> Dials:
         An unknown dial or a value that is not a quantity of its dimension.
     """
     rest = dict(settings)
-    dials = Dials.quiet() if rest.pop("quiet", "0") == "1" else Dials()
+    quiet = rest.pop("quiet", "0")
+    if quiet not in {"0", "1"}:
+        raise InputError(f"sim://: quiet: {quiet!r} is neither 0 nor 1")
+    dials = Dials.quiet() if quiet == "1" else Dials()
     changes: dict[str, float] = {}
     for name, text in rest.items():
         if name not in _NAMES:
@@ -122,4 +130,8 @@ def read_dials(settings: Mapping[str, str]) -> Dials:
             raise InputError(f"sim://: {name}: {error}") from None
         if changes[name] < 0.0 and name not in {"clock", "restitution"}:
             raise InputError(f"sim://: {name}: {text} is negative; zero or more is accepted")
+        if changes[name] > 1.0 and name in _SHARES:
+            raise InputError(f"sim://: {name}: {text} is more than all", "a share is 0 to 100 %")
+        if changes[name] <= -1.0 and name == "clock":
+            raise InputError(f"sim://: clock: {text} would stop it", "a real one is off by < 0.5 %")
     return replace(dials, **changes)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.errors import InputError
 from rig.link.messages import unpack_label
 from rig.model.chain import Chain
 from rig.model.fall import hits, kicks
@@ -96,7 +97,10 @@ class ChainLab:
     def _run(self, label: int) -> tuple[Run, int]:
         number, attempt = unpack_label(label)
         if number not in self.runs:
-            raise KeyError(f"the plan has no run {number}")
+            raise InputError(
+                f"the simulated scene's plan has no run {number}",
+                "give sim:// the protocol that is being run",
+            )
         return self.runs[number], attempt
 
     def rest(self, label: int) -> int:
@@ -190,7 +194,7 @@ class ChainLab:
             )
         gaps = [(a.end, b.start) for a, b in itertools.pairwise(shadows)]
         for start, end in gaps:
-            if rng.random() < self.dials.string:
+            if rng.random() < self.dials.string and start < end:
                 at = float(rng.uniform(start, end))
                 shadows.append(Shadow(at, at + float(rng.uniform(30e-6, 200e-6)), NOT_A_ROD))
         if path.hits and gate.height == min(g.height for g in self.gates if g.side == gate.side):

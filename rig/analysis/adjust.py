@@ -1,0 +1,118 @@
+"""Least squares with prior knowledge, and the uncertainties that follow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.drop_model import DropModel
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+    Matches = Mapping[str, Sequence[Index]]
+
+_STEPS = 12
+_DONE = 1e-6  # of a standard uncertainty
+_HUBER = 4.0  # standard deviations beyond which an edge counts less
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Unknowns after adjustment.
+
+    Attributes
+    ----------
+    x, sd
+        Best estimates (deviations from nominal) and prior uncertainties, shape ``(unknowns,)``.
+    information
+        Normal matrix in units of the prior uncertainties, prior included.
+    data
+        The part of it that comes from edges.
+    chi2, degrees
+        Of the edges: weighted sum of squares, and number of edges less what they determine.
+    scatter
+        How much more the edges scatter than assumed; at least 1, and already allowed for.
+    """
+
+    x: Array
+    sd: Array
+    information: Array
+    data: Array
+    chi2: float
+    degrees: float
+    scatter: float
+
+
+def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
+    """Find the unknowns that fit all matched edges best.
+
+    Gauss–Newton on ‖r/σ‖² + ‖x/sd‖²; residuals beyond 4 σ weigh less (Huber).
+
+    Parameters
+    ----------
+    matches
+        For each side what `rig.analysis.align.align` found.
+    x
+        Where to begin.
+    """
+    sd = model.unknowns.sd
+    free = sd > 0.0
+    scaled = np.divide(x, sd, out=np.zeros_like(x), where=free)
+    information = data = np.eye(x.size)
+    chi2, degrees = 0.0, 0.0
+    inflation = 1.0
+    for step in range(_STEPS):
+        rows = [model.equations(role, scaled * sd, match) for role, match in matches.items()]
+        sigma = np.concatenate([row.sigma for row in rows]) * inflation
+        residuals = np.concatenate([row.residuals for row in rows]) / sigma
+        jacobian = np.concatenate([row.jacobian for row in rows]) * sd / sigma[:, None]
+        size = np.abs(residuals)
+        weight = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-300)))
+        residuals, jacobian = residuals * weight, jacobian * weight[:, None]
+        data = jacobian.T @ jacobian
+        information = data + np.eye(x.size)
+        new = np.linalg.solve(information, jacobian.T @ (jacobian @ scaled - residuals))
+        moved = float(np.abs(new - scaled).max(initial=0.0))
+        scaled = new
+        chi2 = float(residuals @ residuals)
+        degrees = residuals.size - float(np.trace(np.linalg.solve(information, data)))
+        if step and moved < _DONE:
+            factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
+            if factor < 1.05:
+                break
+            inflation *= factor  # the edges scatter more than assumed: weigh them so
+    return Estimate(scaled * sd, sd, information, data, chi2, degrees, inflation)
+
+
+def uncertainty(
+    estimate: Estimate, gradient: Array, groups: Mapping[str, Sequence[slice]]
+) -> tuple[float, dict[str, float]]:
+    """Standard uncertainty of a function of the unknowns, and what each source adds to it.
+
+    With A = JᵀJ + 1 in prior units, A⁻¹ = A⁻¹JᵀJA⁻¹ + Σ A⁻¹PA⁻¹, P picking one group: the squares
+    of the parts add up to the square of the whole.
+
+    Parameters
+    ----------
+    gradient
+        Derivatives by all unknowns, shape ``(unknowns,)``.
+    groups
+        Lines of the budget.
+    """
+    inverse = np.linalg.solve(estimate.information, gradient * estimate.sd)
+    whole = math.sqrt(max(0.0, float(gradient * estimate.sd @ inverse)))
+    parts = {
+        name: math.sqrt(sum(float(inverse[block] @ inverse[block]) for block in blocks))
+        for name, blocks in groups.items()
+    }
+    edges = math.sqrt(max(0.0, float(inverse @ estimate.data @ inverse)))
+    parts["edges"] = math.hypot(edges, parts.get("edges", 0.0))
+    return whole, {name: part for name, part in parts.items() if part > 0.0}

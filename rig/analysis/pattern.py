@@ -1,0 +1,194 @@
+"""A first guess of the fall from edges that nobody has matched yet.
+
+Every pair of an observed and an expected edge votes for a release time; only the true one is
+voted for by all rods at all gates, because a pattern shifted by one rod has other speeds. What
+the impacts do is then found by trying one α after another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.unknowns import HANG_U
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rig.analysis.trains import Side, Train
+    from rig.units import Quantity
+
+    Array = NDArray[np.float64]
+
+ALPHAS = np.arange(-0.10, 0.601, 0.01)
+"""Impact coefficients that are tried: beyond both ends of what energy allows."""
+_LONGEST = 5e-3  # half width of a vote, s: at the very start a chain is too slow to tell more
+_ROUGH = 1e-3  # how far off a rod may be in a first guess, m
+_STEPS = 6
+_APART = 8e-3  # release times further apart than this are different answers, s
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """A first guess and how well the edges support it.
+
+    Attributes
+    ----------
+    release
+        s since the release fired.
+    start
+        Height of the reference point before release, m.
+    alpha
+        Of all impacts; 0 for a free chain.
+    share
+        Share of the expected edges that are where they should be.
+    runner_up
+        The same for the best guess that is a really different one.
+    """
+
+    release: float
+    start: float
+    alpha: float = 0.0
+    share: float = 0.0
+    runner_up: float = 0.0
+
+
+def guess(side: Side, start: Quantity, gravity: float, ratios: Array | None) -> Guess:
+    """Guess the release time, and α where the chain is struck.
+
+    Parameters
+    ----------
+    start
+        Height of the reference point before release, m.
+    ratios
+        As in `rig.analysis.trajectory.struck_trajectory`; `None` for a free chain.
+    """
+    places = np.array(side.chain.chain.heights)
+    pitch = float(np.diff(places).min()) if places.size > 1 else start.value
+    slack = pitch / 6
+    # An impact chain falls freely until its bottom rod is down.
+    lowest = -np.inf if ratios is None else 0.0
+    free = _release(side, start, gravity, lowest, slack)
+    if ratios is None or free.share == 0.0:
+        return free
+    return _alpha(side, gravity, ratios, slack, pitch, free)
+
+
+def _release(side: Side, start: Quantity, gravity: float, lowest: float, slack: float) -> Guess:
+    """Let all pairs vote and count at the moment that most of them agree on."""
+    pairs = [_pairs(train, lowest) for train in side.trains]
+    times = np.concatenate([pair[0] for pair in pairs])
+    levels = np.concatenate([pair[1] for pair in pairs])
+    if times.size == 0:
+        return Guess(0.0, start.value)
+    tau = np.sqrt(2.0 * (start.value - levels) / gravity)
+    middle = times - tau
+    half = np.minimum(slack / np.maximum(gravity * tau, slack / _LONGEST), _LONGEST)
+    steps = np.repeat([1, -1], times.size)
+    moments = np.concatenate([middle - half, middle + half])
+    order = np.lexsort((-steps, moments))
+    moments, votes = moments[order], np.cumsum(steps[order])
+    best = int(np.argmax(votes))
+    release = 0.5 * float(moments[best] + moments[best + 1])
+    voters = np.abs(middle - release) <= half
+    expected = sum(int((train.levels > lowest).sum()) for train in side.trains)
+    elsewhere = votes[np.abs(moments - release) > _APART]
+    release, height = _refine(times[voters], levels[voters], release, start, gravity)
+    return Guess(
+        release,
+        height,
+        share=min(1.0, float(votes[best]) / expected),
+        runner_up=float(elsewhere.max(initial=0)) / expected,
+    )
+
+
+def _pairs(train: Train, lowest: float) -> tuple[Array, Array]:
+    """Pair every edge with every expected edge of its polarity: times and levels."""
+    same = (train.blocked[:, None] == train.blocks[None, :]) & (train.levels > lowest)[None, :]
+    observed, expected = np.nonzero(same)
+    return train.times[observed], train.levels[expected]
+
+
+def _refine(
+    times: Array, levels: Array, release: float, start: Quantity, gravity: float
+) -> tuple[float, float]:
+    """Fit release time and start height to the pairs that voted for them."""
+    offset = 0.0
+    prior = (_ROUGH / max(start.u, HANG_U)) ** 2
+    for _ in range(_STEPS):
+        since = times - release
+        residual = start.value + offset - 0.5 * gravity * since**2 - levels
+        weight = np.minimum(1.0, 2.0 * _ROUGH / np.maximum(np.abs(residual), _ROUGH))
+        speed = gravity * since
+        normal = np.array(
+            [
+                [float(weight @ speed**2), float(weight @ speed)],
+                [float(weight @ speed), float(weight.sum()) + prior],
+            ]
+        )
+        right = [float((weight * speed) @ residual), float(weight @ residual) + prior * offset]
+        step = np.linalg.solve(normal, right)
+        release, offset = release - float(step[0]), offset - float(step[1])
+    return release, start.value + offset
+
+
+def _alpha(
+    side: Side, gravity: float, ratios: Array, slack: float, pitch: float, free: Guess
+) -> Guess:
+    """Try one α after another."""
+    places = np.array(side.chain.chain.heights)
+    time, height, speed = _paths(free.release, free.start, gravity, ratios, places)
+    scores = np.array(
+        [
+            sum(
+                _support(train, time[:, n], height, speed[:, n], gravity, slack)
+                for train in side.trains
+            )
+            for n in range(ALPHAS.size)
+        ]
+    )
+    # The middle of a plateau, not its left end.
+    plateau = np.flatnonzero(scores == scores.max())
+    best = int(plateau[plateau.size // 2])
+    # Where the chain of each other α is when the best one's top rod strikes.
+    end = time[-1, best]
+    leg = np.clip((time <= end).sum(axis=0) - 1, 0, None)
+    since = end - time[leg, range(ALPHAS.size)]
+    at = height[leg] - (speed[leg, range(ALPHAS.size)] + 0.5 * gravity * since) * since
+    different = np.abs(at - at[best]) > pitch / 2
+    return replace(
+        free,
+        alpha=float(ALPHAS[best]),
+        share=min(free.share, float(scores[best]) / side.expected),
+        runner_up=float(scores[different].max(initial=0)) / side.expected,
+    )
+
+
+def _paths(
+    release: float, start: float, gravity: float, ratios: Array, places: Array
+) -> tuple[Array, Array, Array]:
+    """Times and speeds at the beginning of each leg for every α, shape ``(legs, alphas)``."""
+    legs = places.size + 1
+    time, speed = np.empty((legs, ALPHAS.size)), np.zeros((legs, ALPHAS.size))
+    height = np.concatenate([[start], -places])
+    time[0] = release
+    for k, ratio in enumerate(ratios):
+        distance = height[k] - height[k + 1]
+        arrival = np.sqrt(speed[k] ** 2 + 2.0 * gravity * distance)
+        time[k + 1] = time[k] + 2.0 * distance / (speed[k] + arrival)
+        speed[k + 1] = arrival * (1.0 + ALPHAS * ratio)
+    return time, height, speed
+
+
+def _support(
+    train: Train, time: Array, height: Array, speed: Array, gravity: float, slack: float
+) -> int:
+    """Count the expected edges that have an observed one where the chain would be."""
+    leg = np.searchsorted(time, train.times, side="right") - 1
+    since = train.times - time[leg]
+    at = np.where(leg < 0, height[0], height[leg] - (speed[leg] + 0.5 * gravity * since) * since)
+    near = np.abs(at[:, None] - train.levels[None, :]) < slack
+    near &= train.blocked[:, None] == train.blocks[None, :]
+    return int(near.any(axis=0).sum())

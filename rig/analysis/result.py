@@ -1,0 +1,121 @@
+"""Results as plain data, and as the JSON that others rely on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from rig.analysis.student import coverage_factor
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rig.protocol.scene import Run
+
+Verdict = Literal["accepted", "marginal", "void", "rejected"]
+GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
+"""Verdicts that take part in a summary."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A measured value.
+
+    Attributes
+    ----------
+    value, u
+        Best estimate and standard uncertainty.
+    degrees
+        Degrees of freedom of `u`.
+    budget
+        What each source adds to `u`; the squares add up to its square.
+    """
+
+    value: float
+    u: float
+    degrees: float = math.inf
+    budget: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty for 95 %."""
+        return coverage_factor(max(1.0, self.degrees)) * self.u
+
+    def json(self) -> dict[str, float]:
+        """``{"value", "u", "U95"}``."""
+        return {"value": self.value, "u": self.u, "U95": self.expanded}
+
+
+@dataclass(frozen=True, slots=True)
+class Audit:
+    """What became of the edges of a drop.
+
+    Attributes
+    ----------
+    received
+        Edges in the record, of the gates in use.
+    matched
+        Of these, belonging to a rod.
+    missed
+        Expected edges that nobody reported.
+    spurious
+        Received edges that belong to no rod.
+    lost
+        Edges the device saw and could not keep.
+    """
+
+    received: int
+    matched: int
+    missed: int
+    spurious: int
+    lost: int
+
+    def json(self) -> dict[str, int]:
+        """As `rig analyze --json` prints it."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+
+@dataclass(frozen=True, slots=True)
+class DropResult:
+    """Everything that a drop says.
+
+    Attributes
+    ----------
+    quantities
+        By JSON name (``separation_m`` …), only those the scene has.
+    matches
+        For each matched edge (by its number in the drop) its rod, bottom rod 0.
+    scatter
+        How much more than assumed the edges scatter, at least 1; `None` when nothing was fitted.
+    """
+
+    run: Run
+    attempt: int
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    audit: Audit
+    quantities: Mapping[str, Measured] = field(default_factory=dict)
+    matches: Mapping[int, int] = field(default_factory=dict)
+    scatter: float | None = None
+
+    def json(self) -> dict[str, Any]:
+        """One member of ``runs``."""
+        found: dict[str, Any] = {
+            "run": self.run.number,
+            "attempt": self.attempt,
+            "incline_deg": self.run.incline_deg,
+            "impact_chain": self.run.impact,
+        }
+        found |= {name: value.json() for name, value in self.quantities.items()}
+        found["edges"] = self.audit.json()
+        if self.scatter is not None:
+            found["scatter"] = self.scatter
+        found["verdict"] = self.verdict
+        found["reasons"] = list(self.reasons)
+        found["budget"] = [
+            {"name": source, "quantity": name, "u": u}
+            for name, value in self.quantities.items()
+            for source, u in value.budget.items()
+        ]
+        return found

@@ -1,0 +1,104 @@
+"""All drops of a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.drop import TimeScale, analyze_drop
+from rig.analysis.summary import Incline, summarize
+from rig.errors import InputError
+from rig.protocol.plan import runs as planned_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rig.analysis.result import DropResult
+    from rig.protocol.scene import Protocol
+    from rig.records import Drop
+
+    Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """Everything that follows from the edges of a session.
+
+    Attributes
+    ----------
+    runs
+        The last attempt at each planned run, by run.
+    superseded
+        Earlier attempts, by run and attempt.
+    summary
+        One line an incline.
+    """
+
+    runs: tuple[DropResult, ...]
+    superseded: tuple[DropResult, ...]
+    summary: tuple[Incline, ...]
+
+    def json(self) -> dict[str, Any]:
+        """As `rig analyze --json` prints it."""
+        found: dict[str, Any] = {
+            "runs": [run.json() for run in self.runs],
+            "summary": [line.json() for line in self.summary],
+        }
+        if self.superseded:
+            found["superseded"] = [run.json() for run in self.superseded]
+        return found
+
+
+def analyze(
+    protocol: Protocol,
+    drops: Sequence[Drop],
+    scale: Callable[[Drop], TimeScale],
+    rejected: Mapping[tuple[int, int], Sequence[str]] | None = None,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Analyse every drop and sum up.
+
+    Parameters
+    ----------
+    protocol
+        The scene and its plan.
+    drops
+        Raw records, several attempts at a run allowed.
+    scale
+        Calibration of each drop's ticks.
+    rejected
+        Causes by (run, attempt), for drops that the operator rejected.
+    progress
+        Called with the number of drops done and the number of all.
+
+    Raises
+    ------
+    InputError
+        A drop of a run that is not planned, or a scene without gates.
+    """
+    if protocol.gates is None:
+        raise InputError(
+            "this protocol has no gates, so there is nothing to analyse",
+            "rig predict PROTOCOL says what the model expects",
+        )
+    planned = {run.number: run for run in planned_runs(protocol)}
+    rejected = rejected or {}
+    results: list[DropResult] = []
+    for number, drop in enumerate(drops, start=1):
+        if drop.run not in planned:
+            raise InputError(
+                f"run {drop.run} is not in the plan, which has {len(planned)} runs",
+                "is it the right protocol? rig check PROTOCOL shows the plan",
+            )
+        result = analyze_drop(protocol, planned[drop.run], drop, scale(drop))
+        causes = rejected.get((drop.run, drop.attempt))
+        if causes is not None:
+            result = replace(result, verdict="rejected", reasons=(*causes, *result.reasons))
+        results.append(result)
+        if progress is not None:
+            progress(number, len(drops))
+    results.sort(key=lambda result: (result.run.number, result.attempt))
+    last = {result.run.number: result for result in results}
+    latest = tuple(last.values())
+    earlier = tuple(result for result in results if last[result.run.number] is not result)
+    return Analysis(latest, earlier, tuple(summarize(protocol, latest)))

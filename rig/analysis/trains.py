@@ -1,0 +1,105 @@
+"""Edges as times, gate by gate, and the passages each gate should see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rig.protocol.scene import Gate, RodChain
+    from rig.records import Drop
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Train:
+    """What one gate reported, and what it should have.
+
+    Attributes
+    ----------
+    gate
+        Number of the gate in the protocol's list.
+    times, blocked
+        Each edge: seconds since the release fired, and the state after it; shape ``(edges,)``.
+    edge
+        Number of each edge in the drop's own list, shape ``(edges,)``.
+    rods, blocks
+        Each expected edge in order of time: which rod, and whether it darkens the beam; shape
+        ``(expected,)``.
+    levels
+        Height of the chain's reference point at each expected edge by the nominal geometry, m;
+        falling.
+    """
+
+    gate: int
+    times: Array
+    blocked: Flags
+    edge: Index
+    rods: Index
+    blocks: Flags
+    levels: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One chain and the gates beside it.
+
+    Attributes
+    ----------
+    role
+        ``impact`` or ``free``.
+    chain
+        The chain that hangs there.
+    trains
+        One a gate.
+    """
+
+    role: Literal["impact", "free"]
+    chain: RodChain
+    trains: tuple[Train, ...]
+
+    @property
+    def expected(self) -> int:
+        """Number of edges that a perfect rig would report."""
+        return sum(train.rods.size for train in self.trains)
+
+
+def train(
+    number: int, gate: Gate, chain: RodChain, drop: Drop, times: Array, start: float, struck: bool
+) -> Train:
+    """Collect what one gate saw and what it should see.
+
+    Parameters
+    ----------
+    number
+        Of the gate in the protocol's list.
+    times
+        Of all edges of the drop, s; shape ``(edges,)``.
+    start
+        Nominal height of the bottom rod's middle before release, m.
+    struck
+        Whether the rods end at the surface: what passes below it is not expected.
+    """
+    mine = [index for index, edge in enumerate(drop.edges) if edge.channel == gate.channel]
+    edge = np.array(mine, dtype=np.intp)
+    blocked = np.array([drop.edges[index].blocked for index in mine], dtype=np.bool_)
+    places = np.array(chain.chain.heights)
+    widths = np.array(chain.widths)
+    # A rod's lower side darkens the beam, its upper side clears it.
+    levels = np.stack(
+        [gate.height - places + widths / 2, gate.height - places - widths / 2], axis=1
+    )
+    rods = np.repeat(np.arange(places.size), 2)
+    blocks = np.tile(np.array([True, False]), places.size)
+    flat = levels.ravel()
+    seen = flat < start
+    if struck:
+        seen &= flat > -places[rods]
+    return Train(number, times[edge], blocked, edge, rods[seen], blocks[seen], flat[seen])

@@ -1,0 +1,107 @@
+"""Is a drop good? By limits that were fixed before any result was seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rig.analysis.adjust import Estimate
+    from rig.analysis.pattern import Guess
+    from rig.analysis.result import Audit, Measured, Verdict
+    from rig.protocol.scene import Protocol
+    from rig.records import Drop
+
+SUPPORT = 0.6
+"""Share of the expected edges that must be where the first guess puts them."""
+LEAD = 0.1
+"""By how much that share must exceed the best really different guess."""
+RESTLESS = 2.0
+"""Scatter of the edges about the adjusted motion, relative to the assumed one, that is remarked."""
+
+LATE = 0.02
+"""Share of late stamps that a drop may have without remark."""
+
+
+class Judgement(NamedTuple):
+    """The verdict and why."""
+
+    verdict: Verdict
+    reasons: tuple[str, ...]
+
+
+def judge(
+    protocol: Protocol,
+    drop: Drop,
+    guesses: Mapping[str, Guess],
+    audit: Audit,
+    found: Mapping[str, Measured],
+    estimate: Estimate | None,
+) -> Judgement:
+    """Judge a drop; without an `estimate`, only whether it can be analysed at all."""
+    void = [*drop.faults]
+    doubts: list[str] = []
+    if audit.lost:
+        void.append(f"the device lost {audit.lost} edges: its memory was full")
+    for role, guess in guesses.items():
+        void += _pattern(role, guess)
+    if estimate is not None:
+        void += _limits(protocol, audit, found)
+        doubts += _doubts(protocol, drop, found, estimate)
+    if void:
+        return Judgement("void", tuple(void))
+    return Judgement("marginal" if doubts else "accepted", tuple(doubts))
+
+
+def _pattern(role: str, guess: Guess) -> list[str]:
+    if guess.share < SUPPORT:
+        return [
+            f"the {role} side does not look like this chain falling: only {guess.share:.0%} of "
+            "the expected edges are where one fall would put them"
+        ]
+    if guess.share - guess.runner_up < LEAD:
+        return [
+            f"the {role} side is ambiguous: {guess.share:.0%} of the expected edges fit one fall, "
+            f"{guess.runner_up:.0%} a different one"
+        ]
+    return []
+
+
+def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> list[str]:
+    """Return what is beyond the protocol's ``accept``."""
+    accept = protocol.accept
+    void = []
+    expected = audit.matched + audit.missed
+    if expected and audit.missed > accept.missed_edges * expected:
+        void.append(
+            f"{audit.missed} of {expected} edges missed ({audit.missed / expected:.1%}), "
+            f"more than {accept.missed_edges:.1%}"
+        )
+    skew = found.get("release_skew_s")
+    if skew is not None and abs(skew.value) > accept.release_skew:
+        void.append(
+            f"release skew {skew.value * 1e3:.2f} ms is beyond {accept.release_skew * 1e3:g} ms"
+        )
+    return void
+
+
+def _doubts(
+    protocol: Protocol, drop: Drop, found: Mapping[str, Measured], estimate: Estimate
+) -> list[str]:
+    """Return what makes a drop marginal."""
+    doubts = []
+    skew = found.get("release_skew_s")
+    limit = protocol.accept.release_skew
+    if skew is not None and abs(skew.value) + skew.expanded > limit >= abs(skew.value):
+        doubts.append(
+            f"release skew {skew.value * 1e3:.2f} ms is within its uncertainty of the limit"
+        )
+    if estimate.scatter > RESTLESS:
+        doubts.append(
+            f"edges scatter {estimate.scatter:.1f} times as much as assumed; "
+            "the uncertainties are enlarged to match"
+        )
+    if drop.certificate is not None and drop.certificate.late > LATE * max(1, len(drop.edges)):
+        doubts.append(f"{drop.certificate.late} time stamps may be late")
+    return doubts
