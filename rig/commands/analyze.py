@@ -1,0 +1,25 @@
+"""``rig analyze``."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rig import __version__
+from rig.commands.output import print_results, progress
+from rig.errors import SessionError
+from rig.results import results
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Compute the results of a session and keep them in it."""
+    with Session.open(arguments.session, readonly=True) as session:
+        found = results(session, progress("analysing run"))
+    # A session that is being written, or on a read-only disk, is analysed all the same.
+    with suppress(SessionError), Session.open(arguments.session) as session:
+        session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
+    return print_results(found, as_json=arguments.json)

@@ -1,0 +1,17 @@
+"""``rig check``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.protocol import reader
+from rig.protocol.describe import describe
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Describe a protocol."""
+    print(describe(reader.read(arguments.protocol)))
+    return 0

@@ -1,0 +1,22 @@
+"""``rig export``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.commands.output import progress, say
+from rig.results import results, tick_rates
+from rig.session.export import export_csv
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Write a session as CSV files."""
+    with Session.open(arguments.session, readonly=True) as session:
+        found = results(session, progress("analysing run"))
+        export_csv(arguments.csv, session, found, tick_rates(session))
+    say(f"CSV files: {arguments.csv}")
+    return 0

@@ -1,0 +1,22 @@
+"""``rig replay``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.commands.output import progress
+from rig.replay import replay
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+DIFFERENT = 1
+
+
+def main(arguments: Namespace) -> int:
+    """Replay a session and say whether everything comes out the same."""
+    with Session.open(arguments.session, readonly=True) as session:
+        outcome = replay(session, progress("analysing run"))
+    print("\n".join(outcome.lines))
+    return DIFFERENT if outcome.differences else 0

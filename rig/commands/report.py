@@ -1,0 +1,53 @@
+"""``rig report``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig import __version__
+from rig.analysis.curves import model_curves
+from rig.commands.output import progress, say
+from rig.report.html import ReportContext, write_report
+from rig.report.pictures import pictures
+from rig.results import protocol_of, results
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Write a session's report."""
+    with Session.open(arguments.session, readonly=True) as session:
+        protocol = protocol_of(session)
+        found = results(session, progress("analysing run"))
+        figures = pictures(
+            found,
+            model_curves(protocol),
+            session.simulated,
+            skew_limit_s=protocol.accept.release_skew,
+            site_m_s2={"value": protocol.gravity.value, "U95": 2.0 * protocol.gravity.u},
+        )
+        write_report(
+            arguments.output,
+            ReportContext(
+                title=protocol.title,
+                analysis=found,
+                simulated=session.simulated,
+                figures=figures,
+                protocol_text=session.protocol_text,
+                protocol_source=session.protocol_source,
+                protocol_sha256=session.meta["protocol_sha256"],
+                provenance={
+                    "session": session.path.name,
+                    "created": session.meta["created"],
+                    "origin": session.meta["origin"].partition("?")[0],
+                    "recorded with": f"rig {session.meta['rig_version']}",
+                    "analysed with": f"rig {__version__}",
+                },
+                identities=[identity for _, identity in session.identities()],
+                clock=found["clock"],
+            ),
+        )
+    say(f"report: {arguments.output}")
+    return 0

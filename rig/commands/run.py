@@ -1,0 +1,37 @@
+"""``rig run``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+from rig.commands.output import print_results, say
+from rig.runner import Operator, run_protocol
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Carry out a protocol."""
+    signal.signal(signal.SIGTERM, _stop)
+    attended = not arguments.yes and sys.stdin.isatty()
+    operator = Operator(say, _ask if attended else None)
+    found = run_protocol(
+        arguments.protocol, arguments.port, arguments.session, operator, arguments.seed
+    )
+    code = print_results(found, as_json=arguments.json)
+    say(f"session: {arguments.session}")
+    return code
+
+
+def _ask(request: str) -> None:
+    print(f"{request}\n  then press Enter (Ctrl-C stops, the same command goes on) ", end="",
+          file=sys.stderr, flush=True)  # fmt: skip
+    if not sys.stdin.readline():
+        raise KeyboardInterrupt
+
+
+def _stop(*_: object) -> NoReturn:
+    raise KeyboardInterrupt

@@ -1,0 +1,194 @@
+"""One device and one session file: what is measured is on the disk before it is let go of."""
+
+from __future__ import annotations
+
+import random
+from contextlib import suppress
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Self
+
+from rig.errors import DeviceError
+from rig.link.client import Device
+from rig.link.messages import Phase, pack_label, unpack_label
+from rig.link.port import open_port, port_clock
+from rig.records import Ping
+from rig.session.schema import RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.messages import Identity
+    from rig.link.port import Port
+    from rig.link.transcript import Direction, Record
+    from rig.protocol.scene import Protocol
+    from rig.records import Drop
+    from rig.session.store import Session
+
+RECORD_MS = 1500
+"""How long after the release to record: no drop of a lab lasts longer."""
+ARM_TIMEOUT_MS = 10_000
+_PING_S = 0.37  # mean distance of clock samples: in step with nothing
+
+
+class Station:
+    """The owner of the port and of the session.
+
+    Every chunk of bytes is put into the session before anything is done with it; a drop is
+    committed before the device is told to forget it.
+
+    Parameters
+    ----------
+    session
+        Open for writing.
+    url
+        The port.
+    """
+
+    def __init__(self, session: Session, url: str) -> None:
+        self.session = session
+        self.url = url
+        self._port: Port | None = None
+        self._device: Device | None = None
+        self._uneven = random.Random(0)  # noqa: S311 - spacing, not secrets
+        self._armed: tuple[int, int] | None = None
+
+    def __enter__(self) -> Self:
+        self.connect()
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+    def connect(self) -> Identity:
+        """Open the port and learn who is there.
+
+        Raises
+        ------
+        DeviceError
+            No such port, nobody there, or another protocol version.
+        """
+        self._port = open_port(self.url)
+        self.clock = port_clock(self._port)
+        self._device = Device(self._port, self.clock, self._log, on_record=self._note)
+        identity = self._device.connect()
+        told = asdict(identity) | {"unique_id": identity.unique_id.hex()}
+        self.session.add_identity(told, self.clock.now_ns())
+        self.session.commit()
+        return identity
+
+    def close(self) -> None:
+        """Make safe (an armed release is disarmed, a recording is left alone) and close."""
+        if self._port is None:
+            return
+        port, self._port = self._port, None
+        with suppress(DeviceError):
+            if self._device is not None and self._armed is not None:
+                self._device.abort()
+        port.close()
+        self.session.commit()
+
+    @property
+    def device(self) -> Device:
+        """The device client.
+
+        Raises
+        ------
+        DeviceError
+            Before `connect` and after `close`.
+        """
+        if self._device is None or self._port is None:
+            raise DeviceError("not connected", "connect first")
+        return self._device
+
+    def wait(self, seconds: float, stop: Callable[[], bool] | None = None) -> None:
+        """Let time pass and use it to compare clocks, at uneven intervals."""
+        until = self.clock.now_ns() + round(seconds * 1e9)
+        while not (stop is not None and stop()):
+            left = (until - self.clock.now_ns()) * 1e-9
+            if left <= 0.0:
+                break
+            self.clock.sleep(min(left, _PING_S * self._uneven.uniform(0.5, 1.5)))
+            self.device.ping()
+        self.session.commit()
+
+    def held(self) -> tuple[int, int] | None:
+        """Run and attempt of a drop the device still holds, or `None`."""
+        state = self.device.status()
+        if state.phase in {Phase.HOLDING, Phase.RECORDING} and state.label:
+            return unpack_label(state.label)
+        return None
+
+    def arm(self, run: int, attempt: int, protocol: Protocol) -> int:
+        """Prepare a drop; the release stays off until `fire`.
+
+        Returns
+        -------
+        int
+            The token for `fire`.
+
+        Raises
+        ------
+        DeviceRefusedError
+            A gate is blocked, or the device cannot do what the protocol asks.
+        """
+        gates, release = protocol.gates, protocol.release
+        token = self.device.arm(
+            label=pack_label(run, attempt),
+            gates=gates.mask if gates else 0,
+            release=1 << release.channel,
+            pulse_us=round(release.pulse * 1e6),
+            timeout_ms=ARM_TIMEOUT_MS,
+            record_ms=RECORD_MS,
+        )
+        self._armed = run, attempt
+        self.state(run, attempt, RunState.ARMED)
+        return token
+
+    def fire(self, token: int) -> None:
+        """Let go. What was armed is on the disk as fired before the request leaves."""
+        run, attempt = self._armed or (0, 0)
+        self.state(run, attempt, RunState.FIRED)
+        self.device.fire(token)
+
+    def collect(self, run: int, attempt: int) -> Drop:
+        """Read the drop whole, store it, and only then let the device forget it."""
+        return self._keep(self.device.collect(pack_label(run, attempt)))
+
+    def fetch(self, run: int, attempt: int) -> Drop | None:
+        """Read a held drop; `None` when the session has it and only the device did not know."""
+        label = pack_label(run, attempt)
+        drop = self.device.collect(label, timeout=0.0)
+        known = any((d.run, d.attempt) == (run, attempt) for d in self.session.drops())
+        if not known:
+            return self._keep(drop)
+        self._acknowledge(drop)
+        return None
+
+    def abort(self) -> None:
+        """Switch everything off."""
+        self.device.abort()
+        self._armed = None
+
+    def state(self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()) -> None:
+        """Log where a run stands, on the disk when this returns."""
+        self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
+        self.session.commit()
+
+    def _keep(self, drop: Drop) -> Drop:
+        self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
+        self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
+        self._acknowledge(drop)
+        self._armed = None
+        return drop
+
+    def _acknowledge(self, drop: Drop) -> None:
+        if drop.certificate is not None:
+            self.device.acknowledge(pack_label(drop.run, drop.attempt), drop.certificate.crc32)
+            self.session.commit()
+
+    def _log(self, direction: Direction, host_ns: int, data: bytes) -> None:
+        self.session.log_bytes(direction, host_ns, data)
+
+    def _note(self, record: Record) -> None:
+        if isinstance(record, Ping):
+            self.session.add_ping(record)

@@ -1,0 +1,82 @@
+"""Feed a recorded conversation through the whole stack again, and compare the outcome."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rig.link.transcript import Transcript
+from rig.records import Drop, Ping
+from rig.results import results
+
+if TYPE_CHECKING:
+    from rig.analysis.session import Progress
+    from rig.session.reading import Reader
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a replay found, line by line; `differences` is empty when all is identical."""
+
+    lines: tuple[str, ...]
+    differences: tuple[str, ...]
+
+
+def replay(session: Reader, progress: Progress | None = None) -> Outcome:
+    """Feed the recorded bytes through the parser and the edges through the analysis.
+
+    Drops, clock samples and results are compared with what the session holds, exactly.
+    """
+    lines: list[str] = []
+    differences: list[str] = []
+
+    def compare(what: str, again: object, stored: object, count: int) -> None:
+        same = again == stored
+        lines.append(f"{what}: {count} {'identical' if same else 'DIFFERENT'}")
+        if not same:
+            differences.append(what)
+
+    chunks, drops, pings = _from_bytes(session)
+    if chunks:
+        held = sorted(session.drops(), key=_key)
+        compare("drops", sorted(drops, key=_key), held, len(held))
+        compare("clock samples", pings, session.pings(), len(pings))
+    else:
+        lines.append("no bytes were recorded: the edges come from a file")
+    stored = session.results()
+    found = results(session, progress)
+    again = sorted([*found["runs"], *found.get("superseded", [])], key=_number)
+    if stored:
+        compare("results", again, stored, len(stored))
+    else:
+        lines.append("results: none stored yet; rig analyze keeps them")
+    lines.append("identical" if not differences else f"DIFFERENT: {', '.join(differences)}")
+    return Outcome(tuple(lines), tuple(differences))
+
+
+def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping]]:
+    """Parse the whole byte log."""
+    transcript = Transcript()
+    drops: list[Drop] = []
+    pings: list[Ping] = []
+    chunks = 0
+    for host_ns, direction, data in session.byte_log():
+        chunks += 1
+        for record in transcript.feed(direction, host_ns, data):
+            if isinstance(record, Drop):
+                drops.append(record)
+            elif isinstance(record, Ping):
+                pings.append(record)
+    # What was stored and not acknowledged any more still is in the bytes.
+    have = {_key(drop) for drop in drops}
+    stored = {_key(drop) for drop in session.drops()}
+    drops += [d for d in transcript.unfinished() if _key(d) in stored - have]
+    return chunks, drops, pings
+
+
+def _key(drop: Drop) -> tuple[int, int]:
+    return drop.run, drop.attempt
+
+
+def _number(result: dict[str, Any]) -> tuple[int, int]:
+    return result["run"], result["attempt"]
