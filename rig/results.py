@@ -12,7 +12,7 @@ from rig.protocol import reader
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from rig.analysis.session import Progress
+    from rig.analysis.session import Analysis, Progress
     from rig.protocol.scene import Protocol
     from rig.records import Drop, Ping
     from rig.session.reading import Reader
@@ -112,11 +112,17 @@ def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]
     progress
         Called with the number of drops done and the number of all.
     """
+    found, clock = detailed(session, progress)
+    return {"simulated": session.simulated, "clock": clock.details} | found.json()
+
+
+def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
+    """Analyse a session and keep everything, each edge's rod too."""
     clock = calibration(session)
     found = analyze(
         protocol_of(session), list(session.drops()), clock.scale, rejected(session), progress
     )
-    return {"simulated": session.simulated, "clock": clock.details} | found.json()
+    return found, clock
 
 
 def rejected(session: Reader) -> dict[tuple[int, int], tuple[str, ...]]:

@@ -83,8 +83,8 @@ def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
         moved = float(np.abs(new - scaled).max(initial=0.0))
         scaled = new
         chi2 = float(residuals @ residuals)
-        degrees = residuals.size - float(np.trace(np.linalg.solve(information, data)))
         if step and moved < _DONE:
+            degrees = residuals.size - float(np.trace(np.linalg.solve(information, data)))
             factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
             if factor < 1.05:
                 break

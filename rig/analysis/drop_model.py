@@ -200,9 +200,7 @@ class DropModel:
         jacobian[row, at["beams"].start + gate] -= 1.0
         if "ripple" in at:
             jacobian[row, at["ripple"].start + gate] += _alternating(rods)
-        burst = np.concatenate(
-            [_burst(train.times)[edge] for train, edge, _ in columns] or [np.zeros(0)]
-        )
+        burst = np.concatenate([train.burst[edge] for train, edge, _ in columns])
         sigma = np.sqrt(FLOOR**2 + (speed * np.hypot(JITTER, burst)) ** 2)
         return Equations(height - level, jacobian, sigma)
 
@@ -210,20 +208,4 @@ class DropModel:
 def _alternating(rods: Index) -> Array:
     """+1 for even rods, −1 for odd ones: neighbours are tilted the other way."""
     found: Array = np.where(rods % 2, -1.0, 1.0)
-    return found
-
-
-_QUICK = 0.3e-3
-"""Edges of one gate closer than this are no two sides of a rod: the receiver flickered, s."""
-
-
-def _burst(times: Array) -> Array:
-    """How long each edge's burst of flicker lasts, s; 0 for a clean edge."""
-    if times.size == 0:
-        return times
-    starts = np.concatenate([[True], np.diff(times) > _QUICK])
-    number = np.cumsum(starts) - 1
-    first = times[starts]
-    last = np.concatenate([times[np.flatnonzero(starts)[1:] - 1], times[-1:]])
-    found: Array = (last - first)[number]
     return found

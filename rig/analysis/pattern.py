@@ -8,7 +8,7 @@ the impacts do is then found by trying one α after another.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from rig.analysis.unknowns import HANG_U
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rig.analysis.trains import Side, Train
+    from rig.analysis.trains import Side
     from rig.units import Quantity
 
     Array = NDArray[np.float64]
@@ -78,9 +78,7 @@ def guess(side: Side, start: Quantity, gravity: float, ratios: Array | None) -> 
 
 def _release(side: Side, start: Quantity, gravity: float, lowest: float, slack: float) -> Guess:
     """Let all pairs vote and count at the moment that most of them agree on."""
-    pairs = [_pairs(train, lowest) for train in side.trains]
-    times = np.concatenate([pair[0] for pair in pairs])
-    levels = np.concatenate([pair[1] for pair in pairs])
+    times, levels, _ = _pairs(side, lowest)
     if times.size == 0:
         return Guess(0.0, start.value)
     tau = np.sqrt(2.0 * (start.value - levels) / gravity)
@@ -104,11 +102,35 @@ def _release(side: Side, start: Quantity, gravity: float, lowest: float, slack: 
     )
 
 
-def _pairs(train: Train, lowest: float) -> tuple[Array, Array]:
-    """Pair every edge with every expected edge of its polarity: times and levels."""
-    same = (train.blocked[:, None] == train.blocks[None, :]) & (train.levels > lowest)[None, :]
-    observed, expected = np.nonzero(same)
-    return train.times[observed], train.levels[expected]
+class Pairs(NamedTuple):
+    """Every edge with every expected edge of its gate and polarity, shape ``(pairs,)`` each.
+
+    Attributes
+    ----------
+    times
+        Of the edge, s.
+    levels
+        Of the expected edge, m.
+    expected
+        Number of the expected edge, counted over all gates.
+    """
+
+    times: Array
+    levels: Array
+    expected: NDArray[np.intp]
+
+
+def _pairs(side: Side, lowest: float) -> Pairs:
+    """Pair up everything whose level is above `lowest`."""
+    times, levels, numbers, first = [], [], [], 0
+    for train in side.trains:
+        same = train.blocked[:, None] == train.blocks[None, :]
+        observed, expected = np.nonzero(same & (train.levels > lowest)[None, :])
+        times.append(train.times[observed])
+        levels.append(train.levels[expected])
+        numbers.append(first + expected)
+        first += train.rods.size
+    return Pairs(np.concatenate(times), np.concatenate(levels), np.concatenate(numbers))
 
 
 def _refine(
@@ -140,12 +162,10 @@ def _alpha(
     """Try one α after another."""
     places = np.array(side.chain.chain.heights)
     time, height, speed = _paths(free.release, free.start, gravity, ratios, places)
+    pairs = _pairs(side, -np.inf)
     scores = np.array(
         [
-            sum(
-                _support(train, time[:, n], height, speed[:, n], gravity, slack)
-                for train in side.trains
-            )
+            _support(pairs, side.expected, time[:, n], height, speed[:, n], gravity, slack)
             for n in range(ALPHAS.size)
         ]
     )
@@ -183,12 +203,12 @@ def _paths(
 
 
 def _support(
-    train: Train, time: Array, height: Array, speed: Array, gravity: float, slack: float
+    pairs: Pairs, size: int, time: Array, height: Array, speed: Array, gravity: float, slack: float
 ) -> int:
     """Count the expected edges that have an observed one where the chain would be."""
-    leg = np.searchsorted(time, train.times, side="right") - 1
-    since = train.times - time[leg]
-    at = np.where(leg < 0, height[0], height[leg] - (speed[leg] + 0.5 * gravity * since) * since)
-    near = np.abs(at[:, None] - train.levels[None, :]) < slack
-    near &= train.blocked[:, None] == train.blocks[None, :]
-    return int(near.any(axis=0).sum())
+    leg = np.maximum(np.searchsorted(time, pairs.times, side="right") - 1, 0)
+    since = np.maximum(pairs.times - time[leg], 0.0)
+    at = height[leg] - (speed[leg] + 0.5 * gravity * since) * since
+    found = np.zeros(size, dtype=np.bool_)
+    found[pairs.expected[np.abs(at - pairs.levels) < slack]] = True
+    return int(found.sum())

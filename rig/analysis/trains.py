@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 
+QUICK = 0.3e-3
+"""Edges of one gate closer than this are no two sides of a rod: the receiver flickered, s."""
+
+
 @dataclass(frozen=True, slots=True)
 class Train:
     """What one gate reported, and what it should have.
@@ -28,6 +32,8 @@ class Train:
         Number of the gate in the protocol's list.
     times, blocked
         Each edge: seconds since the release fired, and the state after it; shape ``(edges,)``.
+    burst
+        How long the flicker lasted in which each edge came, s; 0 for a clean edge.
     edge
         Number of each edge in the drop's own list, shape ``(edges,)``.
     rods, blocks
@@ -41,6 +47,7 @@ class Train:
     gate: int
     times: Array
     blocked: Flags
+    burst: Array
     edge: Index
     rods: Index
     blocks: Flags
@@ -102,4 +109,24 @@ def train(
     seen = flat < start
     if struck:
         seen &= flat > -places[rods]
-    return Train(number, times[edge], blocked, edge, rods[seen], blocks[seen], flat[seen])
+    mine_times = times[edge]
+    return Train(
+        number,
+        mine_times,
+        blocked,
+        bursts(mine_times),
+        edge,
+        rods[seen],
+        blocks[seen],
+        flat[seen],
+    )
+
+
+def bursts(times: Array) -> Array:
+    """How long the flicker lasts that each edge is part of, s; 0 for a clean edge."""
+    if times.size == 0:
+        return times
+    begins = np.concatenate([[True], np.diff(times) > QUICK])
+    ends = np.concatenate([begins[1:], [True]])
+    found: Array = (times[ends] - times[begins])[np.cumsum(begins) - 1]
+    return found

@@ -1,0 +1,57 @@
+"""``rig bench accuracy``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rig.bench.accuracy import accuracy
+from rig.commands.output import print_json, say
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Mapping
+
+_UNITS = {
+    "separation_m": ("Δz at simultaneous release", "mm", 1e3),
+    "separation_raw_m": ("Δz as it happened", "mm", 1e3),
+    "speed_m_s": ("V", "mm/s", 1e3),
+    "release_skew_s": ("release skew", "ms", 1e3),
+    "fall_time_s": ("fall time", "ms", 1e3),
+    "gravity_m_s2": ("g", "mm/s²", 1e3),
+}
+
+
+def main(arguments: Namespace) -> int:
+    """Measure accuracy over several simulated sessions."""
+    found = accuracy(arguments.protocol, arguments.port, arguments.seeds, say)
+    if arguments.json:
+        print_json(found)
+    else:
+        print("\n".join(_table(found)))
+    return 0
+
+
+def _table(found: Mapping[str, Any]) -> list[str]:
+    verdicts = ", ".join(f"{n} {verdict}" for verdict, n in found["verdicts"].items())
+    lines = [
+        f"{found['sessions']} simulated sessions, drops: {verdicts}",
+        f"{found['edges_matched']} edges matched, {found['edges_given_to_a_wrong_rod']} to a wrong "
+        f"rod, {found['strays_taken_for_a_rod']} strays taken for a rod",
+        f"{'error of one run':<28}{'rms':>9}{'bias':>9}{'worst':>9}{'mean U95':>10}  in U95",
+    ]
+    for name, errors in found["quantities"].items():
+        label, unit, scale = _UNITS[name]
+        rms, bias, worst, u = (errors[key] * scale for key in ("rms", "bias", "worst", "mean_U95"))
+        lines.append(
+            f"{f'{label} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}{u:10.3f}"
+            f"  {errors['coverage']:.1%}"
+        )
+    for name, errors in found.get("camera_480_fps", {}).items():
+        label, unit, scale = _UNITS[name]
+        rms, bias, worst = (errors[key] * scale for key in ("rms", "bias", "worst"))
+        lines.append(
+            f"{f'camera {label.split()[0]} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}"
+        )
+    times = sorted(found["wall_time_s"])
+    lines.append(f"wall time of a session: median {times[len(times) // 2]:.1f} s")
+    return lines
