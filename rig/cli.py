@@ -96,6 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     report = command("report", "write the results of a session as one HTML page")
     _session(report)
     report.add_argument("-o", "--output", required=True, metavar="FILE", help="the page")
+    report.add_argument("--figures", metavar="DIR", help="folder for the figures as SVG files too")
 
     export = command("export", "write a session's results and edges as CSV files")
     _session(export)

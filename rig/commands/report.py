@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
+from rig.errors import InputError
+from rig.files import write_atomic
 from rig.report.html import ReportContext, write_report
 from rig.report.pictures import pictures
 from rig.results import protocol_of, results
@@ -14,6 +17,9 @@ from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Sequence
+
+    from rig.report.embed import Picture
 
 
 def main(arguments: Namespace) -> int:
@@ -49,5 +55,17 @@ def main(arguments: Namespace) -> int:
                 clock=found["clock"],
             ),
         )
+    if arguments.figures is not None:
+        _write_figures(Path(arguments.figures), figures)
     say(f"report: {arguments.output}")
     return 0
+
+
+def _write_figures(folder: Path, figures: Sequence[Picture]) -> None:
+    """Write ``figure-1.svg`` and on, numbered as in the report."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    for number, picture in enumerate(figures, 1):
+        write_atomic(folder / f"figure-{number}.svg", picture.svg)

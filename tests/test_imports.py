@@ -1,0 +1,65 @@
+"""A command loads what it needs and no more: a fresh interpreter tells what it loaded."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+LAST_LINE = """
+import json, sys
+print()
+print(json.dumps(sorted(name for name in sys.modules if "." not in name)))
+"""
+HELP = """
+import rig.cli
+try:
+    rig.cli.main(["--help"])
+except SystemExit as stop:
+    assert not stop.code
+"""
+HEADLESS_RUN = """
+import sys
+import rig.cli
+code = rig.cli.main(["run", "protocols/picket-fence.yaml", "--port", "sim://", "--seed", "1",
+                     "--yes", "--session", sys.argv[1]])
+assert code in (0, 3), code
+"""
+
+
+def packages_loaded_by(program: str, *arguments: str) -> set[str]:
+    """Run `program` in an interpreter of its own and name the top-level packages it loaded."""
+    done = subprocess.run(
+        [sys.executable, "-c", program + LAST_LINE, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.mark.parametrize("package", ["numpy", "yaml", "matplotlib"])
+def test_an_import_does_show(package):
+    assert package in packages_loaded_by(f"import {package}")
+
+
+def test_help_loads_neither_numpy_nor_yaml():
+    assert packages_loaded_by(HELP).isdisjoint({"numpy", "yaml", "matplotlib", "textual"})
+
+
+def test_the_runner_loads_neither_textual_nor_matplotlib():
+    assert packages_loaded_by("import rig.runner").isdisjoint({"matplotlib", "textual"})
+
+
+def test_a_headless_run_loads_neither_textual_nor_matplotlib(tmp_path):
+    session = tmp_path / "fence.session"
+    loaded = packages_loaded_by(HEADLESS_RUN, str(session))
+    assert session.is_file()
+    assert loaded.isdisjoint({"matplotlib", "textual"})
