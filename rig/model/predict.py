@@ -29,7 +29,8 @@ class Prediction:
     alpha, gamma, separation, speed, time
         `None` where the model has no answer; `notes` says why.
     separation_u, speed_u
-        Standard uncertainties that follow from those of β, μ (or α), drop and gravity.
+        Standard uncertainties that follow from those of β, μ (or α), drop and gravity; `None`
+        also where Eq. 13 is singular within the uncertainty of μ.
     in_domain
         False when any note says that the case leaves the model's domain.
     """
@@ -53,7 +54,8 @@ def predict(
 ) -> Prediction:
     """Predict Δz, V and t at one incline by the discrete model (Eqs. 8 to 13).
 
-    Uncertainties are first order: each input is moved by ± its standard uncertainty.
+    Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
+    that would leave what is possible, by less and to one side; the slope counts either way.
     """
     vacuum = free_fall_speed(chain, drop.value, gravity.value)
     try:
@@ -61,8 +63,15 @@ def predict(
     except DomainError as error:
         return Prediction(incline_deg, "discrete", vacuum, in_domain=False, notes=(error.message,))
     centre = fall(chain, impact.alpha, impact.gamma, drop.value, gravity.value)
-    spread = list(_spread(chain, surface, impact, incline_deg, drop, gravity))
     notes = impact.notes
+    separation_u = speed_u = None
+    try:
+        spread = list(_spread(chain, surface, impact, incline_deg, drop, gravity))
+    except DomainError as error:
+        notes = (*notes, f"no uncertainty: within that of μ, {error.message}")
+    else:
+        separation_u = math.hypot(*((b.separation_m - a.separation_m) * w for a, b, w in spread))
+        speed_u = math.hypot(*((b.speed_m_s - a.speed_m_s) * w for a, b, w in spread))
     if impact.basis == "pile":
         notes = (*notes, "rods gather on a pile: taken as level with the pile's restitution")
     return Prediction(
@@ -76,8 +85,8 @@ def predict(
         separation=centre.separation_m,
         speed=centre.speed_m_s,
         time=centre.time_s,
-        separation_u=math.hypot(*((a.separation_m - b.separation_m) / 2 for a, b in spread)),
-        speed_u=math.hypot(*((a.speed_m_s - b.speed_m_s) / 2 for a, b in spread)),
+        separation_u=separation_u,
+        speed_u=speed_u,
     )
 
 
@@ -88,37 +97,47 @@ def _spread(
     incline_deg: float,
     drop: Quantity,
     gravity: Quantity,
-) -> Iterator[tuple[Fall, Fall]]:
-    """Falls with one input at a time moved down and up by its standard uncertainty."""
+) -> Iterator[tuple[Fall, Fall, float]]:
+    """Falls with one input at a time moved down and up, and u over the distance between them."""
     h, g, gamma = drop.value, gravity.value, impact.gamma
 
     def at(alpha: float) -> Fall:
         return fall(chain, alpha, gamma, h, g)
 
     if chain.alpha is not None:
-        a, u = chain.alpha.value, chain.alpha.u
-        yield at(a - u), at(a + u)
+        for low, high, weight in _steps(chain.alpha):
+            yield at(low), at(high), weight
     else:
         struck = surface.pile if impact.basis == "pile" and surface.pile else surface
-        beta = struck.restitution
-        if beta.u:
-            low, high = (
-                impact_on(surface, chain, incline_deg, restitution=beta.value + s * beta.u).alpha
-                for s in (-1, 1)
-            )
-            yield at(low), at(high)
-        mu = surface.friction
-        if mu.u and impact.basis == "surface":
-            low, high = (
-                impact_on(surface, chain, incline_deg, friction=max(0.0, mu.value + s * mu.u)).alpha
-                for s in (-1, 1)
-            )
-            yield at(low), at(high)
-    if drop.u:
-        low, high = max(0.0, h - drop.u), h + drop.u
-        yield fall(chain, impact.alpha, gamma, low, g), fall(chain, impact.alpha, gamma, high, g)
-    if gravity.u:
+        for low, high, weight in _steps(struck.restitution):
+            alphas = [
+                impact_on(surface, chain, incline_deg, restitution=beta).alpha
+                for beta in (low, high)
+            ]
+            yield at(alphas[0]), at(alphas[1]), weight
+        if impact.basis == "surface":
+            for low, high, weight in _steps(surface.friction, least=0.0):
+                alphas = [
+                    impact_on(surface, chain, incline_deg, friction=mu).alpha for mu in (low, high)
+                ]
+                yield at(alphas[0]), at(alphas[1]), weight
+    for low, high, weight in _steps(drop, least=0.0):
         yield (
-            fall(chain, impact.alpha, gamma, h, g - gravity.u),
-            fall(chain, impact.alpha, gamma, h, g + gravity.u),
+            fall(chain, impact.alpha, gamma, low, g),
+            fall(chain, impact.alpha, gamma, high, g),
+            weight,
         )
+    # Half of g is far enough for a slope, and a fall without gravity has no end.
+    for low, high, weight in _steps(gravity, least=g / 2):
+        yield (
+            fall(chain, impact.alpha, gamma, h, low),
+            fall(chain, impact.alpha, gamma, h, high),
+            weight,
+        )
+
+
+def _steps(given: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
+    """An input moved down and up by u, not below `least`; nothing where it is exact."""
+    low, high = max(least, given.value - given.u), given.value + given.u
+    if high > low:
+        yield low, high, given.u / (high - low)

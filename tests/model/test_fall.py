@@ -1,0 +1,145 @@
+"""The discrete fall against many-digit and exact rational arithmetic."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+from itertools import accumulate, pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.errors import DomainError
+from rig.model.chain import Chain
+from rig.model.fall import fall, free_fall_speed, hits, kicks
+from tests.model.chains import (
+    ALPHAS,
+    DROPS,
+    GAMMAS,
+    GRAVITIES,
+    SPEEDS,
+    chains,
+    close,
+    decades,
+    even_chain,
+)
+from tests.model.reference import reference_fall
+
+# Twelve legs of a dozen roundings each: 12 × 12 × 2^-53 is 1.6e-14 were all of one sign.
+TIGHT = 1e-13
+
+
+@settings(deadline=None, max_examples=150)
+@given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
+def test_agrees_with_the_second_implementation(chain, alpha, gamma, drop, gravity, speed):
+    end = fall(chain, alpha, gamma, drop, gravity, speed)
+    wanted = reference_fall(chain.masses, chain.heights, alpha, gamma, drop, gravity, speed)
+    assert close(end.separation_m, wanted.separation, TIGHT)
+    assert close(end.speed_m_s, wanted.speed, TIGHT)
+    assert close(end.time_s, wanted.time, TIGHT)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), GAMMAS, DROPS, decades(-200, 3))
+def test_keeps_its_digits_however_small_alpha_and_gravity(chain, gamma, drop, gravity):
+    end = fall(chain, 1e-12, gamma, drop, gravity)
+    wanted = reference_fall(chain.masses, chain.heights, 1e-12, gamma, drop, gravity)
+    assert close(end.separation_m, wanted.separation, TIGHT)
+    assert close(end.speed_m_s, wanted.speed, TIGHT)
+    assert close(end.time_s, wanted.time, TIGHT)
+
+
+def test_a_long_irregular_chain():
+    source = random.Random(20)
+    masses = tuple(source.uniform(0.1, 10.0) for _ in range(400))
+    gaps = (source.uniform(0.01, 0.05) for _ in range(399))
+    chain = Chain(masses, tuple(accumulate(gaps, initial=0.0)))
+    end = fall(chain, 0.2, 4 / 3, 0.18, 9.81)
+    wanted = reference_fall(masses, chain.heights, 0.2, 4 / 3, 0.18, 9.81)
+    found = (end.separation_m, end.speed_m_s, end.time_s)
+    # Roundings of either sign: √400 times those of one leg.
+    assert all(close(one, other, TIGHT) for one, other in zip(found, wanted, strict=True))
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(most=6), ALPHAS, GAMMAS, DROPS, decades(-3, 3))
+def test_without_gravity_it_is_a_product_of_speeds(chain, alpha, gamma, drop, start):
+    speed, time, before = Fraction(start), Fraction(0), -Fraction(drop)
+    last = speed
+    for k, height in enumerate(map(Fraction, chain.heights)):
+        time += (height - before) / speed
+        before, last = height, speed
+        m, rest = Fraction(chain.masses[k]), sum(map(Fraction, chain.masses[k + 1 :]))
+        if rest:
+            speed += speed * Fraction(alpha) * m / (rest + Fraction(gamma) * m)
+    travelled = Fraction(start) * time
+    separation = Fraction(drop) + Fraction(chain.length) - travelled
+    end = fall(chain, alpha, gamma, drop, 0.0, start)
+    assert close(end.separation_m, float(separation), TIGHT)
+    assert close(end.speed_m_s, float(last), TIGHT)
+    assert close(end.time_s, float(time), TIGHT)
+
+
+@pytest.mark.parametrize("drop", [0.0, 0.18])
+def test_without_gravity_or_speed_there_is_no_fall(drop):
+    with pytest.raises(DomainError, match="never falls"):
+        fall(even_chain(3), 0.1, 1.0, drop, 0.0)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), GAMMAS, DROPS, GRAVITIES, SPEEDS)
+def test_without_impulse_it_is_free_fall(chain, gamma, drop, gravity, speed):
+    end = fall(chain, 0.0, gamma, drop, gravity, speed)
+    assert end.separation_m == 0.0
+    free = free_fall_speed(chain, drop, gravity, speed)
+    exact = Fraction(speed) ** 2 + 2 * Fraction(gravity) * (Fraction(drop) + Fraction(chain.length))
+    assert close(free**2, float(exact), 1e-15)
+    assert close(end.speed_m_s, free, TIGHT)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), GAMMAS, st.data())
+def test_kicks_are_equation_9_to_the_last_digits(chain, gamma, data):
+    size = chain.rods
+    alphas = data.draw(st.lists(ALPHAS, min_size=size, max_size=size))
+    found = kicks(chain, alphas, gamma)
+    assert len(found) == size
+    assert found[-1] == 0.0
+    for k, gain in enumerate(found[:-1]):
+        m, rest = Fraction(chain.masses[k]), sum(map(Fraction, chain.masses[k + 1 :]))
+        impulse = Fraction(alphas[k]) * m / (1 + Fraction(gamma) * m / rest)  # per unit speed
+        assert close(gain, float(impulse / rest), 4e-15)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
+def test_hits_tell_the_same_fall(chain, alpha, gamma, drop, gravity, speed):
+    gains = kicks(chain, [alpha] * chain.rods, gamma)
+    events = hits(chain, gains, drop, gravity, speed)
+    end = fall(chain, alpha, gamma, drop, gravity, speed)
+    assert len(events) == chain.rods
+    assert close(events[-1].time_s, end.time_s, TIGHT)
+    assert close(events[-1].speed_before, end.speed_m_s, TIGHT)
+    assert events[-1].speed_after == events[-1].speed_before
+    start = Fraction(speed)
+    assert close(events[0].speed_before ** 2, start**2 + 2 * Fraction(gravity) * Fraction(drop),
+                 TIGHT)  # fmt: skip
+    for gain, (one, other), (low, high) in zip(
+        gains, pairwise(events), pairwise(chain.heights), strict=False
+    ):
+        assert one.time_s <= other.time_s
+        assert close(one.speed_after, Fraction(one.speed_before) * (1 + Fraction(gain)), 4e-16)
+        # In between the chain falls freely: v² grows by 2 g times the gap.
+        gap = Fraction(high) - Fraction(low)
+        grown = Fraction(one.speed_after) ** 2 + 2 * Fraction(gravity) * gap
+        assert close(other.speed_before**2, grown, 1e-14)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES)
+def test_separation_is_the_height_at_which_the_twin_still_is(chain, alpha, gamma, drop, gravity):
+    end = fall(chain, alpha, gamma, drop, gravity)
+    height = Fraction(drop) + Fraction(chain.length)
+    twin = height - Fraction(gravity) * Fraction(end.time_s) ** 2 / 2
+    assert abs(twin - Fraction(end.separation_m)) <= TIGHT * height

@@ -1,0 +1,183 @@
+"""Predictions: their uncertainties, their domain and what they leave empty."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+from statistics import stdev
+
+import pytest
+from mpmath import mp
+
+from rig.model.chain import Chain
+from rig.model.fall import fall
+from rig.model.impact import alpha_inclined, gamma_finite
+from rig.model.predict import predict
+from rig.model.surface import Pile, Surface
+from rig.units import Quantity
+from tests.model.chains import even_chain
+from tests.model.reference import printed_alpha, reference_fall
+
+CHAIN = even_chain(25)
+SURFACE = Surface(Quantity(0.5), Quantity(0.2))
+DROP, GRAVITY = Quantity(0.18), Quantity(9.81)
+CENTRE = {"beta": 0.5, "mu": 0.2, "drop": 0.18, "gravity": 9.81}
+
+
+def with_u(incline=40.0, chain=CHAIN, **u):
+    """Prediction whose inputs have the named standard uncertainties, and no others."""
+    value = {name: Quantity(number, u.get(name, 0.0)) for name, number in CENTRE.items()}
+    surface = Surface(value["beta"], value["mu"])
+    return predict(chain, surface, incline, value["drop"], value["gravity"])
+
+
+def slopes(name, incline):
+    """∂Δz and ∂V by one input, by differences of 50-digit falls."""
+
+    def end(x, which):
+        v = CENTRE | {name: x}
+        alpha = printed_alpha(v["beta"], v["mu"], incline, mp.mpf(CHAIN.inertia))
+        gamma = (1 + mp.mpf(CHAIN.inertia)) ** 2 / (4 * mp.mpf(CHAIN.inertia))
+        return reference_fall(CHAIN.masses, CHAIN.heights, alpha, gamma, v["drop"], v["gravity"],
+                              digits=50)[which]  # fmt: skip
+
+    with mp.workdps(50):
+        step = mp.mpf(10) ** -12
+        x = mp.mpf(CENTRE[name])
+        return [float((end(x + step, i) - end(x - step, i)) / (2 * step)) for i in (0, 1)]
+
+
+@pytest.mark.parametrize("incline", [15.0, 40.0, 80.0])
+@pytest.mark.parametrize("name", ["beta", "mu", "drop"])
+def test_each_uncertainty_is_slope_times_input(name, incline):
+    u = 1e-5  # so small that curvature is below 1e-6 of the slope
+    found = with_u(incline, **{name: u})
+    separation, speed = slopes(name, incline)
+    assert found.separation_u == pytest.approx(abs(separation) * u, rel=1e-6, abs=0)
+    assert found.speed_u == pytest.approx(abs(speed) * u, rel=1e-6, abs=0)
+
+
+def test_uncertainties_add_in_quadrature():
+    u = {"beta": 0.05, "mu": 0.02, "drop": 0.002, "gravity": 0.01}
+    parts = [with_u(**{name: value}) for name, value in u.items()]
+    whole = with_u(**u)
+    assert whole.separation_u == pytest.approx(math.hypot(*(p.separation_u for p in parts)))
+    assert whole.speed_u == pytest.approx(math.hypot(*(p.speed_u for p in parts)))
+
+
+def test_uncertain_gravity_moves_the_speed_alone():
+    found = with_u(gravity=0.05)
+    # V ∝ √g and Δz does not depend on g.
+    wanted = found.speed * (math.sqrt(1 + 0.05 / 9.81) - math.sqrt(1 - 0.05 / 9.81)) / 2
+    assert found.speed_u == pytest.approx(wanted, rel=1e-11)
+    assert found.separation_u < 1e-15
+
+
+def test_exact_inputs_leave_no_uncertainty():
+    found = with_u()
+    assert (found.separation_u, found.speed_u) == (0.0, 0.0)
+
+
+def test_uncertainties_agree_with_random_inputs():
+    u = {"beta": 0.05, "mu": 0.02, "drop": 0.002, "gravity": 0.01}
+    source = random.Random(5)
+    ends = []
+    for _ in range(4000):
+        x = {name: source.gauss(value, u[name]) for name, value in CENTRE.items()}
+        alpha = alpha_inclined(x["beta"], x["mu"], 40.0)
+        ends.append(fall(CHAIN, alpha, gamma_finite(1 / 3), x["drop"], x["gravity"]))
+    found = with_u(**u)
+    # A standard deviation from 4000 draws is good to 1/√8000 = 1.1 %; four times that.
+    assert stdev(end.separation_m for end in ends) == pytest.approx(found.separation_u, rel=0.045)
+    assert stdev(end.speed_m_s for end in ends) == pytest.approx(found.speed_u, rel=0.045)
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-6])
+def test_uncertainty_at_the_edge_of_what_friction_can_be_is_not_halved(mu):
+    """μ cannot go below zero; a step to one side only still gives slope times input."""
+    u = 1e-5
+    found = predict(CHAIN, Surface(Quantity(0.5), Quantity(mu, u)), 40.0, DROP, GRAVITY)
+    ends = [
+        fall(CHAIN, alpha_inclined(0.5, x, 40.0), gamma_finite(1 / 3), 0.18, 9.81)
+        for x in (0.0, 1e-4)
+    ]
+    slope = (ends[1].separation_m - ends[0].separation_m) / 1e-4
+    assert found.separation_u == pytest.approx(slope * u, rel=1e-3)
+
+
+def test_gravity_may_be_less_certain_than_large():
+    found = with_u(gravity=20.0)
+    assert math.isfinite(found.speed_u)
+    assert found.speed_u > 0.0
+    assert found.separation_u < 1e-15
+
+
+def test_uncertainty_of_a_given_alpha():
+    u = 1e-5
+    chain = replace(CHAIN, alpha=Quantity(0.12, u), gamma=0.5)
+    found = predict(chain, Surface(Quantity(0.5, 0.1), Quantity(0.2, 0.1)), 40.0, DROP, GRAVITY)
+    with mp.workdps(50):
+        step = mp.mpf(10) ** -12
+        low, high = (
+            reference_fall(chain.masses, chain.heights, mp.mpf(0.12) + s * step, 0.5, 0.18, 9.81,
+                           digits=50)
+            for s in (-1, 1)
+        )  # fmt: skip
+        slope = (high.separation - low.separation) / (2 * step)
+    assert found.separation_u == pytest.approx(float(slope) * u, rel=1e-6)
+    assert (found.model, found.in_domain) == ("discrete, given", True)
+
+
+def test_a_pile_has_its_own_restitution_and_no_friction():
+    surface = Surface(Quantity(0.5, 0.3), Quantity(0.2, 0.1), Pile(30.0, Quantity(-0.37, 1e-5)))
+    found = predict(CHAIN, surface, 10.0, DROP, GRAVITY)
+    level = predict(CHAIN, Surface(Quantity(-0.37, 1e-5)), 0.0, DROP, GRAVITY)
+    assert (found.separation, found.speed) == (level.separation, level.speed)
+    assert (found.separation_u, found.speed_u) == (level.separation_u, level.speed_u)
+    assert found.separation_u > 0.0
+    assert found.in_domain
+    assert any("pile" in note for note in found.notes)
+    assert (found.model, level.model) == ("discrete, pile", "discrete")
+
+
+@pytest.mark.parametrize("alpha", [-0.05, 0.55])
+def test_outside_the_domain_a_prediction_says_so_and_is_still_given(alpha):
+    found = predict(replace(CHAIN, alpha=Quantity(alpha)), SURFACE, 40.0, DROP, GRAVITY)
+    assert not found.in_domain
+    assert len(found.notes) == 1
+    assert math.copysign(1.0, found.separation) == math.copysign(1.0, alpha)
+
+
+def test_below_the_sliding_angle_a_prediction_says_so():
+    assert not predict(CHAIN, SURFACE, 11.3, DROP, GRAVITY).in_domain  # arctan 0.2 is 11.31°
+    assert predict(CHAIN, SURFACE, 11.4, DROP, GRAVITY).in_domain
+    assert predict(CHAIN, SURFACE, 0.0, DROP, GRAVITY).in_domain
+
+
+# ξ = 0.01 makes γ = 25.5; g(θ) ≤ 0 for tan θ between the roots of γ t² − (γ − 1) μ t + 1.
+LIGHT_ENDED = Chain(CHAIN.masses, CHAIN.heights, inertia=0.01)
+MIDDLE_DEG = math.degrees(math.atan((gamma_finite(0.01) - 1) / (2 * gamma_finite(0.01))))
+
+
+def test_where_equation_13_is_singular_there_is_no_prediction():
+    found = predict(LIGHT_ENDED, Surface(Quantity(0.5), Quantity(1.0)), MIDDLE_DEG, DROP, GRAVITY)
+    assert not found.in_domain
+    assert "singular" in found.notes[0]
+    assert found.alpha is found.gamma is found.separation is found.speed is found.time is None
+    assert found.separation_u is found.speed_u is None
+    assert found.free_fall_speed == pytest.approx(math.sqrt(2 * 9.81 * 1.345), rel=1e-15)
+
+
+def test_friction_that_may_be_singular_still_allows_a_prediction():
+    """g(θ) > 0 at μ = 0.4 but not at 0.4 + 0.05."""
+    found = predict(LIGHT_ENDED, Surface(Quantity(0.5), Quantity(0.4, 0.05)), 15.0, DROP, GRAVITY)
+    assert found.separation > 0.0
+
+
+@pytest.mark.parametrize("incline", [0.0, 40.0, 80.0])
+def test_free_fall_speed_is_that_of_a_stone(incline):
+    found = predict(CHAIN, SURFACE, incline, DROP, GRAVITY)
+    assert found.free_fall_speed == pytest.approx(math.sqrt(2 * 9.81 * (0.18 + 1.165)), rel=1e-15)
+    assert found.speed > found.free_fall_speed
+    assert found.incline_deg == incline
