@@ -24,6 +24,10 @@ class Chain:
         Height of each rod's middle above the middle of the bottom rod, m; strictly rising from 0.
     inertia
         ξ = 4I/(mL²), the dimensionless rotational inertia of every rod (Eqs. 8 and 10).
+    inertias
+        The same rod by rod, bottom up, where rods differ; it then replaces `inertia`.
+    inertia_z
+        ξ about the vertical axis where it is not the same as about the horizontal one (Eq. 13).
     alpha, gamma
         Impact coefficients where they are simply given (a bead chain); `None` means that they
         follow from the surface by Eqs. 8 to 13.
@@ -32,6 +36,8 @@ class Chain:
     masses: tuple[float, ...]
     heights: tuple[float, ...]
     inertia: float = UNIFORM_ROD_INERTIA
+    inertias: tuple[float, ...] | None = None
+    inertia_z: float | None = None
     alpha: Quantity | None = None
     gamma: float | None = None
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, repeat
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
@@ -48,7 +48,7 @@ class Hit:
     speed_after: float
 
 
-def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
+def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float]) -> list[float]:
     """Relative speed gain ΔV/V of the chain at each rod's impact, from Eq. 9.
 
     ΔV = J/M with J = α m V / (1 + γ m/M), so ΔV/V = α m / (M + γ m).
@@ -57,6 +57,8 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
     ----------
     alphas
         α of each rod, bottom up, shape ``(rods,)``.
+    gamma
+        γ of all rods, or of each.
 
     Returns
     -------
@@ -65,9 +67,10 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
     """
     # Summed from the top so that a light end on a heavy chain keeps its digits.
     above = list(accumulate(reversed(chain.masses[1:])))[::-1]
+    gammas = repeat(gamma) if isinstance(gamma, float | int) else gamma
     gains = [
-        alpha * m / (M + gamma * m)
-        for alpha, m, M in zip(alphas, chain.masses, above, strict=False)
+        alpha * m / (M + g * m)
+        for alpha, g, m, M in zip(alphas, gammas, chain.masses, above, strict=False)
     ]
     return [*gains, 0.0]
 

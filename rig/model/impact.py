@@ -44,11 +44,12 @@ def alpha_inclined(
     friction: float,
     incline_deg: float,
     inertia: float = UNIFORM_ROD_INERTIA,
+    inertia_z: float | None = None,
 ) -> float:
-    """α of a long chain on an inclined surface, Eqs. 12 and 13 with ξ_y = ξ_z.
+    """α of a long chain on an inclined surface, Eqs. 12 and 13.
 
-    Eq. 13 is multiplied through by cos θ + μ sin θ, so that cot θ at 0° and tan θ at 90° are
-    never formed.
+    `inertia` is ξ_y and `inertia_z` is ξ_z, the same unless given. Eq. 13 is multiplied through
+    by cos θ + μ sin θ, so that cot θ at 0° and tan θ at 90° are never formed.
 
     Raises
     ------
@@ -57,7 +58,7 @@ def alpha_inclined(
     """
     theta = math.radians(incline_deg)
     cos, sin = math.cos(theta), math.sin(theta)
-    free_rod = gamma_finite(inertia)
+    free_rod = gamma_finite(inertia, inertia_z)
     g = cos + free_rod * sin * (sin - friction * cos) / (cos + friction * sin)
     if g <= 0.0:
         raise DomainError(
@@ -106,7 +107,7 @@ def impact_on(
     if incline_deg == 0.0:
         return _noted(Impact(alpha_level(beta, chain.inertia), gamma, "level"), ())
     mu = surface.friction.value if friction is None else friction
-    alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia)
+    alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia, chain.inertia_z)
     notes: list[str] = []
     sliding = math.degrees(math.atan(mu))
     if incline_deg < sliding:

@@ -1,0 +1,41 @@
+"""Impact coefficients rod by rod, for chains whose rods differ."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+from rig.model.impact import gamma_finite, impact_on
+
+if TYPE_CHECKING:
+    from rig.model.chain import Chain
+    from rig.model.impact import Impact
+    from rig.model.surface import Surface
+
+
+def rod_impacts(surface: Surface, chain: Chain, incline_deg: float) -> list[Impact]:
+    """α and γ of each rod, bottom up; the top rod's impact pulls on nothing.
+
+    α follows from the rod's own ξ (Eqs. 8, 12 and 13). In γ, ξ is that of the striking rod and
+    ξ' = 4I'/(ML²) that of all rods above it turning together (Eq. 10 and section S II): with rods
+    of one length, the mean of their ξ weighted by mass.
+
+    Raises
+    ------
+    DomainError
+        Where Eq. 13 has no finite solution for one of the rods.
+    """
+    if chain.inertias is None:
+        return [impact_on(surface, chain, incline_deg)] * chain.rods
+    moments = [m * xi for m, xi in zip(chain.masses, chain.inertias, strict=True)]
+    masses_above = list(accumulate(reversed(chain.masses[1:])))[::-1]
+    moments_above = list(accumulate(reversed(moments[1:])))[::-1]
+    above = [i / m for i, m in zip(moments_above, masses_above, strict=True)]
+    found = []
+    for xi, xi_above in zip(chain.inertias, [*above, chain.inertias[-1]], strict=True):
+        one = impact_on(surface, replace(chain, inertia=xi, inertias=None), incline_deg)
+        if chain.alpha is None and chain.gamma is None:
+            one = replace(one, gamma=gamma_finite(xi, xi_above))
+        found.append(one)
+    return found
