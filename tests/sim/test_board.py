@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 import serial
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.link.client import Device
@@ -133,6 +133,7 @@ def test_changes_within_a_tick_are_one_snapshot():
     assert take_snapshots(changes, 0, 3, 16e6) == ([(16000, 3), (32000, 2)], 0)
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.floats(0, 0.01), st.integers(0, 3)), max_size=60).map(sorted),
     st.integers(0, 15),

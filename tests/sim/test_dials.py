@@ -1,0 +1,154 @@
+"""Dials as they are written in a URL's query."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, fields
+
+import pint
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.errors import InputError
+from sim.dials import Dials, read_dials
+
+TIMES = ("skew_sd", "delay", "delay_sd", "jitter_sd", "latency")
+LENGTHS = ("hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd")
+SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose")
+FACTORS = ("drop_error", "impulse_sd", "friction", "restitution", "clock")
+UNSET = {"restitution", "friction"}  # not-a-number, which equals nothing
+SIGNED = {"restitution", "clock"}
+NAMES = {field.name for field in fields(Dials)}
+
+REGISTRY = pint.UnitRegistry()
+
+
+def same(one: Dials, other: Dials) -> bool:
+    """Equal, with not-a-number equal to itself."""
+    pairs = zip(asdict(one).values(), asdict(other).values(), strict=True)
+    return all(a == b or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
+
+
+def test_every_dial_is_of_a_known_kind():
+    assert {*TIMES, *LENGTHS, *SHARES, *FACTORS} == NAMES
+
+
+def test_nothing_said_is_the_default_rig():
+    assert same(read_dials({}), Dials())
+    assert same(read_dials({"quiet": "0"}), Dials())
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("skew_sd", "4ms", 0.004),
+        ("jitter_sd", "1.5 µs", 1.5e-6),
+        ("delay", "0.02 s", 0.02),
+        ("rod_sd", "0.3 mm", 0.3e-3),
+        ("gate_sd", "200 um", 0.2e-3),
+        ("clock", "-1300 ppm", -1300e-6),
+        ("clock", "−0.13 %", -1300e-6),
+        ("missed", "2 %", 0.02),
+        ("missed", "2%", 0.02),
+        ("missed", "0.02", 0.02),
+        ("restitution", "-0.37", -0.37),
+        ("drop_error", "3", 3.0),
+        ("corrupt", "0", 0.0),
+        ("lose", "100 %", 1.0),
+    ],
+)
+def test_a_dial_with_its_unit_changes_nothing_else(name, text, value):
+    dials = asdict(read_dials({name: text}))
+    assert dials.pop(name) == value
+    assert all(dials[other] == getattr(Dials(), other) for other in dials if other not in UNSET)
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(
+        [(name, unit) for name in TIMES for unit in ("s", "ms", "µs", "ns")]
+        + [(name, unit) for name in LENGTHS for unit in ("m", "cm", "mm", "µm")]
+    ),
+    st.decimals(0, 999, places=3),
+)
+def test_units_agree_with_pint(dial, number):
+    name, unit = dial
+    base = "s" if name in TIMES else "m"
+    wanted = REGISTRY.Quantity(float(number), unit).to(base).magnitude
+    assert getattr(read_dials({name: f"{number} {unit}"}), name) == pytest.approx(wanted, rel=1e-14)
+
+
+def test_quiet_switches_every_disturbance_off():
+    quiet = asdict(read_dials({"quiet": "1"}))
+    assert quiet.pop("delay") == Dials().delay > 0
+    assert math.isnan(quiet.pop("restitution"))
+    assert math.isnan(quiet.pop("friction"))
+    assert set(quiet.values()) == {0.0}
+
+
+def test_quiet_with_one_dial_is_that_dial_alone():
+    assert same(
+        read_dials({"skew_sd": "4ms", "quiet": "1"}), read_dials({"quiet": "1", "skew_sd": "4 ms"})
+    )
+    dials = read_dials({"quiet": "1", "skew_sd": "4ms"})
+    assert (dials.skew_sd, dials.rod_sd, dials.missed) == (0.004, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("text", ["yes", "true", "", "2"])
+def test_quiet_is_0_or_1(text):
+    with pytest.raises(InputError, match="quiet"):
+        read_dials({"quiet": text})
+
+
+@pytest.mark.parametrize(
+    ("typo", "meant"), [("skew", "skew_sd"), ("mised", "missed"), ("corupt", "corrupt")]
+)
+def test_an_unknown_dial_is_named_and_a_near_one_proposed(typo, meant):
+    with pytest.raises(InputError, match=repr(typo)) as caught:
+        read_dials({typo: "1"})
+    assert caught.value.hint == f"did you mean '{meant}'?"
+    assert caught.value.exit_code == 2
+
+
+def test_an_unknown_dial_like_no_other_lists_them_all():
+    with pytest.raises(InputError) as caught:
+        read_dials({"zzz": "1"})
+    assert all(name in caught.value.hint for name in NAMES)
+
+
+@pytest.mark.parametrize("name", sorted(NAMES - SIGNED))
+def test_a_size_is_not_negative(name):
+    unit = "ms" if name in TIMES else "mm" if name in LENGTHS else ""
+    with pytest.raises(InputError, match=f"{name}.*negative"):
+        read_dials({name: f"-0.1 {unit}"})
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_a_value_of_another_dimension_is_refused(name):
+    wrong = "2 mm" if name in TIMES else "2 ms"
+    with pytest.raises(InputError, match=f"sim://: {name}: "):
+        read_dials({name: wrong})
+
+
+@pytest.mark.parametrize("name", [*TIMES, *LENGTHS])
+def test_a_time_or_length_without_a_unit_is_refused(name):
+    with pytest.raises(InputError, match=f"{name}.*unit"):
+        read_dials({name: "2"})
+
+
+@pytest.mark.parametrize("text", ["", "much", "nan", "inf", "1e999", "2 %%"])
+def test_what_is_no_quantity_is_refused(text):
+    with pytest.raises(InputError, match="missed"):
+        read_dials({"missed": text})
+
+
+@pytest.mark.parametrize("name", SHARES)
+def test_a_share_is_at_most_all(name):
+    with pytest.raises(InputError, match=f"{name}.*more than all"):
+        read_dials({name: "2"})  # 2 % was meant
+
+
+def test_a_clock_runs_forward():
+    with pytest.raises(InputError, match="clock"):
+        read_dials({"clock": "-100 %"})

@@ -1,0 +1,228 @@
+"""The simulated lab with nothing disturbed is the model, edge by edge; and it is reproducible."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.errors import InputError
+from rig.link.messages import pack_label
+from rig.model.chain import Chain
+from rig.model.fall import fall
+from rig.model.impact import alpha_inclined
+from rig.protocol import reader
+from sim.dials import Dials
+from sim.lab import ChainLab
+from sim.truth import Truth
+from tests.sim.chance import with_dials
+from tests.sim.falls import (
+    DELAY,
+    PROTOCOLS,
+    UNIFORM,
+    WITHOUT_GATES,
+    ByHand,
+    crossings,
+    free_time_down,
+)
+
+QUIET = Dials.quiet()
+RUN_OF = {run.incline_deg: number for number, run in ChainLab(UNIFORM, QUIET, 0).runs.items()}
+# physics.md, 60-digit arithmetic: Δz and V.
+REFERENCE = {
+    30: (0.14455777135466808, 7.5511640917900483),
+    40: (0.11546810526538031, 6.9327596650855757),
+    60: (0.053585554933341692, 5.8609487859073973),
+    80: (0.0098142050953198042, 5.2579813110300101),
+    0: (0.080175519527158543, 6.2857634799081311),  # on the pile
+}
+
+
+def drop(protocol, dials=QUIET, seed=1, run=1, attempt=1) -> tuple[list, Truth]:
+    told: list[Truth] = []
+    edges = ChainLab(protocol, dials, seed, told.append).drop(pack_label(run, attempt))
+    (truth,) = told
+    return edges, truth
+
+
+def on(edges, channel: int) -> list[tuple[float, bool]]:
+    return [(time, blocked) for time, at, blocked in edges if at == channel]
+
+
+def assert_same_edges(edges, expected) -> None:
+    assert [blocked for _, blocked in edges] == [blocked for _, blocked, _ in expected]
+    assert [t for t, _ in edges] == pytest.approx([DELAY + t for t, _, _ in expected], abs=1e-12)
+
+
+@pytest.mark.parametrize("incline", [0, 20, 30, 40, 60, 80])
+def test_every_quiet_edge_is_where_the_equations_put_it(incline):
+    edges, _ = drop(UNIFORM, run=RUN_OF[incline])
+    by_hand = ByHand.at(incline)
+    expected = 0
+    for gate in UNIFORM.gates.gates:
+        time_down = by_hand.time_down if gate.side == "impact" else free_time_down
+        crossed = crossings(gate.height, time_down)
+        assert_same_edges(on(edges, gate.channel), crossed)
+        expected += len(crossed)
+    assert len(edges) == expected
+    assert [e[0] for e in edges] == sorted(e[0] for e in edges)
+
+
+@pytest.mark.parametrize("incline", REFERENCE)
+def test_quiet_truth_is_the_reference(incline):
+    _, truth = drop(UNIFORM, run=RUN_OF[incline])
+    separation, speed = REFERENCE[incline]
+    assert truth.separation_m == pytest.approx(separation, rel=1e-12)
+    assert truth.separation_raw_m == pytest.approx(separation, rel=1e-12)
+    assert truth.speed_m_s == pytest.approx(speed, rel=1e-12)
+    assert truth.fall_time_s == pytest.approx(float(ByHand.at(incline).times[-1]), rel=1e-13)
+    assert (truth.incline_deg, truth.release_skew_s) == (incline, 0.0)
+
+
+def test_quiet_truth_is_the_model_room_s_fall():
+    _, truth = drop(UNIFORM, run=RUN_OF[40])
+    chain = Chain((1.0,) * 25, tuple(1.165 * k / 24 for k in range(25)))
+    model = fall(chain, alpha_inclined(0.5, 0.2, 40), 4 / 3, 0.18, 9.81)
+    assert truth.separation_m == pytest.approx(model.separation_m, rel=1e-12)
+    assert truth.speed_m_s == pytest.approx(model.speed_m_s, rel=1e-12)
+    assert truth.fall_time_s == pytest.approx(model.time_s, rel=1e-12)
+
+
+def test_a_graded_chain_has_the_reference_separation():
+    _, truth = drop(reader.read(PROTOCOLS / "graded-chain.yaml"))
+    assert truth.separation_m == pytest.approx(0.20034710240655192, rel=1e-12)
+    assert truth.speed_m_s == pytest.approx(8.0478400772111967, rel=1e-12)
+
+
+def test_a_single_chain_has_a_speed_and_no_separation():
+    protocol = reader.read(PROTOCOLS / "single-chain.yaml")
+    edges, truth = drop(protocol)
+    by_hand = ByHand.at(40)
+    for gate in protocol.gates.gates:
+        assert_same_edges(on(edges, gate.channel), crossings(gate.height, by_hand.time_down))
+    assert {channel for _, channel, _ in edges} == {g.channel for g in protocol.gates.gates}
+    assert truth.speed_m_s == pytest.approx(REFERENCE[40][1], rel=1e-12)
+    assert truth.impact_chain == "A"
+    assert truth.separation_m is truth.separation_raw_m is truth.release_skew_s is None
+    assert truth.camera_separation_m is truth.camera_speed_m_s is None
+
+
+def test_a_picket_fence_falls_freely():
+    edges, truth = drop(reader.read(PROTOCOLS / "picket-fence.yaml"))
+    for channel, gate in ((0, 0.050), (1, 0.350)):
+        expected = []
+        for bar in range(8):
+            above = 0.400 + 0.050 * bar - gate  # the lowest bar hangs at 400 mm
+            if above > 0:
+                for half, blocked in ((-0.0125, True), (0.0125, False)):
+                    expected.append((math.sqrt(2 * (above + half) / 9.81), blocked, bar))
+        assert_same_edges(on(edges, channel), expected)
+    assert truth.speed_m_s is truth.separation_m is truth.release_skew_s is None
+    assert (truth.impact_chain, truth.gravity_m_s2) == (None, 9.81)
+
+
+def test_a_chain_alone_has_nothing_to_be_late_against():
+    fence = reader.read(PROTOCOLS / "picket-fence.yaml")
+    skewed = with_dials(skew_sd=0.05)
+    assert drop(fence, skewed)[0] == drop(fence)[0]
+
+
+def test_a_scene_without_gates_has_no_edges():
+    edges, truth = drop(reader.read(PROTOCOLS / "bead-chain.yaml"))
+    assert edges == truth.edges == []
+    assert truth.speed_m_s > math.sqrt(2 * 9.81 * 1.1)  # faster than free fall
+
+
+def test_a_gate_just_below_a_hanging_rod_sees_it_and_one_just_above_does_not():
+    # The bottom rod hangs at 180 mm and is 13 mm thick.
+    low, high = (replace(UNIFORM.gates.on("free")[0], height=h) for h in (0.1725, 0.1875))
+    scene = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=(low, replace(high, channel=9))))
+    edges, truth = drop(scene)
+    assert_same_edges(on(edges, 8), crossings(0.1725, free_time_down))
+    assert_same_edges(on(edges, 9), crossings(0.1875, free_time_down))
+    assert [min(e[3] for e in truth.edges if e[1] == c) for c in (8, 9)] == [0, 1]
+
+
+def test_hanging_chains_leave_the_beams_free_unless_hung_too_low():
+    label = pack_label(1, 1)
+    assert ChainLab(UNIFORM, Dials(), 1).rest(label) == 0
+    lab = ChainLab(UNIFORM, QUIET, 1)
+    lab.hang_height = 0.130  # bottom rods right in the beams of channels 3 …
+    gates = {gate.channel: gate.height for gate in UNIFORM.gates.gates}
+    blocked = {
+        channel
+        for channel, height in gates.items()
+        if any(abs(0.130 + 1.165 * k / 24 - height) < 0.0127 / 2 for k in range(25))
+    }
+    assert 3 in blocked
+    assert lab.rest(label) == sum(1 << channel for channel in blocked)
+
+
+labels = st.tuples(st.integers(1, 108), st.integers(1, 3))
+
+
+@settings(deadline=None, max_examples=6)
+@given(st.lists(labels, min_size=1, max_size=3), st.randoms(use_true_random=False))
+def test_a_drop_depends_on_seed_run_and_attempt_alone(asked, order: random.Random):
+    lab = ChainLab(UNIFORM, Dials(), 3)
+    first = {label: lab.drop(pack_label(*label)) for label in asked}
+    again = [*asked, *asked]
+    order.shuffle(again)
+    other = ChainLab(UNIFORM, Dials(), 3)
+    for label in again:
+        assert other.drop(pack_label(*label)) == first[label]
+
+
+def test_other_runs_attempts_and_seeds_are_other_drops():
+    # Runs 1 and 4 hang the same chains at the same incline: only chance tells them apart.
+    late = with_dials(delay_sd=1e-3)
+    cases = ((1, 1, 1), (1, 1, 2), (1, 4, 1), (2, 1, 1))
+    assert len({drop(UNIFORM, late, *case)[0][0] for case in cases}) == len(cases)
+    assert len({drop(UNIFORM, QUIET, *case)[0][0] for case in cases}) == 1
+
+
+def test_a_run_the_plan_does_not_have_is_bad_input():
+    lab = ChainLab(UNIFORM, QUIET, 1)
+    for ask in (lab.drop, lab.rest):
+        with pytest.raises(InputError, match="no run 109"):
+            ask(pack_label(109, 1))
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.builds(
+        Dials,
+        skew_sd=st.floats(0, 0.02),
+        hang_sd=st.floats(0, 0.003),
+        rod_sd=st.floats(0, 0.004),
+        width_sd=st.floats(0, 0.001),
+        gate_sd=st.floats(0, 0.005),
+        beam_sd=st.floats(0, 0.2),
+        impulse_sd=st.floats(0, 0.5),
+        jitter_sd=st.floats(0, 1e-3),
+        missed=st.floats(0, 1),
+        chatter=st.floats(0, 1),
+        string=st.floats(0, 1),
+        bounce=st.floats(0, 1),
+    ),
+    st.integers(0, 10**6),
+    st.integers(1, 108),
+)
+def test_for_any_dials_levels_alternate_and_time_runs_forward(dials, seed, run):
+    edges, truth = drop(UNIFORM, dials, seed, run)
+    assert all(a[0] <= b[0] for a, b in pairwise(edges))
+    for gate in UNIFORM.gates.gates:
+        levels = [blocked for _, blocked in on(edges, gate.channel)]
+        assert levels == [i % 2 == 0 for i in range(len(levels))]
+        assert len(levels) % 2 == 0
+    assert [(t, c, b) for t, c, b, _ in truth.edges] == edges
+
+
+def test_the_chains_swap_sides_and_the_truth_says_which_strikes():
+    struck = [drop(WITHOUT_GATES, run=run)[1].impact_chain for run in (1, 2, 3, 4)]
+    assert struck == ["A", "B", "B", "A"]

@@ -1,0 +1,162 @@
+"""Chance in single drops: release, impulses, and what the beams make of rods and string."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from rig.model.chain import Chain
+from sim.beam import NOT_A_ROD
+from sim.dials import Dials
+from sim.truth import Truth
+from tests.sim.chance import (
+    FEW_GATES,
+    FREE,
+    RUN_40,
+    assert_binomial,
+    assert_normal,
+    attempts,
+    truths,
+    with_dials,
+)
+from tests.sim.falls import DELAY, RODS, UNIFORM, WITHOUT_GATES, ByHand, alpha
+
+G = 9.81
+
+
+def late(truth: Truth, quiet: Truth) -> tuple[float, float]:
+    """How much later each side's edges come than in a quiet drop: one value a side."""
+    found = []
+    for free in (False, True):
+        now, then = (
+            sorted((c, r, b, t) for t, c, b, r in x.edges if (c in FREE) == free)
+            for x in (truth, quiet)
+        )
+        lags = [a[3] - b[3] for a, b in zip(now, then, strict=True)]
+        assert max(lags) - min(lags) < 1e-12
+        found.append(lags[0])
+    return found[0], found[1]
+
+
+def test_the_delay_moves_both_chains_alike():
+    (quiet,) = attempts(with_dials(), 1, FEW_GATES)
+    drops = attempts(with_dials(delay_sd=1e-3), 300, FEW_GATES)
+    draws = []
+    for truth in drops:
+        struck, free = late(truth, quiet)
+        assert struck == pytest.approx(free, abs=1e-12)
+        assert truth.separation_raw_m == pytest.approx(quiet.separation_m, rel=1e-12)
+        draws.append(struck)
+    assert_normal(draws, 1e-3)
+
+
+def test_a_positive_skew_is_a_free_chain_that_leaves_later():
+    (quiet,) = attempts(with_dials(), 1, FEW_GATES)
+    drops = attempts(with_dials(skew_sd=4e-3), 300, FEW_GATES)
+    fall = float(ByHand.at(40).times[-1])
+    for truth in drops:
+        struck, free = late(truth, quiet)
+        skew = truth.release_skew_s
+        assert struck == 0.0
+        assert free == pytest.approx(skew, abs=1e-12)
+        # At the hit the free chain has fallen for `fall - skew`: later means higher.
+        raised = G * fall * skew - G * skew**2 / 2
+        assert truth.separation_raw_m - truth.separation_m == pytest.approx(raised, abs=1e-12)
+        assert truth.separation_m == pytest.approx(quiet.separation_m, rel=1e-12)
+    assert pytest.approx(4.9e-3, rel=0.01) == G * fall * 1e-3  # 4.9 mm a millisecond
+    assert_normal([t.release_skew_s for t in drops], 4e-3)
+
+
+def test_jitter_scatters_single_edges():
+    quiet = attempts(with_dials(), 1)[0]
+    truth = attempts(with_dials(jitter_sd=2e-6), 1)[0]
+    then = {(c, b, r): t for t, c, b, r in quiet.edges}
+    assert_normal([t - then[c, b, r] for t, c, b, r in truth.edges], 2e-6)
+
+
+def test_impulses_scatter_after_the_first_hit_and_leave_the_free_chain_alone():
+    quiet = attempts(with_dials(), 1)[0]
+    truth = attempts(with_dials(impulse_sd=0.02), 1)[0]
+    first_hit = DELAY + math.sqrt(2 * 0.18 / G)
+    then = {(c, b, r): t for t, c, b, r in quiet.edges}
+    for time, channel, blocked, rod in truth.edges:
+        same = abs(time - then[channel, blocked, rod]) < 1e-12
+        assert same == (channel in FREE or time <= first_hit)
+
+
+def test_single_impulses_scatter_independently_by_the_dial():
+    sd, wiggle = 0.02, 1e-6
+    a = alpha(40)
+    level = ByHand([a] * RODS).separation
+    slopes = [
+        float(ByHand([a * (1 + wiggle * (k == rod)) for k in range(RODS)]).separation - level)
+        / wiggle
+        for rod in range(RODS)
+    ]
+    drops = attempts(with_dials(impulse_sd=sd), 300, WITHOUT_GATES)
+    assert_normal([t.separation_m - float(level) for t in drops], sd * math.hypot(*slopes))
+
+
+@pytest.mark.parametrize("true", [{"restitution": 0.6}, {"friction": 0.25}])
+def test_true_coefficients_may_differ_from_the_protocol_s(true):
+    (name, value), *_ = true.items()
+    by_hand = ByHand.at(40, **{{"restitution": "beta", "friction": "mu"}[name]: str(value)})
+    truth = attempts(with_dials(**true), 1)[0]
+    assert truth.separation_m == pytest.approx(float(by_hand.separation), rel=1e-12)
+    assert truth.speed_m_s == pytest.approx(float(by_hand.before[-1]), rel=1e-12)
+
+
+def test_missed_edges_are_the_dial_s_share():
+    quiet, lossy = (
+        sum(len(t.edges) for t in attempts(with_dials(missed=share), 20)) for share in (0, 0.05)
+    )
+    assert_binomial((quiet - lossy) / 2, quiet // 2, 0.05)  # rods and gaps are lost whole
+
+
+def test_the_string_flickers_in_gaps_between_rods():
+    quiet = attempts(with_dials(), 1)[0]
+    truth = attempts(with_dials(string=1.0), 1)[0]
+    flickers = [edge for edge in truth.edges if edge[3] == NOT_A_ROD]
+    for channel in (gate.channel for gate in UNIFORM.gates.gates):
+        rods = {rod for _, at, _, rod in quiet.edges if at == channel}
+        begun = [edge for edge in flickers if edge[1] == channel and edge[2]]
+        # A flicker that runs into the next rod ends with it; it still begins by itself.
+        assert len(begun) == len(rods) - 1
+        gaps = [edge for edge in quiet.edges if edge[1] == channel][1:-1]
+        for (time, *_), (last, *_), (following, *_) in zip(
+            begun, gaps[::2], gaps[1::2], strict=True
+        ):
+            assert last < time < following
+
+
+def test_rods_bounce_through_the_lowest_beam_of_the_impact_side_alone():
+    truth = attempts(with_dials(bounce=1.0), 1)[0]
+    bounces = [edge for edge in truth.edges if edge[3] == NOT_A_ROD]
+    assert {channel for _, channel, _, _ in bounces} == {0}
+    hits = [DELAY + float(t) for t in ByHand.at(40).times]
+    assert 2 <= len(bounces) <= 2 * RODS  # many merge with the next rods' shadows
+    assert min(t for t, *_ in bounces) > hits[0] + 4e-3
+    assert max(t for t, *_ in bounces) < hits[-1] + 40e-3
+    assert {edge[1] for edge in truth.edges if edge[0] > hits[-1] + 1e-3 and edge[1] < 8} == {0}
+
+
+def test_a_quarter_of_the_struck_rods_bounces():
+    # Two rods far apart, so that every bounce is alone in the beam.
+    a = UNIFORM.chains["A"]
+    pair = replace(a, chain=Chain((1.0, 1.0), (0.0, 1.165)), widths=a.widths[:2])
+    scene = replace(
+        UNIFORM,
+        chains={"A": pair},
+        gates=replace(UNIFORM.gates, gates=UNIFORM.gates.on("impact")[:1]),
+    )
+    drops = attempts(with_dials(bounce=0.25), 200, scene)
+    bounces = sum(rod == NOT_A_ROD and blocked for t in drops for _, _, blocked, rod in t.edges)
+    assert_binomial(bounces, 2 * 200, 0.25)
+
+
+def test_the_graver_dials_all_at_once_still_end_in_a_truth():
+    truth = truths(Dials(skew_sd=0.01, missed=0.1, chatter=0.1, bounce=0.5), 5, (RUN_40, 1))[0]
+    assert 0 < truth.separation_m < 0.3
+    assert truth.separation_raw_m != truth.separation_m

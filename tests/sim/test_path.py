@@ -1,0 +1,115 @@
+"""The way down: heights and times of a falling chain, both ways round."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.model.chain import Chain
+from rig.model.fall import hits, kicks
+from sim.path import Path
+
+
+@st.composite
+def paths(draw) -> Path:
+    """Any chain on its way down, with impacts of any strength."""
+    rods = draw(st.integers(1, 30))
+    lists = {"min_size": rods, "max_size": rods}
+    gaps = draw(st.lists(st.floats(0.002, 0.1), **lists))
+    chain = Chain(
+        masses=tuple(draw(st.lists(st.floats(0.05, 20), **lists))),
+        heights=tuple(math.fsum(gaps[1 : k + 1]) for k in range(rods)),
+    )
+    alphas = draw(st.lists(st.floats(-0.2, 0.5), **lists))
+    start = draw(st.floats(0.001, 2))
+    gravity = draw(st.floats(0.5, 30))
+    gains = kicks(chain, alphas, draw(st.floats(0, 3)))
+    # No impact throws the chain back up: only then is there one time for each height.
+    events = hits(chain, [max(gain, -0.5) for gain in gains], start, gravity)
+    return Path(draw(st.floats(0, 1)), start, gravity, events, tuple(-z for z in chain.heights))
+
+
+def end(path: Path) -> float:
+    return path.release_s + path.hits[-1].time_s
+
+
+@settings(deadline=None)
+@given(paths(), st.floats(0, 1))
+def test_height_undoes_time(path, part):
+    low, high = path.hit_heights[-1] - 0.3, path.start
+    height = low + part * (high - low)
+    assert path.height_at(path.time_at(height)) == pytest.approx(height, abs=1e-12)
+
+
+@settings(deadline=None)
+@given(paths(), st.floats(0, 1.3))
+def test_time_undoes_height(path, part):
+    # In the first millisecond the speed is too small for a height to tell the time.
+    time = path.release_s + 1e-3 + part * path.hits[-1].time_s
+    assert path.time_at(path.height_at(time)) == pytest.approx(time, abs=1e-11)
+
+
+@settings(deadline=None)
+@given(paths())
+def test_each_hit_is_on_the_way(path):
+    for hit, height in zip(path.hits, path.hit_heights, strict=True):
+        when = path.release_s + hit.time_s
+        assert path.time_at(height) == pytest.approx(when, abs=1e-13)
+        assert path.height_at(when) == pytest.approx(height, abs=1e-12)
+
+
+@settings(deadline=None)
+@given(paths())
+def test_the_speed_steps_at_each_hit_and_only_there(path):
+    g, e = path.gravity, 1e-4
+    for before, after in pairwise(path.hits):
+        if after.time_s - before.time_s < e:
+            continue
+        first, last = path.release_s + before.time_s, path.release_s + after.time_s
+        # Exact for constant acceleration: v(0) = Δz/e − g e/2, v(e) = Δz/e + g e/2. Here z falls.
+        leaving = (path.height_at(first) - path.height_at(first + e)) / e - g * e / 2
+        arriving = (path.height_at(last - e) - path.height_at(last)) / e + g * e / 2
+        assert leaving == pytest.approx(before.speed_after, abs=1e-8)
+        assert arriving == pytest.approx(after.speed_before, abs=1e-8)
+
+
+@settings(deadline=None)
+@given(paths(), st.lists(st.floats(-0.5, 1.5), min_size=2).map(sorted))
+def test_it_never_rises_and_hangs_still_before(path, parts):
+    span = path.hits[-1].time_s
+    heights = [path.height_at(path.release_s + part * span) for part in parts]
+    assert all(b <= a + 1e-14 for a, b in pairwise(heights))
+    assert all(z == path.start for z, part in zip(heights, parts, strict=True) if part <= 0)
+
+
+@settings(deadline=None)
+@given(st.floats(0, 1), st.floats(0.1, 3), st.floats(0.5, 30), st.floats(0, 3))
+def test_free_fall_is_half_g_t_squared(release, start, gravity, since):
+    path = Path(release, start, gravity)
+    since = (release + since) - release  # what is left of it in floats
+    assert path.height_at(release + since) == pytest.approx(
+        start - gravity * since**2 / 2, rel=1e-13, abs=1e-13
+    )
+    depth = 0.5 * gravity * since**2
+    assert path.time_at(start - depth) == pytest.approx(
+        release + math.sqrt(2 * (start - (start - depth)) / gravity), abs=1e-13
+    )
+
+
+def test_before_the_first_hit_impacts_change_nothing():
+    struck = Path(
+        0.02, 0.18, 9.81, hits(Chain((1, 1), (0, 0.05)), [0.2, 0], 0.18, 9.81), (0, -0.05)
+    )
+    free = Path(0.02, 0.18, 9.81)
+    assert struck.time_at(0.001) == free.time_at(0.001)
+    assert struck.time_at(0.0) == free.time_at(0.0)  # a hit changes speed, not place
+    assert struck.time_at(-0.02) < free.time_at(-0.02) - 1e-4
+    assert struck.height_at(end(struck)) < free.height_at(end(struck))
+
+
+def test_a_height_above_the_start_is_passed_at_release():
+    assert Path(0.3, 0.1, 9.81).time_at(0.2) == 0.3

@@ -1,0 +1,217 @@
+"""``sim://`` as the rest of the program meets it: a port by URL, a device on it, drops."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+import pytest
+
+from rig.errors import InputError
+from rig.link.client import Device
+from rig.link.clock import tick_rate
+from rig.link.messages import pack_label
+from rig.link.port import open_port, port_clock
+from rig.records import Drop, Ping
+from tests.sim.falls import PROTOCOLS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FENCE = PROTOCOLS / "picket-fence.yaml"
+HZ = 16_000_000
+
+
+def url(protocol: Path = FENCE, **settings: object) -> str:
+    said = {"protocol": str(protocol), **settings}
+    return "sim://?" + "&".join(f"{name}={quote(str(value))}" for name, value in said.items())
+
+
+@dataclass
+class Talk:
+    """A conversation: all bytes with their times, and what came of it."""
+
+    chunks: list[tuple] = field(default_factory=list)
+    drops: list[Drop] = field(default_factory=list)
+    pings: list[Ping] = field(default_factory=list)
+
+
+def talk(where: str, gates: int = 0b11, runs=((1, 1),), pings: int = 3) -> Talk:
+    port = open_port(where)
+    clock, done = port_clock(port), Talk()
+    device = Device(port, clock, lambda *chunk: done.chunks.append(chunk))
+    device.connect()
+    for i in range(pings):
+        clock.sleep(0.1 + 0.037 * (i % 7))
+        ping = device.ping()
+        if ping is not None:
+            done.pings.append(ping)
+    for run, attempt in runs:
+        label = pack_label(run, attempt)
+        order = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000, "record_ms": 900}
+        device.fire(device.arm(label=label, gates=gates, **order))
+        drop = device.collect(label)
+        device.acknowledge(label, drop.certificate.crc32)
+        done.drops.append(drop)
+    port.close()
+    return done
+
+
+def test_the_same_seed_gives_the_same_conversation_byte_for_byte():
+    one, two, other = (talk(url(seed=seed), runs=((1, 1), (2, 1))) for seed in (3, 3, 4))
+    assert one == two
+    assert [c for c in one.chunks if c[0] == "rx"] != [c for c in other.chunks if c[0] == "rx"]
+    assert one.drops[0].edges != other.drops[0].edges
+
+
+def test_no_seed_is_seed_0():
+    assert talk(url()) == talk(url(seed=0)) != talk(url(seed=1))
+
+
+def test_the_seed_chooses_the_board_too():
+    ids = []
+    for seed in (1, 1, 2):
+        port = open_port(url(seed=seed))
+        ids.append(Device(port, port_clock(port)).connect().unique_id)
+    assert ids[0] == ids[1] != ids[2]
+
+
+def truth_lines(file: Path) -> list[dict]:
+    return [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+
+
+def test_the_truth_file_tells_what_is_on_the_wire(tmp_path):
+    file = tmp_path / "truth of it.jsonl"
+    runs = ((1, 1), (2, 1), (2, 2))
+    done = talk(
+        url(PROTOCOLS / "inclined-uniform.yaml", seed=5, truth=file, clock="2000 ppm"), 0xFFFF, runs
+    )
+    lines = truth_lines(file)
+    assert [(line["run"], line["attempt"]) for line in lines] == list(runs)
+    assert [(drop.run, drop.attempt) for drop in done.drops] == list(runs)
+    for line, drop in zip(lines, done.drops, strict=True):
+        assert drop.faults == ()  # no glitches either, so that edges match one to one
+        assert len(drop.edges) > 500
+        assert sorted(drop.edges) == sorted(
+            (round(seconds * HZ * 1.002), channel, blocked)
+            for seconds, channel, blocked, _ in line["edges"]
+        )
+        skew, fall = line["release_skew_s"], line["fall_time_s"]
+        raised = 9.81 * (fall * skew - skew**2 / 2)  # a later free chain is higher at the hit
+        assert skew != 0
+        assert line["separation_raw_m"] == pytest.approx(line["separation_m"] + raised, abs=1e-12)
+
+
+def test_the_truth_file_of_a_single_faller_has_no_separation(tmp_path):
+    file = tmp_path / "truth.jsonl"
+    talk(url(truth=file))
+    (line,) = truth_lines(file)
+    assert line["separation_m"] is line["speed_m_s"] is line["impact_chain"] is None
+    assert line["gravity_m_s2"] == 9.81
+
+
+def test_a_quiet_drop_on_the_wire_is_the_closed_form():
+    (drop,) = talk(url(quiet=1)).drops
+    expected = []
+    for channel, gate in ((0, 0.050), (1, 0.350)):
+        for bar in range(8):
+            above = 0.400 + 0.050 * bar - gate
+            if above > 0:
+                for edge, blocked in ((above - 0.0125, True), (above + 0.0125, False)):
+                    expected.append((0.02 + math.sqrt(2 * edge / 9.81), channel, blocked))
+    assert len(drop.edges) == len(expected) > 20
+    for edge, (seconds, channel, blocked) in zip(drop.edges, sorted(expected), strict=True):
+        assert (edge.channel, edge.blocked) == (channel, blocked)
+        assert abs(edge.tick - seconds * HZ) <= 0.5 + 1e-6
+
+
+@pytest.mark.parametrize("ppm", [-1300, 0, 872, -3283])
+def test_the_clock_dial_shows_in_the_pings(ppm):
+    pulls = []
+    for seed in range(8):
+        done = talk(url(seed=seed, clock=f"{ppm} ppm"), runs=(), pings=25)
+        rate = tick_rate(done.pings, HZ)
+        assert (rate.n > 15, rate.u_hz < HZ * 50e-6) == (True, True)
+        pulls.append((rate.hz / HZ - 1 - ppm * 1e-6) / (rate.u_hz / HZ))
+    assert max(map(abs, pulls)) < 4
+    # Were the uncertainty far too small or too large, the pulls would not be of order one.
+    assert 0.25 < math.sqrt(sum(pull**2 for pull in pulls) / len(pulls)) < 2
+
+
+def test_the_clock_dial_stretches_a_drop():
+    true, fast = (talk(url(quiet=1, clock=clock)).drops[0] for clock in ("0", "0.5 %"))
+    for a, b in zip(true.edges, fast.edges, strict=True):
+        assert abs(b.tick - 1.005 * a.tick) <= 1.01
+
+
+def test_the_latency_dial_lengthens_round_trips():
+    n = 200
+    trips = []
+    for latency in ("0 s", "5 ms"):
+        done = talk(url(quiet=1, latency=latency), runs=(), pings=n)
+        trips.append(sum(p.host_recv_ns - p.host_send_ns for p in done.pings) * 1e-9 / n)
+        assert len(done.pings) == n
+    # The first byte waits 5 ms on average, and now and then the rest waits once more.
+    assert abs(trips[1] - trips[0] - 5e-3) < 5 * 5e-3 / math.sqrt(n) + 0.5e-3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_bad_line_still_gives_the_whole_drop_once(tmp_path, seed):
+    scene, gates = PROTOCOLS / "inclined-uniform.yaml", 0xFFFF
+    file = tmp_path / "truth.jsonl"
+    bad = talk(url(scene, seed=seed, corrupt="0.2 %", lose="0.1 %", truth=file), gates)
+    clean = talk(url(scene, seed=seed), gates)
+    assert bad.drops[0].faults == ()
+    assert bad.drops[0].edges == clean.drops[0].edges
+    assert len(bad.chunks) > len(clean.chunks)  # something had to be said twice
+    assert len(truth_lines(file)) == 1  # a repeated FIRE does not let go twice
+
+
+@pytest.mark.parametrize("where", ["sim://", "sim://?seed=1", "sim://?protocol=&seed=1"])
+def test_without_a_protocol_there_is_nothing_to_simulate(where):
+    with pytest.raises(InputError, match="scene") as caught:
+        open_port(where)
+    assert "protocol=FILE" in caught.value.hint
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"protocol": "nowhere.yaml"}, "nowhere.yaml"),
+        ({"seed": "one"}, "seed.*'one'"),
+        ({"pace": "slow"}, "pace.*'slow'"),
+        ({"skew": "2 ms"}, "unknown dial 'skew'"),
+        ({"skew_sd": "2 mm"}, "skew_sd.*length"),
+        ({"missed": "-1 %"}, "negative"),
+        ({"quiet": ""}, "quiet"),
+        ({"truth": "no/such/folder/truth.jsonl"}, "truth: cannot write"),
+    ],
+)
+def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
+    with pytest.raises(InputError, match=complaint):
+        open_port(url(**settings))
+
+
+def test_a_setting_given_twice_is_bad_input():
+    with pytest.raises(InputError, match="seed is given twice"):
+        open_port(url(seed=1) + "&seed=2")
+
+
+def test_a_percent_sign_need_not_be_escaped():
+    plain = url(seed=1) + "&missed=20%&skew_sd=4 ms&clock=-1300 ppm"
+    escaped = url(seed=1, missed="20 %", skew_sd="4ms", clock="-1300ppm")
+    assert talk(plain) == talk(escaped) != talk(url(seed=1))
+
+
+def test_a_run_that_is_not_planned_is_bad_input():
+    with pytest.raises(InputError, match="no run 11"):
+        talk(url(), runs=((11, 1),))
+
+
+def test_only_the_gates_that_are_armed_are_heard():
+    both, one = (talk(url(seed=2), gates).drops[0] for gates in (0b11, 0b10))
+    assert [e for e in both.edges if e.channel == 1] == list(one.edges)
