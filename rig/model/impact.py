@@ -56,8 +56,11 @@ def alpha_inclined(
     DomainError
         Where g(θ) ≤ 0: no finite impulse satisfies Eqs. S7 to S12.
     """
-    theta = math.radians(incline_deg)
-    cos, sin = math.cos(theta), math.sin(theta)
+    sin = math.sin(math.radians(incline_deg))
+    # Not cos θ: near 90° all its digits would be those of π/2 − θ, which radians do not hold.
+    cos = math.sin(math.radians(90.0 - incline_deg))
+    if cos == 0.0:
+        return 0.0  # a wall: the contact has no vertical part
     free_rod = gamma_finite(inertia, inertia_z)
     g = cos + free_rod * sin * (sin - friction * cos) / (cos + friction * sin)
     if g <= 0.0:

@@ -1,0 +1,72 @@
+"""``rig bench stability``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.bench.stability import Row, sonic_lengths, stability
+from rig.commands.output import print_json
+from rig.errors import InputError
+from rig.files import write_atomic
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Sequence
+
+FAILED = 1
+
+
+def main(arguments: Namespace) -> int:
+    """Print one row a scene, and keep the table."""
+    show = None if arguments.json else _print_row
+    rows = stability(progress=show)
+    counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in _VERDICTS}
+    sonic = [asdict(one) for one in sonic_lengths()]
+    found = {"rows": [asdict(row) for row in rows], "counts": counts, "sonic": sonic}
+    if arguments.json:
+        print_json(found)
+    else:
+        print(", ".join(f"{n} {verdict}" for verdict, n in counts.items()))
+        for one in sonic:
+            print(
+                f"each rod {one['ratio']:g} of the one below: faster than sound from "
+                f"{one['rods']} rods, {one['length_m']:.2f} m, {one['decades']:.1f} decades of mass"
+            )
+    if arguments.output is not None:
+        _write(Path(arguments.output), rows, json.dumps(found, indent=2, ensure_ascii=False))
+    return FAILED if counts["FAILED"] else 0
+
+
+_VERDICTS = ("exact", "noted", "refused", "FAILED")
+
+
+def _print_row(row: Row) -> None:
+    errors = [
+        "–" if error is None else f"{error:.1e}"
+        for error in (row.separation_error, row.speed_error)
+    ]
+    said = f"  {row.note}" if row.note else ""
+    print(
+        f"{f'{row.group} {row.value}':<40} Δz {errors[0]:>8}  V {errors[1]:>8}  {row.verdict:<8}"
+        f"as printed: {row.naive}{said}",
+        flush=True,
+    )
+
+
+def _write(folder: Path, rows: Sequence[Row], text: str) -> None:
+    """Write ``stability.csv`` and ``stability.json``."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    table = io.StringIO()
+    writer = csv.DictWriter(table, [field.name for field in fields(Row)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(row) for row in rows)
+    write_atomic(folder / "stability.csv", table.getvalue())
+    write_atomic(folder / "stability.json", text + "\n")
