@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.commands.output import print_json
+from rig.errors import InputError
 from rig.model.fall import fall, free_fall_speed
 from rig.model.predict import predict
 from rig.protocol import reader
@@ -16,7 +17,14 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Namespace) -> int:
-    """Print the model's predictions, one an incline."""
+    """Print the model's predictions, one an incline, or draw a figure of the paper."""
+    if arguments.figure is not None:
+        from rig.commands.paper_figure import write_figure  # noqa: PLC0415 - it needs matplotlib
+
+        write_figure(arguments.figure, arguments.output)
+        return 0
+    if arguments.protocol is None:
+        raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
     protocol = reader.read(arguments.protocol)
     found = predictions(protocol)
     if arguments.json:

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from rig.model.chain import Chain
 
 
-_SMALL, _LARGE = 1e-100, 1e100  # beyond these a square may leave the floats
+SMALL, LARGE = 1e-100, 1e100
+"""Beyond these a square may leave the floats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +133,9 @@ def fall(
         Where nothing would ever move: no gravity and no initial speed.
     """
     if not (
-        _SMALL < chain.heights[-1] + drop < _LARGE
-        and _SMALL < gravity < _LARGE
-        and initial_speed < _LARGE
+        SMALL < chain.heights[-1] + drop < LARGE
+        and SMALL < gravity < LARGE
+        and initial_speed < LARGE
     ):
         return _rescaled(chain, alpha, gamma, drop, gravity, initial_speed)
     return _fall(chain, alpha, gamma, drop, gravity, initial_speed)
@@ -156,7 +157,7 @@ def _fall(
             if distance == 0.0:
                 arrival = speed
             else:
-                arrival = sqrt(speed * speed + twice_g * distance)
+                arrival = math.sqrt(speed * speed + twice_g * distance)
                 duration = 2.0 * distance / (speed + arrival)
                 time += duration
                 separation += gained * duration
@@ -177,8 +178,10 @@ def _rescaled(
     Units are powers of two: changing to them and back costs no digit.
     """
     length = math.frexp(chain.heights[-1] + drop)[1]
-    fallen = (math.frexp(gravity)[1] + length) // 2
-    unit = max(math.frexp(initial_speed)[1], fallen) if initial_speed else fallen
+    # Of speed; what is 0 has no size.
+    speeds = [(math.frexp(gravity)[1] + length) // 2] if gravity else []
+    speeds += [math.frexp(initial_speed)[1]] if initial_speed else []
+    unit = max(speeds, default=0)
     small = replace(chain, heights=tuple(math.ldexp(z, -length) for z in chain.heights))
     found = _fall(
         small,
@@ -197,14 +200,14 @@ def _rescaled(
 
 def free_fall_speed(chain: Chain, drop: float, gravity: float, initial_speed: float = 0.0) -> float:
     """Speed of the top rod at the contact point when nothing is struck, m/s."""
-    return sqrt(initial_speed**2 + 2.0 * gravity * (drop + chain.length))
+    return math.sqrt(initial_speed**2 + 2.0 * gravity * (drop + chain.length))
 
 
 def _leg(distance: float, speed: float, gravity: float) -> tuple[float, float]:
     """Speed at the end of a free-fall leg and its duration."""
     if distance == 0.0:
         return speed, 0.0
-    arrival = sqrt(speed * speed + 2.0 * gravity * distance)
+    arrival = math.sqrt(speed * speed + 2.0 * gravity * distance)
     if speed + arrival == 0.0:
         raise _never_falls()
     return arrival, 2.0 * distance / (speed + arrival)

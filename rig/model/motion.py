@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from rig.model.fall import hits
@@ -93,8 +93,14 @@ class Motion:
         # Not the difference of two speeds: it has no digits left where α is tiny.
         self._steps = [hit.speed_before * gain for hit, gain in zip(self.hits, gains, strict=True)]
         self._gained = [0.0, *accumulate(self._steps)]
-        legs = [b - a for a, b in zip(self._times, self._times[1:], strict=False)]
-        grown = [gained * leg for gained, leg in zip(self._gained, legs, strict=False)]
+        # Nor the difference of two times: short legs late in a long fall would lose theirs.
+        self._legs = [
+            2.0 * (above - below) / (after + hit.speed_before) if above > below else 0.0
+            for (above, below), after, hit in zip(
+                pairwise(self._heights), self._speeds, self.hits, strict=False
+            )
+        ]
+        grown = [gained * leg for gained, leg in zip(self._gained, self._legs, strict=False)]
         self._separations = [0.0, *accumulate(grown)]
 
     @property
@@ -113,7 +119,9 @@ class Motion:
         if not 0.0 <= time_s <= self.end_s:
             raise ValueError(f"{time_s} s is outside the fall, 0 to {self.end_s} s")
         leg = min(bisect_right(self._times, time_s), len(self.hits)) - 1
-        since = time_s - self._times[leg]
+        since = min(time_s - self._times[leg], self._legs[leg])
+        if time_s == self.end_s:
+            since = self._legs[leg]
         speed = self._speeds[leg] + self.gravity * since
         fallen = (self._speeds[leg] + 0.5 * self.gravity * since) * since
         return Instant(

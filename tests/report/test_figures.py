@@ -3,11 +3,11 @@
 import copy
 from xml.etree import ElementTree
 
-import fake_analysis
 import pytest
 
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.pictures import pictures
+from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
 CURVES = fake_analysis.curves()

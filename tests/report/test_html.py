@@ -7,10 +7,9 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
-import fake_analysis
-
 from rig.report.html import ReportContext, report_html, write_report
 from rig.report.pictures import pictures
+from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains(repeats=4)
 CONTEXT = ReportContext(

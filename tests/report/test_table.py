@@ -1,10 +1,10 @@
 """Tables in the terminal, and the digits of numbers."""
 
-import fake_analysis
 import pytest
 
 from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.table import summary_table
+from tests.report import fake_analysis
 
 
 def test_summary_is_aligned() -> None:

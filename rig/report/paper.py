@@ -1,0 +1,126 @@
+"""The paper's figures, drawn anew from its equations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.model import paper
+from rig.model.fall import free_fall_speed
+from rig.report.canvas import INK, MODEL, MUTED, SECOND, canvas
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from matplotlib.axes import Axes
+
+    Columns = Mapping[str, list[float]]
+    _Kind = tuple[Callable[[], dict[str, list[float]]], Callable[[list[Axes], Columns], None], int]
+
+_LINE_HEIGHT = 0.17  # inches
+
+
+def paper_figure(number: int) -> tuple[str, dict[str, list[float]]]:
+    """Draw one of the paper's figures.
+
+    Parameters
+    ----------
+    number
+        3 (Δz and V against inclination), 4 (height against V²) or 6 (against rod inertia).
+
+    Returns
+    -------
+    svg, columns
+        The figure, with what the text says and the equations do not below it; and its numbers.
+
+    Raises
+    ------
+    InputError
+        If matplotlib is not installed.
+    """
+    compute, draw, panels = _KINDS[number]
+    columns = compute()
+    caption = _caption()
+    foot = _LINE_HEIGHT * (caption.count("\n") + 2)
+    with canvas((*((2.9,) * panels), foot), simulated=False) as drawing:
+        *axes, below = drawing.axes
+        draw(axes, columns)
+        below.axis("off")
+        below.text(0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes)
+        # The caption's panel must not take the labels of the axis all panels share.
+        axes[-1].tick_params(labelbottom=True)
+    return drawing.svg, columns
+
+
+def _caption() -> str:
+    said = "\n".join(f"· {claim.text}; equations: {claim.equations}" for claim in paper.claims())
+    return f"Where the paper's text (first) and its equations part:\n{said}"
+
+
+def _figure_3(axes: list[Axes], columns: Columns) -> None:
+    """Δz above, V below."""
+    for panel, name, scale, label in (
+        (axes[0], "separation_m", 100.0, "separation Δz (cm)"),
+        (axes[1], "speed_m_s", 1.0, "end speed V (m/s)"),
+    ):
+        for pile, style, words in ((0.0, "-", "rods on the surface"), (1.0, "--", "on a pile")):
+            rows = [i for i, flag in enumerate(columns["pile"]) if flag == pile]
+            # The rod does not slide between level and arctan μ: no line across.
+            inclines = [columns["incline_deg"][i] for i in rows]
+            values = [columns[name][i] * scale for i in rows]
+            start = 1 if not pile and inclines[0] == 0.0 else 0
+            if start:
+                panel.plot(inclines[:1], values[:1], "o", color=MODEL, markersize=4)
+            panel.plot(inclines[start:], values[start:], style, color=MODEL, label=words)
+        panel.set_ylabel(label)
+    axes[0].legend(loc="upper right")
+    axes[1].axhline(paper.TEXT_FREE_FALL_SPEED, color=SECOND, linestyle=":", linewidth=1.2)
+    axes[1].text(89, paper.TEXT_FREE_FALL_SPEED, "free fall in the text, 5.08 m/s ", color=SECOND,
+                 ha="right", va="top", fontsize=8)  # fmt: skip
+    axes[1].axhline(_free_fall(), color=MUTED, linestyle=":", linewidth=1.2)
+    axes[1].text(1, _free_fall(), " free fall by the equations", color=MUTED, va="bottom",
+                 fontsize=8)  # fmt: skip
+    axes[1].set_ylim(bottom=4.8)
+    axes[1].set_xlabel("inclination of the surface (°)")
+
+
+def _free_fall() -> float:
+    return free_fall_speed(paper.UNIFORM, paper.DROP, paper.GRAVITY)
+
+
+def _figure_4(axes: list[Axes], columns: Columns) -> None:
+    """Height against V², with the separation at the end."""
+    panel = axes[0]
+    for height, speed2, style, color, words in (
+        ("height_m", "speed2", "-", MODEL, "strikes the surface at 40°"),
+        ("free_height_m", "free_speed2", "--", INK, "falls freely"),
+    ):
+        heights = [100.0 * z for z in columns[height]]
+        panel.plot(columns[speed2], heights, style, color=color, label=words)
+    end = columns["free_speed2"][-1]
+    measured = 100.0 * paper.MEASURED_GRADED_SEPARATION
+    panel.plot([end], [measured], "s", color=SECOND, label="Δz = 17 cm measured")
+    panel.set_xlabel("V² (m²/s²)")
+    panel.set_ylabel("height of the top rod (cm)")
+    panel.legend(loc="upper right")
+
+
+def _figure_6(axes: list[Axes], columns: Columns) -> None:
+    """Against ξ, with the closed forms beside the discrete model."""
+    for panel, name, other, words, scale, label in (
+        (axes[0], "separation_m", "eq15_separation_m", "Eq. 15", 100.0, "separation Δz (cm)"),
+        (axes[1], "speed_m_s", "eq14_speed_m_s", "Eq. 14", 1.0, "end speed V (m/s)"),
+    ):
+        inertia = columns["inertia"]
+        panel.plot(inertia, [scale * v for v in columns[name]], color=MODEL, label="discrete model")
+        panel.plot(inertia, [scale * v for v in columns[other]], "--", color=INK, label=words)
+        panel.axvline(paper.UNIFORM.inertia, color=MUTED, linestyle=":", linewidth=1.2)
+        panel.set_ylabel(label)
+        panel.legend(loc="upper right")
+    axes[1].set_xlabel("rotational inertia of the rods, ξ (dotted: uniform rods, 1/3)")
+
+
+_KINDS: dict[int, _Kind] = {
+    3: (paper.figure_3, _figure_3, 2),
+    4: (paper.figure_4, _figure_4, 1),
+    6: (paper.figure_6, _figure_6, 2),
+}

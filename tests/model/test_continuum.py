@@ -1,0 +1,201 @@
+"""The continuum fall against 50 digits, and what may be changed without changing it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp
+
+from rig.errors import DomainError
+from rig.model.continuum import UniformChain, end, end_tanh_sinh, speed
+from tests.model.chains import ALPHAS, close, decades
+from tests.model.continuum_reference import closed_end, printed_end, printed_squared_speed
+
+# A sum of some hundred positive terms, each of a dozen roundings; 4e-15 is the worst seen.
+TIGHT = 1e-13
+
+REACHES = st.one_of(st.just(0.0), decades(-15, 6))
+DROPS = st.one_of(st.just(0.0), decades(-15, 9))
+GRAVITIES = decades(-6, 3)
+SPEEDS = st.one_of(st.just(0.0), decades(-6, 4))
+PAPER = UniformChain(1.165, 1.165 / 24, 0.15506060850816171, 4 / 3, 0.18, 9.81)
+
+
+def chain_of(length, reach, alpha, drop, gravity, initial_speed=0.0):
+    """γ = 1, so that the reach is given to the last digit."""
+    return UniformChain(length, reach, alpha, 1.0, drop, gravity, initial_speed)
+
+
+def check(found, wanted, relative):
+    assert close(found.lay_down_s, wanted.lay_down, relative)
+    assert close(found.speed_m_s, wanted.speed, relative)
+    assert close(found.separation_m, wanted.separation, relative)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        (1.165, 0.0647, 0.155, 0.18, 9.81),
+        (1.165, 0.0647, 1e-12, 0.18, 9.81),
+        (1.165, 0.0647, 0.155, 0.0, 9.81),
+        (1.165, 0.0647, 0.155, 1e-12, 9.81),
+        (1.165, 1e-6, 0.5, 0.0, 9.81),
+        (1.165, 100.0, 0.1, 0.1, 9.81),
+        (1.165, 0.0647, 0.155, 0.18, 9.81, 3.0),
+        (1.165, 0.0647, 0.155, 0.18, 0.0, 3.0),
+    ],
+)
+def test_agrees_with_the_printed_equations_in_50_digits(case):
+    wanted = printed_end(*case)
+    check(end(chain_of(*case)), wanted, 1e-14)
+    check(end_tanh_sinh(chain_of(*case), nodes=241), wanted, 1e-13)
+    if case[4] > 0.0:
+        with mp.workdps(50):
+            for printed, closed in zip(wanted, closed_end(*case), strict=True):
+                assert abs(printed / closed - 1) < mp.mpf(10) ** -25
+
+
+@settings(deadline=None, max_examples=150)
+@given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, SPEEDS)
+def test_agrees_with_the_closed_form(length, reach, alpha, drop, gravity, initial_speed):
+    case = (length, reach, alpha, drop, gravity, initial_speed)
+    check(end(chain_of(*case)), closed_end(*case), TIGHT)
+
+
+@settings(deadline=None, max_examples=60)
+@given(decades(-3, 3), REACHES, ALPHAS, st.sampled_from([0.0, 1e-3, 1.0, 1e6]), GRAVITIES)
+def test_a_second_rule_agrees_without_the_substitution(length, reach, alpha, share, gravity):
+    chain = chain_of(length, reach, alpha, share * length, gravity)
+    one, other = end(chain), end_tanh_sinh(chain)
+    assert close(one.separation_m, other.separation_m, 1e-12)
+    assert close(one.lay_down_s, other.lay_down_s, 1e-12)
+    assert one.speed_m_s == other.speed_m_s
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    decades(-3, 3), decades(-15, 6), ALPHAS, DROPS, GRAVITIES, SPEEDS, st.floats(0.0, 1.0)
+)  # fmt: skip
+def test_speed_is_equation_14(length, reach, alpha, drop, gravity, initial_speed, share):
+    z = share * length
+    found = speed(chain_of(length, reach, alpha, drop, gravity, initial_speed), z)
+    with mp.workdps(60):
+        given = map(mp.mpf, (z, length, reach, alpha, drop, gravity, initial_speed))
+        wanted = mp.sqrt(printed_squared_speed(*given))
+    assert close(found, float(wanted), 1e-14)
+
+
+def test_above_the_surface_the_chain_falls_freely():
+    chain = chain_of(2.0, 0.1, 0.3, 8.0, 9.0, 5.0)
+    assert speed(chain, 10.0) == 5.0
+    assert speed(chain, 7.0) == math.sqrt(25.0 + 2 * 9.0 * 3.0)
+    assert speed(chain, 2.0) == chain.strike_speed == 13.0
+
+
+@settings(deadline=None, max_examples=100)
+@given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, GRAVITIES)
+def test_separation_does_not_depend_on_gravity(length, reach, alpha, drop, here, there):
+    one, other = (end(chain_of(length, reach, alpha, drop, g)) for g in (here, there))
+    root = math.sqrt(there / here)
+    assert close(one.separation_m, other.separation_m, TIGHT)
+    assert one.speed_m_s == other.speed_m_s or close(one.speed_m_s * root, other.speed_m_s, TIGHT)
+    assert close(one.time_s, other.time_s * root, TIGHT)
+
+
+@settings(deadline=None, max_examples=60)
+@given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, SPEEDS, st.integers(-15, 15))
+def test_a_larger_scene_is_the_same_scene(length, reach, alpha, drop, gravity, start, n):
+    """All lengths by 4^n and speeds by 2^n: Δz by 4^n, t by 2^n, to the last bit."""
+    size, root = 4.0**n, 2.0**n
+    one = end(chain_of(length, reach, alpha, drop, gravity, start))
+    other = end(
+        chain_of(length * size, reach * size, alpha, drop * size, gravity, start * root)
+    )  # fmt: skip
+    assert other.separation_m == one.separation_m * size
+    assert other.speed_m_s == one.speed_m_s * root
+    assert other.time_s == one.time_s * root
+
+
+@settings(deadline=None, max_examples=60)
+@given(decades(-3, 3), REACHES, ALPHAS, decades(-6, 3), GRAVITIES, st.floats(0.0, 1.0))
+def test_the_drop_can_be_cut_in_two(length, reach, alpha, drop, gravity, share):
+    lower = drop * share
+    passing = math.sqrt(2.0 * gravity * (drop - lower))
+    whole = end(chain_of(length, reach, alpha, drop, gravity))
+    rest = end(chain_of(length, reach, alpha, lower, gravity, passing))
+    assert close(rest.separation_m, whole.separation_m, TIGHT)
+    assert close(rest.lay_down_s, whole.lay_down_s, TIGHT)
+    assert close(rest.time_s + passing / gravity, whole.time_s, TIGHT)
+
+
+@settings(deadline=None, max_examples=60)
+@given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, SPEEDS, decades(-3, 1))
+def test_a_stronger_pull_is_never_slower(length, reach, alpha, drop, gravity, start, more):
+    weak = end(chain_of(length, reach, alpha, drop, gravity, start))
+    strong = end(chain_of(length, reach, alpha * (1.0 + more), drop, gravity, start))
+    assert 0.0 < weak.separation_m < strong.separation_m < length
+    assert weak.speed_m_s <= strong.speed_m_s * (1.0 + TIGHT)
+    assert strong.lay_down_s <= weak.lay_down_s * (1.0 + TIGHT)
+
+
+def test_only_the_product_of_gamma_and_spacing_counts():
+    chain = chain_of(1.165, 0.06, 0.15, 0.18, 9.81)
+    assert end(replace(chain, spacing_m=0.03, gamma=2.0)) == end(chain)
+
+
+def test_time_counts_from_release():
+    found = end(PAPER)
+    assert found.time_s == pytest.approx(found.lay_down_s + math.sqrt(2 * 0.18 / 9.81), rel=1e-15)
+    moving = end(replace(PAPER, initial_speed=2.0))
+    assert moving.time_s - moving.lay_down_s == pytest.approx(
+        (math.sqrt(4 + 2 * 9.81 * 0.18) - 2) / 9.81, rel=1e-14
+    )
+
+
+def test_nodes_and_panels_can_be_chosen_and_are_counted():
+    fine = end(PAPER, nodes=30, panels=10)
+    assert fine.evaluations == 300
+    errors = []
+    for nodes in (2, 3, 4, 6, 8):
+        found = end(PAPER, nodes=nodes, panels=3)
+        assert found.evaluations == 3 * nodes
+        errors.append(abs(found.separation_m / fine.separation_m - 1.0))
+    # Two orders a node, and nothing left to gain at eight.
+    assert errors[1] < 3e-6
+    assert errors[2] < 1e-8
+    assert errors[3] < 1e-12
+    assert errors[4] < 2e-15
+    assert end_tanh_sinh(PAPER, nodes=51).evaluations == 51 * 52
+    coarse, better = (
+        abs(end_tanh_sinh(PAPER, nodes=n).separation_m / fine.separation_m - 1) for n in (21, 41)
+    )
+    assert better < 1e-3 * coarse
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"length_m": 0.0}, "no chain"),
+        ({"length_m": -1.0}, "length_m"),
+        ({"spacing_m": -1.0}, "spacing_m"),
+        ({"alpha": -0.1}, "alpha"),
+        ({"gamma": math.nan}, "gamma"),
+        ({"drop_m": math.inf}, "drop_m"),
+        ({"gravity": -9.81}, "gravity"),
+        ({"initial_speed": -1.0}, "initial_speed"),
+        ({"gravity": 0.0}, "never falls"),
+    ],
+)
+def test_says_what_is_wrong_with_a_chain(change, message):
+    with pytest.raises(DomainError, match=message):
+        replace(PAPER, **change)
+
+
+def test_there_is_no_speed_outside_the_fall():
+    for height in (-1e-9, 1.165 + 0.18 + 1e-9):
+        with pytest.raises(ValueError, match="outside the fall"):
+            speed(PAPER, height)

@@ -1,0 +1,71 @@
+"""The quadrature rules against integrals known exactly."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from rig.model.quadrature import gauss, tanh_sinh
+from tests.model.chains import close
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 16, 40, 100])
+def test_gauss_is_exact_for_polynomials(count):
+    rule = gauss(count)
+    for degree in {0, 1, count, 2 * count - 2, 2 * count - 1}:
+        exact = 0.0 if degree % 2 else 2 / (degree + 1)
+        assert float(rule.weights @ rule.nodes**degree) == pytest.approx(
+            exact, rel=1e-13, abs=1e-14
+        )
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 16, 40, 100])
+def test_running_integrals_are_exact_for_polynomials(count):
+    rule = gauss(count)
+    for degree in {0, count // 2, count - 1}:
+        exact = (rule.nodes ** (degree + 1) - (-1) ** (degree + 1)) / (degree + 1)
+        np.testing.assert_allclose(rule.running @ rule.nodes**degree, exact, rtol=0, atol=5e-15)
+
+
+def test_running_integrals_converge_faster_than_any_power():
+    def error(count):
+        rule = gauss(count)
+        exact = np.exp(rule.nodes) - math.exp(-1)
+        return float(np.max(np.abs(rule.running @ np.exp(rule.nodes) - exact)))
+
+    assert error(4) < 2e-3
+    assert error(8) < 2e-8
+    assert error(14) < 4e-15
+
+
+def test_rules_are_shared_and_cannot_be_spoilt():
+    assert gauss(7) is gauss(7)
+    with pytest.raises(ValueError, match="read-only"):
+        gauss(7).weights[0] = 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        tanh_sinh(7).nodes[0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("function", "exact"),
+    [
+        (np.ones_like, 1.0),
+        (np.sqrt, 2 / 3),
+        (lambda x: 1 / np.sqrt(x), 2.0),
+        (lambda x: -np.log(x), 1.0),
+        (lambda x: 1 / (1 + x), math.log(2)),
+    ],
+)
+def test_tanh_sinh_does_not_mind_what_happens_at_an_end(function, exact):
+    rule = tanh_sinh(121)
+    assert close(float(rule.weights @ function(rule.nodes)), exact, 3e-15)
+
+
+def test_tanh_sinh_nodes_keep_their_digits_near_zero():
+    nodes = tanh_sinh(81).nodes
+    assert 0.0 < nodes[0] < 1e-37
+    for u, x in ((-4.0, nodes[0]), (-2.0, nodes[20]), (0.0, nodes[40])):
+        assert close(x, float(1 / (1 + Fraction(math.exp(-math.pi * math.sinh(u))))), 1e-13)

@@ -1,0 +1,232 @@
+"""Rods that differ in inertia: against direct solutions of the paper's equations of motion.
+
+The equations are solved in kilograms, metres and newton seconds for one drawn rod and chain, with
+every impulse and every change of motion an unknown of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from mpmath import mp
+
+from rig.errors import DomainError
+from rig.model.chain import Chain
+from rig.model.fall import kicks
+from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
+from rig.model.motion import Motion
+from rig.model.rods import rod_impacts
+from rig.model.surface import Pile, Surface
+from rig.units import Quantity
+from tests.model.chains import close, decades, even_chain
+
+TIGHT = 1e-13
+RESTITUTIONS = st.floats(-0.9, 1.0)
+INERTIAS = st.floats(0.02, 1.0)
+INCLINES = st.floats(12.0, 85.0)
+FRICTIONS = st.floats(0.0, 0.2)
+LENGTH, SPEED = 0.102, 5.3
+SURFACE = Surface(Quantity(0.5), Quantity(0.2))
+LEVEL_PILE = Surface(Quantity(0.5), Quantity(0.2), Pile(30.0, Quantity(-0.37)))
+
+
+def solve(rows):
+    with mp.workdps(60):
+        system = mp.matrix([row[:-1] for row in rows])
+        return mp.lu_solve(system, mp.matrix([row[-1] for row in rows]))
+
+
+def level_pull(beta, mass, inertia, masses_above, inertias_above):
+    """J from Eqs. 3, 4, S1 and S2, with the ends' velocities of S3 to S6.
+
+    Unknowns: impulses F and N; changes of V_z, ω, V_z' and ω'; U_R and U_L. Upward is positive, and
+    ω turns the right end up. The torques on all rods above turn them together: I' is their sum.
+    """
+    with mp.workdps(60):
+        beta, v, half = mp.mpf(beta), mp.mpf(SPEED), mp.mpf(LENGTH) / 2
+        m, total = mp.mpf(mass), mp.fsum(masses_above)
+        i = mp.mpf(inertia) * m * half**2  # ξ = 4I/(mL²)
+        i_above = mp.fsum(
+            xi * mp.mpf(one) * half**2 for xi, one in zip(inertias_above, masses_above, strict=True)
+        )
+        rows = [
+            # F, N, ΔV_z, Δω, ΔV_z', Δω', U_R, U_L | right-hand side
+            [1, 1, -m, 0, 0, 0, 0, 0, 0],  # Eq. 3
+            [half, -half, 0, -i, 0, 0, 0, 0, 0],  # Eq. 4
+            [1, 0, 0, 0, total, 0, 0, 0, 0],  # S1
+            [half, 0, 0, 0, 0, i_above, 0, 0, 0],  # S2
+            [0, 0, 1, -half, 0, 0, 0, 0, (1 + beta) * v],  # S3: −V → +βV
+            [0, 0, 1, half, 0, 0, 1, 0, v],  # S4: −V → −U_R
+            [0, 0, 0, 0, 1, half, 1, 0, v],  # S5: −V → −U_R
+            [0, 0, 0, 0, 1, -half, 0, 1, v],  # S6: −V → −U_L
+        ]
+    return solve(rows)[0]
+
+
+def inclined_pull(beta, mu, incline_deg, mass, inertia_y, inertia_z):
+    """J from Eqs. S7 to S12 and f = μN.
+
+    Unknowns: impulses N, f and F; changes of V_z, ω, V_y and ψ. The left end is struck: it moves
+    at V_z − ωL/2 and, ψ being counted as S10 does, at V_y + ψL/2.
+    """
+    with mp.workdps(60):
+        theta = mp.radians(mp.mpf(incline_deg))
+        cos, sin = mp.cos(theta), mp.sin(theta)
+        half, m, v, mu = mp.mpf(LENGTH) / 2, mp.mpf(mass), mp.mpf(SPEED), mp.mpf(mu)
+        i_y, i_z = (mp.mpf(xi) * m * half**2 for xi in (inertia_y, inertia_z))
+        rows = [
+            # N, f, F, ΔV_z, Δω, ΔV_y, Δψ | right-hand side
+            [cos, sin, 1, -m, 0, 0, 0, 0],  # S7
+            [-half * cos, -half * sin, half, 0, -i_y, 0, 0, 0],  # S8
+            [sin, -cos, 0, 0, 0, -m, 0, 0],  # S9
+            [half * sin, -half * cos, 0, 0, 0, 0, -i_z, 0],  # S10
+            [0, 0, 0, cos, -half * cos, sin, half * sin, (1 + mp.mpf(beta)) * v * cos],  # S11
+            [0, 0, 0, 1, half, 0, 0, 0],  # S12
+            [mu, -1, 0, 0, 0, 0, 0, 0],
+        ]
+    return solve(rows)[2]
+
+
+def unlike_chains(most=6, mass_decades=2.0):
+    def build(masses, inertias):
+        size = len(masses)
+        heights = tuple(0.05 * k for k in range(size))
+        return Chain(tuple(masses), heights, inertias=tuple(inertias[:size]))
+
+    masses = st.lists(decades(-mass_decades, mass_decades), min_size=2, max_size=most)
+    return st.builds(build, masses, st.lists(INERTIAS, min_size=most, max_size=most))
+
+
+@settings(deadline=None, max_examples=60)
+@given(unlike_chains(), RESTITUTIONS)
+def test_unlike_rods_solve_the_equations_of_motion_on_the_level(chain, beta):
+    found = rod_impacts(Surface(Quantity(beta), Quantity(0.2)), chain, 0.0)
+    assert len(found) == chain.rods
+    gains = kicks(chain, [one.alpha for one in found], [one.gamma for one in found])
+    for k, (gain, impact) in enumerate(zip(gains[:-1], found, strict=False)):
+        m, rest = chain.masses[k], chain.masses[k + 1 :]
+        pull = level_pull(beta, m, chain.inertias[k], rest, chain.inertias[k + 1 :])
+        # Eq. 9, and the gain that a fall is made of; α has the digits of 1 − ξ.
+        loose = TIGHT / max(1.0 - chain.inertias[k], 1e-3)
+        wanted = float(pull) / SPEED
+        assert impact.alpha * m / (1.0 + impact.gamma * m / math.fsum(rest)) == pytest.approx(
+            wanted, rel=loose, abs=1e-15 * m
+        )
+        assert gain * math.fsum(rest) == pytest.approx(wanted, rel=loose, abs=1e-15 * m)
+
+
+@settings(deadline=None, max_examples=60)
+@given(unlike_chains(), RESTITUTIONS, FRICTIONS, INCLINES, st.one_of(st.none(), INERTIAS))
+def test_unlike_rods_solve_the_equations_of_motion_on_an_incline(
+    chain, beta, mu, incline, inertia_z
+):
+    """ξ_z is the rod's own ξ, or the chain's where it has one."""
+    chain = replace(chain, inertia_z=inertia_z)
+    found = rod_impacts(Surface(Quantity(beta), Quantity(mu)), chain, incline)
+    for mass, xi, impact in zip(chain.masses, chain.inertias, found, strict=True):
+        pull = inclined_pull(beta, mu, incline, mass, xi, inertia_z or xi)
+        loose = TIGHT / max(1.0 - xi, 1e-3)
+        assert impact.alpha == pytest.approx(float(pull) / mass / SPEED, rel=loose, abs=1e-15)
+
+
+@settings(deadline=None, max_examples=80)
+@given(RESTITUTIONS, FRICTIONS, INCLINES, st.floats(0.02, 0.98), INERTIAS)
+def test_unlike_axes_solve_the_equations_of_motion(beta, mu, incline, inertia, inertia_z):
+    """Eq. 13 with ξ_y ≠ ξ_z, for a chain of like rods."""
+    wanted = float(inclined_pull(beta, mu, incline, 0.012, inertia, inertia_z) / 0.012 / SPEED)
+    assert close(alpha_inclined(beta, mu, incline, inertia, inertia_z), wanted, TIGHT)
+    chain = replace(even_chain(3), inertia=inertia, inertia_z=inertia_z)
+    impact = impact_on(Surface(Quantity(beta), Quantity(mu)), chain, incline)
+    assert close(impact.alpha, wanted, TIGHT)
+    # γ is about the horizontal axis and knows nothing of ξ_z.
+    assert impact.gamma == gamma_finite(inertia)
+
+
+def test_the_axis_matters_only_on_an_incline():
+    thin = replace(even_chain(3), inertia_z=0.05)
+    assert impact_on(SURFACE, thin, 0.0) == impact_on(SURFACE, even_chain(3), 0.0)
+    assert (
+        impact_on(SURFACE, thin, 40.0).alpha < 0.7 * impact_on(SURFACE, even_chain(3), 40.0).alpha
+    )
+
+
+@settings(deadline=None, max_examples=60)
+@given(unlike_chains(), st.floats(0.02, 1.0), st.sampled_from([0.0, 20.0, 40.0, 80.0]))
+def test_like_rods_given_one_by_one_are_like_rods(chain, inertia, incline):
+    one_by_one = replace(chain, inertias=(inertia,) * chain.rods)
+    like = replace(chain, inertia=inertia, inertias=None)
+    for surface in (SURFACE, LEVEL_PILE):
+        wanted = impact_on(surface, like, incline)
+        assert rod_impacts(surface, like, incline) == [wanted] * chain.rods
+        for found in rod_impacts(surface, one_by_one, incline):
+            assert close(found.gamma, wanted.gamma, 1e-15 * chain.rods)
+            assert replace(found, gamma=wanted.gamma) == wanted
+
+
+@settings(deadline=None, max_examples=40)
+@given(unlike_chains(most=4))
+def test_splitting_a_rod_above_changes_nothing_below(chain):
+    """I' is a sum: two half rods in the place of one turn the chain above as it did."""
+    masses = (*chain.masses[:-1], chain.masses[-1] / 2, chain.masses[-1] / 2)
+    heights = (*chain.heights, chain.length + 0.01)
+    split = Chain(masses, heights, inertias=(*chain.inertias, chain.inertias[-1]))
+    for one, other in zip(
+        rod_impacts(SURFACE, chain, 40.0)[:-1], rod_impacts(SURFACE, split, 40.0), strict=False
+    ):
+        assert close(one.gamma, other.gamma, 1e-14)
+        assert one.alpha == other.alpha
+
+
+def test_by_hand():
+    chain = Chain((2.0, 1.0, 3.0), (0.0, 0.1, 0.2), inertias=(0.5, 0.2, 0.4))
+    bottom, middle, top = rod_impacts(SURFACE, chain, 0.0)
+    assert bottom.alpha == pytest.approx(1.5 / 4 * 0.5, rel=1e-15)
+    assert bottom.gamma == pytest.approx(0.25 * 1.5 * (1 + 1 / 0.35), rel=1e-15)
+    assert middle.alpha == pytest.approx(1.5 / 4 * 0.8, rel=1e-15)
+    assert middle.gamma == pytest.approx(0.25 * 1.2 * (1 + 1 / 0.4), rel=1e-15)
+    assert top.alpha == pytest.approx(1.5 / 4 * 0.6, rel=1e-15)
+    assert kicks(chain, [bottom.alpha, middle.alpha, top.alpha], [1.0, 1.0, 1.0])[-1] == 0.0
+
+
+def test_a_pile_is_level_and_softer_for_each_rod():
+    chain = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.2, 0.4))
+    for xi, impact in zip(chain.inertias, rod_impacts(LEVEL_PILE, chain, 20.0), strict=True):
+        assert impact.basis == "pile"
+        assert impact.alpha == alpha_level(-0.37, xi)
+
+
+def test_given_coefficients_win():
+    rods = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.2, 0.4))
+    beads = replace(rods, alpha=Quantity(0.12))
+    assert {(one.alpha, one.gamma, one.basis) for one in rod_impacts(SURFACE, beads, 40.0)} == {
+        (0.12, 0.0, "given")
+    }
+    stiff = replace(rods, gamma=0.7)
+    assert {one.gamma for one in rod_impacts(SURFACE, stiff, 40.0)} == {0.7}
+    assert len({one.alpha for one in rod_impacts(SURFACE, stiff, 40.0)}) == 3
+
+
+def test_one_singular_rod_is_enough():
+    slow = Surface(Quantity(0.5), Quantity(1.0))
+    chain = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.01, 0.4))
+    with pytest.raises(DomainError, match="singular"):
+        rod_impacts(slow, chain, 20.0)
+    assert rod_impacts(slow, replace(chain, inertias=(0.3, 0.3, 0.4)), 20.0)
+
+
+@settings(deadline=None, max_examples=80)
+@given(unlike_chains(mass_decades=4.0), RESTITUTIONS, FRICTIONS, INCLINES, decades(-3, 1))
+def test_unlike_rods_lose_energy_and_never_gain_any(chain, beta, mu, incline, drop):
+    impacts = rod_impacts(Surface(Quantity(beta), Quantity(mu)), chain, incline)
+    assume(all(0.0 <= one.alpha <= 0.5 for one in impacts))
+    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    blows = Motion(chain, gains, drop, 9.81).blows()
+    assert all(blow.lost >= -TIGHT * blow.brought for blow in blows)
+    potential = 9.81 * math.fsum(
+        m * (drop + z) for m, z in zip(chain.masses, chain.heights, strict=True)
+    )
+    assert math.fsum(blow.lost for blow in blows) == pytest.approx(potential, rel=1e-12)
