@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from contextlib import suppress
 from importlib import import_module
+from io import TextIOWrapper
 from typing import TYPE_CHECKING
 
 from rig import __version__
@@ -14,6 +16,7 @@ from rig.errors import RigError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+BAD_INPUT = 2
 INTERRUPTED = 130
 
 
@@ -25,21 +28,46 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     # The matrices here are small: more threads only get into each other's way.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _open_streams()
     arguments = _parser().parse_args(argv)
     try:
         code: int = import_module(f"rig.commands.{arguments.module}").main(arguments)
         sys.stdout.flush()
     except RigError as error:
-        print(error, file=sys.stderr)
+        _say(error)
         return error.exit_code
     except KeyboardInterrupt:
-        print("rig: interrupted; the same command goes on from here", file=sys.stderr)
+        _say("rig: interrupted; the same command goes on from here")
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has seen enough; nothing more can be written to it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read our output has seen enough.
+        _silence_stdout()
         return 0
+    except OSError as error:
+        _say(f"rig: {error}")
+        _silence_stdout()
+        return BAD_INPUT
     return code
+
+
+def _open_streams() -> None:
+    """Give a closed stdout or stderr a place to go, and an old terminal ``?`` for a Δ it lacks."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            setattr(sys, name, os.fdopen(nowhere, "w", encoding="utf-8", closefd=False))
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+
+
+def _say(what: object) -> None:
+    with suppress(OSError):  # nobody listens any more
+        print(what, file=sys.stderr, flush=True)
+
+
+def _silence_stdout() -> None:
+    """Let what could not be written vanish: Python would try once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -72,7 +100,13 @@ def _parser() -> argparse.ArgumentParser:
     _protocol(command("check", "say what a protocol's scene has and what follows from it"))
 
     predict = command("predict", "say what the model expects")
-    _protocol(predict)
+    predict.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="the protocol file (YAML)")
+    predict.add_argument(
+        "--figure", type=int, choices=(3, 4, 6), help="draw this figure of the paper instead"
+    )
+    predict.add_argument(
+        "-o", "--output", metavar="FILE.svg", help="the figure; its numbers go to FILE.csv"
+    )
     _json(predict)
 
     imported = command("import", "make a session from the edges of another timer", "import_edges")
@@ -104,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
 
     _session(command("replay", "feed the recorded bytes through the whole stack and compare"))
 
-    bench = command("bench", "measure accuracy against the simulation's hidden truth")
+    bench = command("bench", "measure accuracy against hidden truth, and speed as ratios")
     benches = bench.add_subparsers(required=True, metavar="BENCH")
     accuracy = benches.add_parser("accuracy", help="errors of Δz, V and skew, coverage, matches")
     accuracy.set_defaults(module="bench_accuracy")
@@ -112,9 +146,34 @@ def _parser() -> argparse.ArgumentParser:
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
     accuracy.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
-    accuracy.add_argument("--seeds", type=int, default=5, metavar="N", help="sessions to simulate")
+    accuracy.add_argument(
+        "--seeds", type=_count, default=5, metavar="N", help="sessions to simulate"
+    )
     _json(accuracy)
+    stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
+    stability.set_defaults(module="bench_stability")
+    stability.add_argument("-o", "--output", metavar="DIR", help="folder for CSV and JSON")
+    _json(stability)
+    precision = benches.add_parser("precision", help="error against run time of every method")
+    precision.set_defaults(module="bench_precision")
+    precision.add_argument(
+        "-o", "--output", required=True, metavar="DIR", help="folder for CSV, JSON and pictures"
+    )
+    precision.add_argument("--quick", action="store_true", help="a small subset, in seconds")
+    _json(precision)
+    bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
+    bulk.set_defaults(module="bench_bulk")
+    bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")
+    bulk.add_argument("--rounds", type=_count, default=15, metavar="N", help="of measurement")
+    _json(bulk)
     return parser
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text} is too few: at least 1 is needed")
+    return number
 
 
 def _protocol(parser: argparse.ArgumentParser) -> None:

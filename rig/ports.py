@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl, urlencode, urlsplit
+from pathlib import Path
+from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
-if TYPE_CHECKING:
-    from pathlib import Path
+from rig.errors import InputError
 
 SIMULATED = ("sim", "emu")
 """URL schemes behind which no real chain falls."""
+_BYTES = "surrogateescape"  # a file's name need not be UTF-8
+_FILES = {"protocol", "truth"}
 
 
 def is_simulated(url: str) -> bool:
     """Whether data from this port must be stamped as simulated."""
-    return urlsplit(url).scheme in SIMULATED
+    return _split(url).scheme in SIMULATED
 
 
-def completed(url: str, protocol: Path, session: Path, seed: int | None) -> str:
+def completed(url: str, protocol: Path, session: Path, seed: int | None, before: str = "") -> str:
     """Tell a simulation its scene, seed and where to keep the hidden truth.
 
     Parameters
@@ -30,20 +31,69 @@ def completed(url: str, protocol: Path, session: Path, seed: int | None) -> str:
         The session file; the truth is kept beside it.
     seed
         `None` for 0.
+    before
+        What `told` gave for a session that is continued: its rig and chains stay the same, and
+        so does every dial that the user does not turn.
+
+    Raises
+    ------
+    InputError
+        No URL, or one that asks for other chains than `before`.
     """
     if not is_simulated(url):
         return url
-    parts = urlsplit(url)
-    settings = dict(parse_qsl(parts.query, keep_blank_values=True))
-    settings.setdefault("protocol", str(protocol.resolve()))
-    settings.setdefault("truth", str(truth_file(session)))
+    parts = _split(url)
+    settings = _settings(parts)
     if seed is not None:
         settings["seed"] = str(seed)
+    old = _split(before)
+    if old.scheme == parts.scheme:
+        known = _settings(old)
+        seeds = known.get("seed", "0"), settings.get("seed", known.get("seed", "0"))
+        if seeds[0] != seeds[1]:
+            raise InputError(
+                f"{session} was simulated with seed {seeds[0]}: seed {seeds[1]} means other chains",
+                "leave the seed out to continue it, or give a new session file",
+            )
+        settings = known | settings
+    settings.setdefault("protocol", str(protocol.resolve()))
+    settings.setdefault("truth", str(truth_file(session)))
     settings.setdefault("seed", "0")
-    # urlunsplit would drop the empty authority that pyserial looks for.
-    return f"{parts.scheme}://{parts.netloc}{parts.path}?{urlencode(settings)}"
+    return _joined(parts, settings)
+
+
+def told(url: str) -> str:
+    """Return a port's URL for the record: a simulation's without the names of files."""
+    if not is_simulated(url):
+        return url
+    parts = _split(url)
+    settings = _settings(parts)
+    return _joined(parts, {name: settings[name] for name in settings if name not in _FILES})
 
 
 def truth_file(session: Path) -> Path:
     """Where a simulation keeps the truth of a session."""
-    return session.with_name(session.name + ".truth.jsonl")
+    return Path(f"{session}.truth.jsonl")  # with_name would not take a folder's root
+
+
+def _split(url: str) -> SplitResult:
+    try:
+        return urlsplit(url)
+    except ValueError as error:
+        raise InputError(
+            f"{url} is no port: {error}", "a device path, or a URL such as sim://"
+        ) from None
+
+
+def _settings(parts: SplitResult) -> dict[str, str]:
+    settings: dict[str, str] = {}
+    for name, text in parse_qsl(parts.query, keep_blank_values=True, errors=_BYTES):
+        if name in settings:
+            raise InputError(f"{parts.scheme}://: {name} is given twice")
+        settings[name] = text
+    return settings
+
+
+def _joined(parts: SplitResult, settings: dict[str, str]) -> str:
+    # urlunsplit would drop the empty authority that pyserial looks for.
+    return f"{parts.scheme}://{parts.netloc}{parts.path}?{urlencode(settings, errors=_BYTES)}"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rig.records import Drop, Ping
     from rig.session.reading import Reader
 
-_APART_NS = 6 * 3600 * 10**9  # further apart than any wrap of the tick can be bridged
+_APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
 _UNKNOWN = RESONATOR_TOLERANCE / 3**0.5
 
 
@@ -53,15 +53,16 @@ def calibration(session: Reader) -> Calibration:
     """Calibrate a session's clock from everything it recorded."""
     identities = session.identities()
     nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
+    u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
     if nominal is None:
-        u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
         return Calibration(
             None,
             "times as the file gives them",
             {"source": "times as the file gives them", "relative_u": u},
             u,
         )
-    rate = tick_rate(_one_after_another(session.pings()), nominal, [ns for ns, _ in identities])
+    pings, boots_ns = _one_after_another(session.pings(), [ns for ns, _ in identities])
+    rate = tick_rate(pings, nominal, boots_ns)
     source = (
         f"device against host clock, {rate.n} samples"
         if rate.n
@@ -79,22 +80,31 @@ def calibration(session: Reader) -> Calibration:
             "samples": rate.n,
             "span_s": rate.span_s,
         },
+        u,
     )
 
 
-def _one_after_another(pings: list[Ping]) -> list[Ping]:
-    """Keep samples of separate connections apart: a host's clock may begin again in between."""
+def _one_after_another(pings: list[Ping], identities_ns: list[int]) -> tuple[list[Ping], list[int]]:
+    """Put samples into one order of time where the host's clock began again in between.
+
+    Also return when the device may have restarted: at each of those breaks, and wherever it said
+    who it is. By which clock it said so is not known, so it is said by each.
+    """
     found: list[Ping] = []
+    boots_ns = list(identities_ns)
     shift = 0
     for ping in pings:
         if found and ping.host_send_ns + shift < found[-1].host_recv_ns:
-            shift = found[-1].host_recv_ns + _APART_NS - ping.host_send_ns
+            last_ns = found[-1].host_recv_ns
+            shift = last_ns + _APART_NS - ping.host_send_ns
+            # How far apart the two really are nobody knows: no line may go through both.
+            boots_ns += [last_ns, *(ns + shift for ns in identities_ns)]
         found.append(
             ping._replace(
                 host_send_ns=ping.host_send_ns + shift, host_recv_ns=ping.host_recv_ns + shift
             )
         )
-    return found
+    return found, boots_ns
 
 
 def protocol_of(session: Reader) -> Protocol:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.analysis.drop import analyze_drop
+from rig.daemon.interrupts import Interrupts
 from rig.daemon.station import Station
 from rig.errors import DeviceError, InputError, SessionError
 from rig.link.messages import Reason
@@ -32,6 +33,10 @@ ATTEMPTS = 3
 """How often a void run is made before it stays void."""
 _SETTLED = (RunState.ACCEPTED, RunState.MARGINAL, RunState.REJECTED)
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
+_CLOCK_U = 1e-4
+"""How well the device's clock must be known before a drop, relative: a resonator that is off by
+0.13 % spreads a chain's edges over the wrong rods."""
+_CLOCK_S = 2.0  # of clock samples are plenty for that
 _LOOKS = 5  # how often a blocked gate is looked at again when nobody is there to clear it
 
 
@@ -52,7 +57,12 @@ class Operator:
 
 
 def run_protocol(
-    source: str, url: str, session_path: str, operator: Operator, seed: int | None = None
+    source: str,
+    url: str,
+    session_path: str,
+    operator: Operator,
+    seed: int | None = None,
+    interrupts: Interrupts | None = None,
 ) -> dict[str, Any]:
     """Carry out a plan, or what is left of it, and analyse the session.
 
@@ -68,6 +78,8 @@ def run_protocol(
         Who prepares each drop and is told about it.
     seed
         Of a simulation.
+    interrupts
+        What stops the campaign: see `Station`.
 
     Returns
     -------
@@ -88,16 +100,25 @@ def run_protocol(
             f"rig predict {source} says what the model expects",
         )
     path = Path(session_path)
-    url = completed(url, Path(source), path, seed)
-    with _session(protocol, Path(source), url, path) as session:
-        if session.states() and is_simulated(url):
-            url = session.meta["origin"]  # the same rig, the same chains
-        with Station(session, url) as station:
+    fresh = completed(url, Path(source), path, seed)
+    interrupts = Interrupts() if interrupts is None else interrupts
+    with _session(protocol, Path(source), fresh, path) as session:
+        before = _port_before(session)
+        url = completed(url, Path(source), path, seed, before)
+        with Station(session, url, interrupts) as station:
             Campaign(protocol, station, operator).carry_out()
         operator.say("analysing the session …")
         found = results(session)
-        session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
+        with interrupts.held():
+            session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
+            session.commit()
         return found
+
+
+def _port_before(session: Session) -> str:
+    """Say which port the session was recorded at so far; empty for none."""
+    ports = [str(identity["port"]) for _, identity in session.identities() if "port" in identity]
+    return ports[-1] if ports else ""
 
 
 def _session(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
@@ -148,6 +169,9 @@ class Campaign:
 
     def carry_out(self) -> None:
         """Do every run that is not done yet, in order."""
+        with self.station.interrupts.held():
+            self.session.put_results([], __version__)  # of less than there will be
+            self.session.commit()
         self._rescue()
         for run in self.plan:
             while (attempt := self._next_attempt(run)) is not None:
@@ -196,12 +220,14 @@ class Campaign:
         self._prepare(run, attempt)
         station = self.station
         token = self._arm(run, attempt)
-        try:
-            station.fire(token)
-            drop = station.collect(run.number, attempt)
-        except KeyboardInterrupt:
-            self._interrupted(run, attempt)
-            raise
+        # A chain that falls is recorded to the end: it took somebody minutes to hang.
+        with station.interrupts.held():
+            try:
+                station.fire(token)
+                drop = station.collect(run.number, attempt)
+            except KeyboardInterrupt:
+                self._interrupted(run, attempt)
+                raise
         self._judge(run, drop)
 
     def _prepare(self, run: Run, attempt: int) -> None:
@@ -209,7 +235,11 @@ class Campaign:
         again = f", attempt {attempt}" if attempt > 1 else ""
         if self.operator.ask is not None:
             self.operator.ask(f"run {run.number} of {len(self.plan)}{again}: {what_to_hang(run)}")
-        self.station.wait(self.protocol.plan.settle)
+        settle = self.protocol.plan.settle
+        clock = calibration(self.session).device
+        if clock is None or clock.u > _CLOCK_U:
+            settle = max(settle, _CLOCK_S)
+        self.station.wait(settle)
 
     def _arm(self, run: Run, attempt: int) -> int:
         """Arm, and go on asking for free beams as long as one is blocked."""

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
     Matches = Mapping[str, Sequence[Index]]
 
-_STEPS = 12
+_STEPS = 60
 _DONE = 1e-6  # of a standard uncertainty
+_STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 _HUBER = 4.0  # standard deviations beyond which an edge counts less
 
 
@@ -40,6 +41,8 @@ class Estimate:
         Of the edges: weighted sum of squares, and number of edges less what they determine.
     scatter
         How much more the edges scatter than assumed; at least 1, and already allowed for.
+    settled
+        Whether the steps came to an end.
     """
 
     x: Array
@@ -49,6 +52,7 @@ class Estimate:
     chi2: float
     degrees: float
     scatter: float
+    settled: bool = True
 
 
 def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
@@ -69,6 +73,7 @@ def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
     information = data = np.eye(x.size)
     chi2, degrees = 0.0, 0.0
     inflation = 1.0
+    settled = False
     for step in range(_STEPS):
         rows = [model.equations(role, scaled * sd, match) for role, match in matches.items()]
         sigma = np.concatenate([row.sigma for row in rows]) * inflation
@@ -82,14 +87,16 @@ def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
         new = np.linalg.solve(information, jacobian.T @ (jacobian @ scaled - residuals))
         moved = float(np.abs(new - scaled).max(initial=0.0))
         scaled = new
-        chi2 = float(residuals @ residuals)
-        if step and moved < _DONE:
+        before, chi2 = chi2, float(residuals @ residuals)
+        if step and abs(chi2 - before) <= _STEADY * max(chi2, 1.0):
             degrees = residuals.size - float(np.trace(np.linalg.solve(information, data)))
             factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
-            if factor < 1.05:
+            if factor >= 1.05:
+                inflation *= factor  # the edges scatter more than assumed: weigh them so
+            elif moved < _DONE:
+                settled = True
                 break
-            inflation *= factor  # the edges scatter more than assumed: weigh them so
-    return Estimate(scaled * sd, sd, information, data, chi2, degrees, inflation)
+    return Estimate(scaled * sd, sd, information, data, chi2, degrees, inflation, settled)
 
 
 def uncertainty(

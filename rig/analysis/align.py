@@ -30,7 +30,11 @@ _ROUNDING = 1e-9
 
 
 def align(
-    trains: Sequence[Train], levels: Sequence[Array], trajectory: Trajectory, scale: float
+    trains: Sequence[Train],
+    levels: Sequence[Array],
+    trajectory: Trajectory,
+    scale: float,
+    clock: float = 0.0,
 ) -> list[Index]:
     """Match the edges of one side to rods.
 
@@ -43,6 +47,8 @@ def align(
     scale
         Standard deviation of the distance between where a chain is when an edge comes and where
         it should be, m.
+    clock
+        By what share the edges' clock is believed to be slow.
 
     Returns
     -------
@@ -51,7 +57,8 @@ def align(
         ``(expected,)``.
     """
     costs = [
-        _costs(train, level, trajectory, scale) for train, level in zip(trains, levels, strict=True)
+        _costs(train, level, trajectory, scale, 1.0 + clock)
+        for train, level in zip(trains, levels, strict=True)
     ]
     rows = max((cost.shape[0] for cost in costs), default=0)
     columns = max((cost.shape[1] for cost in costs), default=0)
@@ -71,9 +78,11 @@ def align(
     return [_trace(table[:, gate], cost) for gate, cost in enumerate(costs)]
 
 
-def _costs(train: Train, levels: Array, trajectory: Trajectory, scale: float) -> Array:
+def _costs(
+    train: Train, levels: Array, trajectory: Trajectory, scale: float, stretch: float
+) -> Array:
     """Cost of every pairing, shape ``(edges, expected)``; infinite for unlike polarities."""
-    heights, _ = trajectory.heights(train.times)
+    heights, _ = trajectory.heights(train.times * stretch)
     distance = (heights[:, None] - levels[None, :]) / scale
     return np.where(train.blocked[:, None] == train.blocks[None, :], 0.5 * distance**2, np.inf)
 

@@ -12,9 +12,10 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.pattern import guess
 from rig.analysis.quantities import quantities
 from rig.analysis.result import Audit, DropResult
-from rig.analysis.trains import Side, train
+from rig.analysis.trains import Edges, Side, train
 from rig.analysis.verdict import judge
-from rig.model.impact import gamma_finite
+from rig.model.fall import kicks
+from rig.model.rods import rod_impacts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.pattern import Guess
-    from rig.protocol.scene import Protocol, RodChain, Run
+    from rig.model.chain import Chain
+    from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
 
     Array = NDArray[np.float64]
@@ -67,7 +69,7 @@ def analyze_drop(protocol: Protocol, run: Run, drop: Drop, scale: TimeScale) -> 
     early = judge(protocol, drop, guesses, blank, {}, None)
     if early.verdict == "void":
         return DropResult(run, drop.attempt, early.verdict, early.reasons, blank)
-    model = DropModel(protocol, sides, guesses, _ratios(sides), scale.u)
+    model = DropModel(protocol, sides, guesses, scale.u)
     matches, estimate = _settle(model)
     matched = sum(int((match >= 0).sum()) for side in matches.values() for match in side)
     audit = Audit(received, matched, expected - matched, received - matched, lost)
@@ -88,7 +90,7 @@ def analyze_drop(protocol: Protocol, run: Run, drop: Drop, scale: TimeScale) -> 
 def _sides(protocol: Protocol, run: Run, drop: Drop, scale: TimeScale) -> list[Side]:
     """Collect each chain with the trains of its gates."""
     assert protocol.gates is not None
-    times = np.array([edge.tick for edge in drop.edges], dtype=float) / scale.hz
+    edges = Edges.of(drop, scale.hz)
     start = protocol.drop.value
     sides = []
     for role in ("impact", "free"):
@@ -97,33 +99,24 @@ def _sides(protocol: Protocol, run: Run, drop: Drop, scale: TimeScale) -> list[S
         if name is None or not gates:
             continue
         chain = protocol.chains[name]
-        trains = [train(n, g, chain, drop, times, start, role == "impact") for n, g in gates]
-        sides.append(Side(role, chain, tuple(trains)))
+        trains = [train(n, g, chain, edges, start, role == "impact") for n, g in gates]
+        ratios = _ratios(protocol, chain.chain) if role == "impact" else None
+        sides.append(Side(role, chain, tuple(trains), ratios))
     return sides
 
 
 def _guesses(protocol: Protocol, sides: Sequence[Side]) -> dict[str, Guess]:
     """Guess each side's fall."""
-    found: dict[str, Guess] = {}
-    for side in sides:
-        ratios = _ratios([side]) if side.role == "impact" else None
-        found[side.role] = guess(side, protocol.drop, protocol.gravity.value, ratios)
-    return found
+    gravity = protocol.gravity.value
+    return {side.role: guess(side, protocol.drop, gravity) for side in sides}
 
 
-def _ratios(sides: Sequence[Side]) -> Array:
+def _ratios(protocol: Protocol, chain: Chain) -> Array:
     """ΔV/V of each impact for α = 1, Eq. 9."""
-    chain: RodChain | None = next((s.chain for s in sides if s.role == "impact"), None)
-    if chain is None:
-        return np.zeros(0)
-    gamma = chain.chain.gamma
-    if gamma is None:
-        gamma = 0.0 if chain.chain.alpha is not None else gamma_finite(chain.chain.inertia)
-    masses = np.array(chain.chain.masses)
-    above = np.cumsum(masses[::-1])[::-1] - masses
-    ratios: Array = np.where(above > 0.0, masses / (above + gamma * masses), 0.0)
-    ratios[-1] = 0.0
-    return ratios
+    assert protocol.surface is not None
+    # γ is the same at every incline, and level ground is always inside the domain of Eq. 13.
+    gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain, 0.0)]
+    return np.array(kicks(chain, [1.0] * chain.rods, gammas))
 
 
 def _settle(model: DropModel) -> tuple[Matches, Estimate]:
@@ -133,8 +126,9 @@ def _settle(model: DropModel) -> tuple[Matches, Estimate]:
     before: Matches = {}
     for round_ in range(_ROUNDS):
         width = _COARSE if round_ == 0 else _FINE
+        clock = float(x[model.unknowns["clock"]][0])
         matches: Matches = {
-            role: align(side.trains, model.levels(role, x), model.trajectory(role, x), width)
+            role: align(side.trains, model.levels(role, x), model.trajectory(role, x), width, clock)
             for role, side in model.sides.items()
         }
         if estimate is not None and _same(matches, before):

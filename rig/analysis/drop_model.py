@@ -73,8 +73,6 @@ class DropModel:
         The chains with their trains.
     guesses
         First guess for each side, by role.
-    ratios
-        ΔV/V of each impact for α = 1, by Eq. 9, for the impact side.
     clock_u
         Relative standard uncertainty of the time scale.
     """
@@ -84,14 +82,12 @@ class DropModel:
         protocol: Protocol,
         sides: Sequence[Side],
         guesses: Mapping[str, Guess],
-        ratios: Array,
         clock_u: float,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
         self.sides: dict[str, Side] = {side.role: side for side in sides}
         self.guesses = guesses
-        self.ratios = ratios
         gates = protocol.gates.gates
         self.heights = np.array([gate.height for gate in gates])
         free_only = protocol.surface is None
@@ -113,7 +109,9 @@ class DropModel:
             alpha = abs(guesses["impact"].alpha)
             scatter = math.hypot(IMPULSE_U * alpha, IMPULSE_FLOOR)
             unknowns.add("alpha", "edges", ANYTHING)
-            unknowns.add("impulses", "single impulses", [scatter] * ratios.size)
+            unknowns.add(
+                "impulses", "single impulses", [scatter] * self.sides["impact"].chain.chain.rods
+            )
         self.unknowns = unknowns
 
     def first(self) -> Array:
@@ -131,10 +129,11 @@ class DropModel:
         gravity = self.protocol.gravity.value + float(x[at["gravity"]][0])
         if role == "free":
             return free_trajectory(release, start, gravity)
-        chain = self.sides["impact"].chain.chain
-        places = np.array(chain.heights) + x[at["impact rods"]]
+        side = self.sides["impact"]
+        assert side.ratios is not None
+        places = np.array(side.chain.chain.heights) + x[at["impact rods"]]
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        return struck_trajectory(release, start, gravity, gains, self.ratios, places)
+        return struck_trajectory(release, start, gravity, gains, side.ratios, places)
 
     def spread(self, role: str, derivatives: Array) -> Array:
         """Derivatives by a trajectory's parameters → by all unknowns.

@@ -55,25 +55,23 @@ class Guess:
     runner_up: float = 0.0
 
 
-def guess(side: Side, start: Quantity, gravity: float, ratios: Array | None) -> Guess:
+def guess(side: Side, start: Quantity, gravity: float) -> Guess:
     """Guess the release time, and α where the chain is struck.
 
     Parameters
     ----------
     start
         Height of the reference point before release, m.
-    ratios
-        As in `rig.analysis.trajectory.struck_trajectory`; `None` for a free chain.
     """
     places = np.array(side.chain.chain.heights)
     pitch = float(np.diff(places).min()) if places.size > 1 else start.value
     slack = pitch / 6
     # An impact chain falls freely until its bottom rod is down.
-    lowest = -np.inf if ratios is None else 0.0
+    lowest = -np.inf if side.ratios is None else 0.0
     free = _release(side, start, gravity, lowest, slack)
-    if ratios is None or free.share == 0.0:
+    if side.ratios is None or free.share == 0.0:
         return free
-    return _alpha(side, gravity, ratios, slack, pitch, free)
+    return _alpha(side, gravity, side.ratios, slack, pitch, free)
 
 
 def _release(side: Side, start: Quantity, gravity: float, lowest: float, slack: float) -> Guess:
@@ -162,7 +160,7 @@ def _alpha(
     """Try one α after another."""
     places = np.array(side.chain.chain.heights)
     time, height, speed = _paths(free.release, free.start, gravity, ratios, places)
-    pairs = _pairs(side, -np.inf)
+    pairs = _within_reach(_pairs(side, -np.inf), time, height, speed, gravity, slack)
     scores = np.array(
         [
             _support(pairs, side.expected, time[:, n], height, speed[:, n], gravity, slack)
@@ -202,13 +200,29 @@ def _paths(
     return time, height, speed
 
 
+def _within_reach(
+    pairs: Pairs, time: Array, height: Array, speed: Array, gravity: float, slack: float
+) -> Pairs:
+    """Leave out pairs that no α brings together: a larger one is lower at any time."""
+    highest = _heights(pairs.times, time[:, 0], height, speed[:, 0], gravity)
+    lowest = _heights(pairs.times, time[:, -1], height, speed[:, -1], gravity)
+    near = (highest > pairs.levels - slack) & (lowest < pairs.levels + slack)
+    return Pairs(pairs.times[near], pairs.levels[near], pairs.expected[near])
+
+
 def _support(
     pairs: Pairs, size: int, time: Array, height: Array, speed: Array, gravity: float, slack: float
 ) -> int:
     """Count the expected edges that have an observed one where the chain would be."""
-    leg = np.maximum(np.searchsorted(time, pairs.times, side="right") - 1, 0)
-    since = np.maximum(pairs.times - time[leg], 0.0)
-    at = height[leg] - (speed[leg] + 0.5 * gravity * since) * since
+    at = _heights(pairs.times, time, height, speed, gravity)
     found = np.zeros(size, dtype=np.bool_)
     found[pairs.expected[np.abs(at - pairs.levels) < slack]] = True
     return int(found.sum())
+
+
+def _heights(times: Array, time: Array, height: Array, speed: Array, gravity: float) -> Array:
+    """Height of the reference point on one path, shape of `times`."""
+    leg = np.maximum(np.searchsorted(time, times, side="right") - 1, 0)
+    since = np.maximum(times - time[leg], 0.0)
+    at: Array = height[leg] - (speed[leg] + 0.5 * gravity * since) * since
+    return at

@@ -28,7 +28,7 @@ def coverage_factor(degrees: float, probability: float = 0.95) -> float:
     ValueError
         For fewer than one degree of freedom.
     """
-    if degrees < 1.0:
+    if not degrees >= 1.0:  # not-a-number too
         raise ValueError(f"{degrees} degrees of freedom; at least 1 is needed")
     degrees = min(degrees, _MANY)
     norm = math.exp(math.lgamma((degrees + 1) / 2) - math.lgamma(degrees / 2)) / math.sqrt(math.pi)

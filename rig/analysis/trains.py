@@ -55,6 +55,21 @@ class Train:
 
 
 @dataclass(frozen=True, slots=True)
+class Edges:
+    """A drop's edges as arrays, shape ``(edges,)`` each."""
+
+    times: Array
+    channels: Index
+    blocked: Flags
+
+    @classmethod
+    def of(cls, drop: Drop, hz: float) -> Edges:
+        """Take them from a drop whose ticks come at a rate in Hz."""
+        table = np.array(drop.edges, dtype=np.int64).reshape(-1, 3)
+        return cls(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
+
+
+@dataclass(frozen=True, slots=True)
 class Side:
     """One chain and the gates beside it.
 
@@ -66,11 +81,15 @@ class Side:
         The chain that hangs there.
     trains
         One a gate.
+    ratios
+        ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, shape ``(rods,)``; `None` for a chain
+        that strikes nothing.
     """
 
     role: Literal["impact", "free"]
     chain: RodChain
     trains: tuple[Train, ...]
+    ratios: Array | None = None
 
     @property
     def expected(self) -> int:
@@ -79,7 +98,7 @@ class Side:
 
 
 def train(
-    number: int, gate: Gate, chain: RodChain, drop: Drop, times: Array, start: float, struck: bool
+    number: int, gate: Gate, chain: RodChain, edges: Edges, start: float, struck: bool
 ) -> Train:
     """Collect what one gate saw and what it should see.
 
@@ -87,16 +106,15 @@ def train(
     ----------
     number
         Of the gate in the protocol's list.
-    times
-        Of all edges of the drop, s; shape ``(edges,)``.
+    edges
+        All edges of the drop.
     start
         Nominal height of the bottom rod's middle before release, m.
     struck
         Whether the rods end at the surface: what passes below it is not expected.
     """
-    mine = [index for index, edge in enumerate(drop.edges) if edge.channel == gate.channel]
-    edge = np.array(mine, dtype=np.intp)
-    blocked = np.array([drop.edges[index].blocked for index in mine], dtype=np.bool_)
+    mine = np.flatnonzero(edges.channels == gate.channel)
+    times = edges.times[mine]
     places = np.array(chain.chain.heights)
     widths = np.array(chain.widths)
     # A rod's lower side darkens the beam, its upper side clears it.
@@ -109,13 +127,12 @@ def train(
     seen = flat < start
     if struck:
         seen &= flat > -places[rods]
-    mine_times = times[edge]
     return Train(
         number,
-        mine_times,
-        blocked,
-        bursts(mine_times),
-        edge,
+        times,
+        edges.blocked[mine],
+        bursts(times),
+        mine,
         rods[seen],
         blocks[seen],
         flat[seen],

@@ -102,6 +102,8 @@ def _doubts(
             f"edges scatter {estimate.scatter:.1f} times as much as assumed; "
             "the uncertainties are enlarged to match"
         )
+    if not estimate.settled:
+        doubts.append("the adjustment did not settle: no motion fits these edges well")
     if drop.certificate is not None and drop.certificate.late > LATE * max(1, len(drop.edges)):
         doubts.append(f"{drop.certificate.late} time stamps may be late")
     return doubts

@@ -14,12 +14,21 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from argparse import Namespace
 
+    from rig.session.reading import Reader
+
 
 def main(arguments: Namespace) -> int:
     """Compute the results of a session and keep them in it."""
     with Session.open(arguments.session, readonly=True) as session:
+        extent = _extent(session)
         found = results(session, progress("analysing run"))
     # A session that is being written, or on a read-only disk, is analysed all the same.
     with suppress(SessionError), Session.open(arguments.session) as session:
-        session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
+        if _extent(session) == extent:  # else it went on meanwhile, and these are out of date
+            session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
     return print_results(found, as_json=arguments.json)
+
+
+def _extent(session: Reader) -> tuple[int, int]:
+    """How far a session has come: its records are only ever added to."""
+    return len(session.states()), len(session.pings())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rig.report.table import summary_table
@@ -16,7 +17,8 @@ VOID = 3
 
 def say(line: str) -> None:
     """Tell the user something that is no result."""
-    print(line, file=sys.stderr, flush=True)
+    with suppress(OSError):  # a campaign does not end because nobody listens any more
+        print(line, file=sys.stderr, flush=True)
 
 
 def progress(what: str) -> Callable[[int, int], None]:

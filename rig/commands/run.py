@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from rig.commands.output import print_results, say
+from rig.daemon.interrupts import Interrupts
 from rig.runner import Operator, run_protocol
 
 if TYPE_CHECKING:
@@ -15,13 +15,19 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Carry out a protocol."""
-    signal.signal(signal.SIGTERM, _stop)
     attended = not arguments.yes and sys.stdin.isatty()
     operator = Operator(say, _ask if attended else None)
-    found = run_protocol(
-        arguments.protocol, arguments.port, arguments.session, operator, arguments.seed
-    )
-    code = print_results(found, as_json=arguments.json)
+    interrupts = Interrupts()
+    with interrupts.caught():
+        found = run_protocol(
+            arguments.protocol,
+            arguments.port,
+            arguments.session,
+            operator,
+            arguments.seed,
+            interrupts,
+        )
+        code = print_results(found, as_json=arguments.json)
     say(f"session: {arguments.session}")
     return code
 
@@ -31,7 +37,3 @@ def _ask(request: str) -> None:
           file=sys.stderr, flush=True)  # fmt: skip
     if not sys.stdin.readline():
         raise KeyboardInterrupt
-
-
-def _stop(*_: object) -> NoReturn:
-    raise KeyboardInterrupt

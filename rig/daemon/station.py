@@ -7,10 +7,12 @@ from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
-from rig.errors import DeviceError
+from rig.daemon.interrupts import Interrupts
+from rig.errors import DeviceError, SessionError
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label, unpack_label
 from rig.link.port import open_port, port_clock
+from rig.ports import told
 from rig.records import Ping
 from rig.session.schema import RunState
 
@@ -42,15 +44,19 @@ class Station:
         Open for writing.
     url
         The port.
+    interrupts
+        Kept waiting during each call; by default nobody's.
     """
 
-    def __init__(self, session: Session, url: str) -> None:
+    def __init__(self, session: Session, url: str, interrupts: Interrupts | None = None) -> None:
         self.session = session
         self.url = url
+        self.interrupts = Interrupts() if interrupts is None else interrupts
         self._port: Port | None = None
         self._device: Device | None = None
         self._uneven = random.Random(0)  # noqa: S311 - spacing, not secrets
         self._armed: tuple[int, int] | None = None
+        self._disk_must_not_matter = False
 
     def __enter__(self) -> Self:
         self.connect()
@@ -67,25 +73,33 @@ class Station:
         DeviceError
             No such port, nobody there, or another protocol version.
         """
-        self._port = open_port(self.url)
-        self.clock = port_clock(self._port)
-        self._device = Device(self._port, self.clock, self._log, on_record=self._note)
-        identity = self._device.connect()
-        told = asdict(identity) | {"unique_id": identity.unique_id.hex()}
-        self.session.add_identity(told, self.clock.now_ns())
-        self.session.commit()
-        return identity
+        with self.interrupts.held():
+            self._port = open_port(self.url)
+            try:
+                self.clock = port_clock(self._port)
+                self._device = Device(self._port, self.clock, self._log, on_record=self._note)
+                identity = self._device.connect()
+                known = asdict(identity) | {"unique_id": identity.unique_id.hex()}
+                self.session.add_identity(known | {"port": told(self.url)}, self.clock.now_ns())
+                self.session.commit()
+            except BaseException:
+                self.close()
+                raise
+            return identity
 
     def close(self) -> None:
         """Make safe (an armed release is disarmed, a recording is left alone) and close."""
         if self._port is None:
             return
-        port, self._port = self._port, None
-        with suppress(DeviceError):
-            if self._device is not None and self._armed is not None:
-                self._device.abort()
-        port.close()
-        self.session.commit()
+        with self.interrupts.held():
+            try:
+                with suppress(DeviceError):
+                    if self._armed is not None:
+                        self.abort()
+            finally:
+                port, self._port = self._port, None
+                port.close()
+            self.session.commit()
 
     @property
     def device(self) -> Device:
@@ -108,12 +122,15 @@ class Station:
             if left <= 0.0:
                 break
             self.clock.sleep(min(left, _PING_S * self._uneven.uniform(0.5, 1.5)))
-            self.device.ping()
-        self.session.commit()
+            with self.interrupts.held():
+                self.device.ping()
+        with self.interrupts.held():
+            self.session.commit()
 
     def held(self) -> tuple[int, int] | None:
         """Run and attempt of a drop the device still holds, or `None`."""
-        state = self.device.status()
+        with self.interrupts.held():
+            state = self.device.status()
         if state.phase in {Phase.HOLDING, Phase.RECORDING} and state.label:
             return unpack_label(state.label)
         return None
@@ -132,53 +149,76 @@ class Station:
             A gate is blocked, or the device cannot do what the protocol asks.
         """
         gates, release = protocol.gates, protocol.release
-        token = self.device.arm(
-            label=pack_label(run, attempt),
-            gates=gates.mask if gates else 0,
-            release=1 << release.channel,
-            pulse_us=round(release.pulse * 1e6),
-            timeout_ms=ARM_TIMEOUT_MS,
-            record_ms=RECORD_MS,
-        )
-        self._armed = run, attempt
-        self.state(run, attempt, RunState.ARMED)
-        return token
+        with self.interrupts.held():
+            token = self.device.arm(
+                label=pack_label(run, attempt),
+                gates=gates.mask if gates else 0,
+                release=1 << release.channel,
+                pulse_us=round(release.pulse * 1e6),
+                timeout_ms=ARM_TIMEOUT_MS,
+                record_ms=RECORD_MS,
+            )
+            self._armed = run, attempt
+            self.state(run, attempt, RunState.ARMED)
+            return token
 
     def fire(self, token: int) -> None:
         """Let go. What was armed is on the disk as fired before the request leaves."""
         run, attempt = self._armed or (0, 0)
-        self.state(run, attempt, RunState.FIRED)
-        self.device.fire(token)
+        with self.interrupts.held():
+            self.state(run, attempt, RunState.FIRED)
+            self.interrupts.check()  # whoever asked to stop until now sees nothing fall
+            self.device.fire(token)
+            self._armed = None  # from here on there is a recording, which `close` leaves alone
 
     def collect(self, run: int, attempt: int) -> Drop:
         """Read the drop whole, store it, and only then let the device forget it."""
-        return self._keep(self.device.collect(pack_label(run, attempt)))
+        with self.interrupts.held():
+            return self._keep(self.device.collect(pack_label(run, attempt)))
 
     def fetch(self, run: int, attempt: int) -> Drop | None:
-        """Read a held drop; `None` when the session has it and only the device did not know."""
-        label = pack_label(run, attempt)
-        drop = self.device.collect(label, timeout=0.0)
-        known = any((d.run, d.attempt) == (run, attempt) for d in self.session.drops())
-        if not known:
-            return self._keep(drop)
-        self._acknowledge(drop)
-        return None
+        """Read a held drop; `None` when the session has it and only the device did not know.
+
+        Raises
+        ------
+        DeviceError
+            The session has another drop of this run and attempt, or the device is in trouble.
+        """
+        with self.interrupts.held():
+            drop = self.device.collect(pack_label(run, attempt), timeout=0.0)
+            key = run, attempt
+            known = next((d for d in self.session.drops() if (d.run, d.attempt) == key), None)
+            if known is None:
+                return self._keep(drop)
+            if known.certificate != drop.certificate or known.fire_tick != drop.fire_tick:
+                raise DeviceError(
+                    f"the device holds another drop of run {run}, attempt {attempt}, than this "
+                    "session",
+                    "continue the session it belongs to; resetting the board discards the drop",
+                )
+            self._acknowledge(drop)
+            return None
 
     def abort(self) -> None:
-        """Switch everything off."""
-        self.device.abort()
-        self._armed = None
+        """Switch everything off, even when the disk does not take the record of it any more."""
+        with self.interrupts.held():
+            self._disk_must_not_matter = True
+            try:
+                self.device.abort()
+                self._armed = None
+            finally:
+                self._disk_must_not_matter = False
 
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()) -> None:
         """Log where a run stands, on the disk when this returns."""
-        self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
-        self.session.commit()
+        with self.interrupts.held():
+            self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
+            self.session.commit()
 
     def _keep(self, drop: Drop) -> Drop:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
         self._acknowledge(drop)
-        self._armed = None
         return drop
 
     def _acknowledge(self, drop: Drop) -> None:
@@ -187,7 +227,11 @@ class Station:
             self.session.commit()
 
     def _log(self, direction: Direction, host_ns: int, data: bytes) -> None:
-        self.session.log_bytes(direction, host_ns, data)
+        try:
+            self.session.log_bytes(direction, host_ns, data)
+        except SessionError:  # the bytes wait in memory, and the next commit says so
+            if not self._disk_must_not_matter:
+                raise
 
     def _note(self, record: Record) -> None:
         if isinstance(record, Ping):

@@ -1,0 +1,105 @@
+"""``rig bench precision``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import asdict, fields
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.output import print_json, say
+from rig.errors import InputError
+from rig.files import write_atomic
+from rig.report.precision import precision_figure
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from rig.bench.precision import Cheapest, Gap, Precision
+
+_PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
+"""Contact times whose rows are printed; the others are in ``precision.json``, s."""
+
+
+def main(arguments: Namespace) -> int:
+    """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
+    try:
+        from rig.bench.precision import as_json, precision  # noqa: PLC0415 - needs an extra
+    except ImportError as error:
+        raise InputError(
+            f"the benchmark needs {error.name}",
+            "install it with: pip install 'chainrig[bench,report]' mpmath",
+        ) from error
+    folder = Path(arguments.output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    found = precision(quick=arguments.quick, progress=say)
+    whole = as_json(found)
+    _write(folder, found, json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False))
+    if arguments.json:
+        print_json(whole)
+    else:
+        print(summary(found))
+    return 0
+
+
+def summary(found: Precision) -> str:
+    """The cheapest methods, how far the models are apart, and what was left out."""
+    lines = []
+    for name, title in found.scenes:
+        lines.append(f"{title}: cheapest method for a relative error of Δz, with its run time")
+        rows: dict[str, list[Cheapest]] = {}
+        for one in found.cheapest:
+            tau = one.contact_time_s
+            if one.scene == name and (tau is None or tau in _PRINTED_CONTACTS):
+                rows.setdefault(_model(one), []).append(one)
+        width = max(map(len, rows))
+        for model, row in rows.items():
+            for winner, won in groupby(row, key=_winner):
+                targets = [f"{one.target:.0e}" for one in won]
+                lines.append(f"  {model:<{width}}  {', '.join(targets)}: {winner}")
+        lines += [
+            f"  {_model(gap):<{width}}  less discrete: Δz {gap.separation_relative:+.2e}, "
+            f"V {gap.speed_relative:+.2e}, gate {gap.gate_difference_s:+.2e} s"
+            for gap in found.gaps
+            if gap.scene == name and gap.contact_time_s in {None, *_PRINTED_CONTACTS}
+        ]
+        gone: dict[tuple[str, str], list[str]] = {}
+        for out in found.left_out:
+            if out.scene == name:
+                gone.setdefault((out.method, out.reason), []).append(out.setting)
+        lines += [
+            f"  left out: {method} ({', '.join(settings)}): {reason}"
+            for (method, reason), settings in gone.items()
+        ]
+    return "\n".join(lines)
+
+
+def _model(of: Cheapest | Gap) -> str:
+    return of.model if of.contact_time_s is None else f"{of.model} τ {of.contact_time_s:.0e} s"
+
+
+def _winner(one: Cheapest) -> str:
+    if one.median_s is None:
+        return "none gets there"
+    return f"{one.median_s * 1e6:.1f} µs, {one.method}, {one.setting}"
+
+
+def _write(folder: Path, found: Precision, text: str) -> None:
+    """Write ``precision.csv``, ``precision.json`` and a picture for each scene."""
+    from rig.bench.precision import Point  # noqa: PLC0415 - see main
+
+    table = io.StringIO()
+    writer = csv.DictWriter(table, [field.name for field in fields(Point)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(point) for point in found.points)
+    write_atomic(folder / "precision.csv", table.getvalue())
+    write_atomic(folder / "precision.json", text + "\n")
+    for name, title in found.scenes:
+        points = [point for point in found.points if point.scene == name]
+        write_atomic(folder / f"precision-{name}.svg", precision_figure(title, points))

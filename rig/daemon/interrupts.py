@@ -1,0 +1,69 @@
+"""Ctrl-C and SIGTERM, kept waiting while a record is half made."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_PATIENCE = 3
+
+
+class Interrupts:
+    """Turns both signals into `KeyboardInterrupt` at moments when nothing is torn apart by it.
+
+    An exception that may strike between any two instructions would now and then strike between a
+    byte and the log of it, or between a row and its count. Inside `held` a signal is only noted;
+    the exception comes at the end of the block. Whoever asks a third time is obeyed at once: a
+    port may hang for good.
+    """
+
+    def __init__(self) -> None:
+        self._held = 0
+        self._asked = 0
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Take both signals for the time of a block; only in the main thread."""
+        before = {
+            number: signal.signal(number, self._arrived)
+            for number in (signal.SIGINT, signal.SIGTERM)
+            # A shell starts what runs in the background with Ctrl-C ignored, and means it.
+            if signal.getsignal(number) is not signal.SIG_IGN
+        }
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep signals waiting until the end of the block; blocks may stand inside each other."""
+        self._held += 1
+        try:
+            yield
+        finally:
+            self._held -= 1
+        if not self._held:
+            self.check()
+
+    def check(self) -> None:
+        """Raise what is waiting.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If a signal came and was not raised yet.
+        """
+        if self._asked:
+            self._asked = 0
+            raise KeyboardInterrupt
+
+    def _arrived(self, *_: object) -> None:
+        self._asked += 1
+        if not self._held or self._asked >= _PATIENCE:
+            self.check()

@@ -1,0 +1,190 @@
+"""The discrete fall in air that resists as the square of the speed.
+
+A rod is held back by c v²; what still falls then has the acceleration g − κ v², where
+κ = Σc/Σm over the rods still falling. The free chain keeps all its rods and the first κ.
+
+A leg of length d from speed v₀ to v₁, with q = e^(−2κd) and φ = (1 − q)/(2κd):
+
+    v₁² = q v₀² + 2 g d φ
+    t = τ atanh(x)/x,  τ = 2dφ/(v₁ + q v₀),  x = √(κg) τ
+
+τ is (v₁ − v₀)/(g − κ v₀ v₁) with g − κ v₀² cancelled from both its parts, so nothing is lost at or
+near the terminal speed √(g/κ), on either side of it. As x → 1 the time is taken instead from the
+same expression as the sum κd + ln((v₁ + u)/(v₀ + u)), over √(κg), u being the terminal speed.
+At κ = 0 every number is that of `rig.model.fall`.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import accumulate
+from math import atanh, exp, expm1, inf, log, log1p, sinh, sqrt, tanh
+from typing import TYPE_CHECKING
+
+from rig.errors import DomainError
+from rig.model.fall import Fall, Hit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rig.model.chain import Chain
+
+
+def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
+    """κ on the leg before each rod's impact, 1/m: Σc/Σm of that rod and all above it.
+
+    Parameters
+    ----------
+    drags
+        c of each rod, bottom up, not negative: drag force over speed squared, in units of mass/m.
+
+    Returns
+    -------
+    list of float
+        Shape ``(rods,)``, each correctly rounded: where all rods are alike so are all κ, and the
+        two chains' difference is not touched by rounding (see `drag_fall`).
+    """
+    falling = [
+        list(accumulate(map(Fraction, reversed(each))))[::-1] for each in (drags, chain.masses)
+    ]
+    return [float(drag / mass) for drag, mass in zip(*falling, strict=True)]
+
+
+def drag_hits(
+    chain: Chain,
+    gains: Sequence[float],
+    kappas: Sequence[float],
+    drop: float,
+    gravity: float,
+    initial_speed: float = 0.0,
+) -> list[Hit]:
+    """Every impact of a fall in air, bottom rod first.
+
+    Parameters
+    ----------
+    gains
+        ΔV/V at each impact, as from `rig.model.fall.kicks`.
+    kappas
+        κ on the leg before each impact, 1/m, as from `leg_drags`.
+    drop, gravity, initial_speed
+        As in `rig.model.fall.hits`; none negative.
+    """
+    events: list[Hit] = []
+    time, speed, before = 0.0, initial_speed, -drop
+    for height, gain, kappa in zip(chain.heights, gains, kappas, strict=True):
+        arrival, duration = drag_leg(height - before, speed, gravity, kappa)
+        time += duration
+        speed = arrival * (1.0 + gain)
+        before = height
+        events.append(Hit(time, arrival, speed))
+    return events
+
+
+def drag_fall(
+    chain: Chain,
+    gains: Sequence[float],
+    kappas: Sequence[float],
+    drop: float,
+    gravity: float,
+    initial_speed: float = 0.0,
+) -> Fall:
+    """Δz, V and t of one fall in air; arguments as in `drag_hits`.
+
+    With one κ for all legs Δz keeps full relative precision as α → 0: it is summed from the
+    impacts' own effects. Where κ changes from leg to leg, unequal drag separates the chains too,
+    and that part is a difference of two distances: each leg then adds an error of a few units in
+    the last place of its length, a relative one of about 2^-52/(κ' − κ)d.
+    """
+    gained = separation = time = 0.0
+    speed = twin = initial_speed
+    arrival, before, free = speed, -drop, kappas[0]
+    for height, gain, kappa in zip(chain.heights, gains, kappas, strict=True):
+        distance = height - before
+        arrival, duration = drag_leg(distance, speed, gravity, kappa)
+        time += duration
+        grown, gained = _apart(gained, speed, twin, duration, gravity, free)
+        separation += grown
+        if kappa != free:
+            # So far as if this chain too had the free one's drag.
+            separation += distance - fallen(duration, gravity, free, speed)
+            gained += arrival - falling_speed(duration, gravity, free, speed)
+        twin = falling_speed(duration, gravity, free, twin)
+        step = arrival * gain
+        gained += step
+        speed = arrival + step
+        before = height
+    return Fall(separation, arrival, time)
+
+
+def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tuple[float, float]:
+    """Speed at the end of a leg in air, m/s, and the leg's duration, s.
+
+    Raises
+    ------
+    DomainError
+        Where the end is never reached, there being no gravity.
+    """
+    if distance == 0.0:
+        return speed, 0.0
+    left = exp(-2.0 * kappa * distance)
+    reach = 2.0 * distance * _per(expm1, -2.0 * kappa * distance)
+    arrival = sqrt(speed * speed * left + gravity * reach)
+    if arrival == 0.0:
+        raise DomainError(
+            "the chain never arrives: no gravity, and no speed or too much drag",
+            "give a gravity above zero",
+        )
+    slow = reach / (arrival + left * speed)
+    rate = sqrt(kappa * gravity)
+    if rate * slow < 0.5:
+        return arrival, slow * _per(atanh, rate * slow)
+    terminal = terminal_speed(gravity, kappa)
+    return arrival, (kappa * distance + log((arrival + terminal) / (speed + terminal))) / rate
+
+
+def terminal_speed(gravity: float, kappa: float) -> float:
+    """√(g/κ), m/s: where drag balances gravity; infinite without drag."""
+    return sqrt(gravity / kappa) if kappa else inf
+
+
+def fallen(time: float, gravity: float, kappa: float, initial_speed: float = 0.0) -> float:
+    """How far a chain that strikes nothing has fallen after a time, m.
+
+    ln(cosh x + r sinh x)/κ, with x = √(κg) t and r the initial speed over the terminal one.
+    """
+    rate = sqrt(kappa * gravity)
+    x = rate * time
+    if x <= 1.0:
+        # (cosh x + r sinh x − 1)/κ, which is the way without drag as κ → 0.
+        half = time * _per(sinh, 0.5 * x)
+        way = 0.5 * gravity * half * half + initial_speed * time * _per(sinh, x)
+        return way * _per(log1p, kappa * way)
+    return (x + log1p(0.5 * (kappa * initial_speed / rate - 1.0) * -expm1(-2.0 * x))) / kappa
+
+
+def falling_speed(time: float, gravity: float, kappa: float, initial_speed: float = 0.0) -> float:
+    """Speed after a time of a chain that strikes nothing, m/s."""
+    reach = time * _per(tanh, sqrt(kappa * gravity) * time)
+    return (initial_speed + gravity * reach) / (1.0 + kappa * initial_speed * reach)
+
+
+def _apart(
+    gained: float, speed: float, twin: float, time: float, gravity: float, kappa: float
+) -> tuple[float, float]:
+    """How far two chains with one κ part in a time, and how much faster the one still is.
+
+    From w = v − u at first: ln((C + κ v S)/(C + κ u S))/κ and w/((C + κ v S)(C + κ u S)), where
+    C = cosh x, S = t sinh(x)/x and x = √(κg) t; both proportional to w, whatever it is.
+    """
+    x = sqrt(kappa * gravity) * time
+    reach = time * _per(tanh, x)
+    faster, slower = 1.0 + kappa * speed * reach, 1.0 + kappa * twin * reach
+    parted = gained * reach / slower
+    decay = exp(-2.0 * x)
+    sech_squared = 4.0 * decay / ((1.0 + decay) * (1.0 + decay))
+    return parted * _per(log1p, kappa * parted), gained * sech_squared / (faster * slower)
+
+
+def _per(function: Callable[[float], float], x: float) -> float:
+    """f(x)/x of a function whose slope at 0 is 1; so 1 at 0."""
+    return function(x) / x if x else 1.0

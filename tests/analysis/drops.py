@@ -1,0 +1,141 @@
+"""Drops straight from the simulated lab: what a perfect recorder would keep, and the truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rig.analysis.align import align
+from rig.analysis.drop import TimeScale, analyze_drop
+from rig.analysis.drop_model import DropModel
+from rig.analysis.pattern import Guess, guess
+from rig.analysis.result import DropResult
+from rig.analysis.trains import Edges, Side, train
+from rig.link.messages import pack_label
+from rig.model.chain import Chain
+from rig.protocol import reader
+from rig.protocol.scene import Protocol, Run
+from rig.records import Drop, Edge
+from sim.dials import Dials
+from sim.lab import ChainLab
+from sim.truth import Truth
+
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+UNIFORM, GRADED, SINGLE, FENCE = (
+    reader.read(PROTOCOLS / f"{name}.yaml")
+    for name in ("inclined-uniform", "graded-chain", "single-chain", "picket-fence")
+)
+SCENES = {"uniform": UNIFORM, "graded": GRADED, "single": SINGLE, "fence": FENCE}
+
+HZ = 16_000_000
+CLOCK_U = 1e-6  # what a minute of pings gives
+STRAY = -1
+
+
+def with_dials(**changes: float) -> Dials:
+    """Nothing disturbed but what is named."""
+    return Dials(**(asdict(Dials.quiet()) | changes))
+
+
+@dataclass(frozen=True)
+class Case:
+    protocol: Protocol
+    run: Run
+    drop: Drop
+    truth: Truth
+    scale: TimeScale
+
+    def analyze(self) -> DropResult:
+        return analyze_drop(self.protocol, self.run, self.drop, self.scale)
+
+    def with_edges(self, edges) -> Case:
+        """The same drop with other edges; they need not be in order of time."""
+        ordered = tuple(sorted(edges, key=lambda edge: edge.tick))
+        return replace(self, drop=replace(self.drop, edges=ordered))
+
+    def side(self, role: str) -> Side:
+        """One chain with the trains of its gates."""
+        struck = role == "impact"
+        chain = self.protocol.chains[self.run.impact if struck else self.run.free]
+        edges = Edges.of(self.drop, self.scale.hz)
+        trains = [
+            train(number, gate, chain, edges, self.protocol.drop.value, struck)
+            for number, gate in enumerate(self.protocol.gates.gates)
+            if gate.side == role
+        ]
+        return Side(role, chain, tuple(trains), impact_ratios(chain.chain) if struck else None)
+
+    @property
+    def sides(self) -> list[Side]:
+        names = {"impact": self.run.impact, "free": self.run.free}
+        return [self.side(role) for role, name in names.items() if name is not None]
+
+    def guesses(self) -> dict[str, Guess]:
+        gravity = self.protocol.gravity.value
+        return {side.role: guess(side, self.protocol.drop, gravity) for side in self.sides}
+
+    def model(self) -> tuple[DropModel, dict]:
+        """The observation equations of this drop, and the matches that the first guess gives."""
+        model = DropModel(self.protocol, self.sides, self.guesses(), self.scale.u)
+        x = model.first()
+        matches = {
+            side.role: align(
+                side.trains, model.levels(side.role, x), model.trajectory(side.role, x), 2.5e-3
+            )
+            for side in self.sides
+        }
+        return model, matches
+
+
+def impact_ratios(chain: Chain) -> np.ndarray:
+    """ΔV/V of each impact for α = 1: m/(M + γm) of Eq. 9, γ by Eq. 10 for rods all alike."""
+    xi = chain.inertia
+    gamma = (1 + xi) * (1 + 1 / xi) / 4
+    above = [sum(chain.masses[k + 1 :]) for k in range(chain.rods)]
+    return np.array(
+        [m / (M + gamma * m) if M else 0.0 for m, M in zip(chain.masses, above, strict=True)]
+    )
+
+
+def first_run(protocol: Protocol, incline: float | None) -> int:
+    """The first run at an incline; of all runs where nothing is inclined."""
+    lab = ChainLab(protocol, Dials.quiet(), 0)
+    return next(n for n, run in lab.runs.items() if incline is None or run.incline_deg == incline)
+
+
+def case(
+    protocol: Protocol,
+    dials: Dials | None = None,
+    *,
+    incline: float | None = None,
+    seed: int = 1,
+    run: int | None = None,
+    attempt: int = 1,
+    hz: int = HZ,
+    clock_u: float = CLOCK_U,
+) -> Case:
+    """One simulated drop, with a calibrated clock unless the dials say otherwise."""
+    dials = Dials() if dials is None else dials
+    told: list[Truth] = []
+    lab = ChainLab(protocol, dials, seed, told.append)
+    number = first_run(protocol, incline) if run is None else run
+    rate = hz * (1.0 + dials.clock)
+    edges = tuple(
+        Edge(round(seconds * rate), channel, blocked)
+        for seconds, channel, blocked in lab.drop(pack_label(number, attempt))
+    )
+    drop = Drop(number, attempt, hz, edges)
+    return Case(protocol, lab.runs[number], drop, told[0], TimeScale(rate, clock_u))
+
+
+def true_value(truth: Truth, name: str) -> float:
+    """What a quantity really was, by its JSON name."""
+    return getattr(truth, name)
+
+
+def wrong_rods(result: DropResult, truth: Truth) -> list[int]:
+    """Edges that were given to another rod than the one they came from."""
+    origins = {number: truth.edges[number][3] for number in result.matches}
+    return [n for n, rod in result.matches.items() if origins[n] not in (STRAY, rod)]

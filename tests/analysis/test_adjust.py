@@ -1,0 +1,173 @@
+"""Least squares with priors against the same written directly, and the budget that follows."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp
+
+from rig.analysis.adjust import adjust, uncertainty
+from rig.analysis.drop_model import Equations
+from tests.analysis.drops import SCENES, case
+
+HUBER = 4.0
+GROUPS = {"place": [slice(0, 2)], "edges": [slice(2, 3)], "rest": [slice(3, 5)]}
+PRIOR = np.array([0.3, 2.0, 50.0, 0.0, 0.7])  # one is known exactly
+
+
+class Linear:
+    """Two sides whose residuals are linear in five unknowns."""
+
+    def __init__(self, seed: int, noise: float = 0.5, outlier: float = 0.0) -> None:
+        rng = np.random.default_rng(seed)
+        self.unknowns = SimpleNamespace(sd=PRIOR)
+        self.jacobian = {role: rng.normal(size=(12, 5)) for role in ("impact", "free")}
+        self.sigma = {role: rng.uniform(0.5, 2.0, 12) for role in ("impact", "free")}
+        true = PRIOR * rng.normal(size=5) * 0.5
+        self.offset = {
+            role: -slopes @ true + noise * self.sigma[role] * rng.normal(size=12)
+            for role, slopes in self.jacobian.items()
+        }
+        self.offset["free"][3] += outlier
+
+    def equations(self, role: str, x, match) -> Equations:
+        residuals = self.offset[role] + self.jacobian[role] @ x
+        return Equations(residuals[match], self.jacobian[role][match], self.sigma[role][match])
+
+    def stacked(self) -> tuple[np.ndarray, np.ndarray]:
+        """All rows in standard deviations: J/σ and r(0)/σ."""
+        roles = ("impact", "free")
+        sigma = np.concatenate([self.sigma[role] for role in roles])
+        jacobian = np.concatenate([self.jacobian[role] for role in roles]) / sigma[:, None]
+        return jacobian, np.concatenate([self.offset[role] for role in roles]) / sigma
+
+
+ALL = {"impact": np.arange(12), "free": np.arange(12)}
+
+
+def posterior(model: Linear) -> tuple[np.ndarray, np.ndarray]:
+    """Bayes directly, in 40 digits: covariance (JᵀJ + P⁻¹)⁻¹, mean −C Jᵀr.
+
+    What is known exactly is left out.
+    """
+    jacobian, offset = model.stacked()
+    free = PRIOR > 0.0
+    with mp.workdps(40):
+        rows = mp.matrix(jacobian[:, free].tolist())
+        prior = mp.diag([1 / mp.mpf(sd) ** 2 for sd in PRIOR[free].tolist()])
+        inverse = (rows.T * rows + prior) ** -1
+        centre = -inverse * (rows.T * mp.matrix(offset.tolist()))
+        mean, covariance = np.zeros(5), np.zeros((5, 5))
+        mean[free] = [float(value) for value in centre]
+        covariance[np.ix_(free, free)] = np.array(inverse.tolist(), dtype=float)
+    return mean, covariance
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_linear_problem_has_the_posterior_of_bayes(seed):
+    model = Linear(seed)
+    mean, covariance = posterior(model)
+    found = adjust(model, ALL, PRIOR * 0.9)
+    assert found.settled
+    assert found.scatter == 1.0
+    np.testing.assert_allclose(found.x, mean, rtol=1e-9, atol=1e-12)
+    for gradient in np.eye(5):
+        u, _ = uncertainty(found, gradient, GROUPS)
+        assert u == pytest.approx(math.sqrt(gradient @ covariance @ gradient), rel=1e-10)
+
+
+def test_fewer_matches_are_fewer_equations():
+    model = Linear(1)
+    some = {"impact": np.array([0, 5, 7]), "free": np.array([], dtype=int)}
+    found = adjust(model, some, np.zeros(5))
+    rows = model.jacobian["impact"][some["impact"]] / model.sigma["impact"][some["impact"], None]
+    np.testing.assert_allclose(found.data, (rows * PRIOR).T @ (rows * PRIOR), rtol=1e-12)
+    nothing = adjust(model, {"impact": np.array([], dtype=int)}, PRIOR)
+    assert not nothing.x.any()
+    u, budget = uncertainty(nothing, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), GROUPS)
+    assert (u, budget) == (PRIOR[1], {"place": PRIOR[1]})
+
+
+def test_degrees_of_freedom_are_edges_less_what_they_determine():
+    model = Linear(2)
+    found = adjust(model, ALL, np.zeros(5))
+    jacobian, offset = model.stacked()
+    _, covariance = posterior(model)
+    hat = jacobian @ covariance @ jacobian.T
+    assert found.degrees == pytest.approx(24 - np.trace(hat), rel=1e-10)
+    residuals = offset + jacobian @ found.x
+    assert found.chi2 == pytest.approx(residuals @ residuals, rel=1e-6)
+
+
+@pytest.mark.parametrize("outlier", [-60.0, 25.0, 1000.0])
+def test_an_outlier_pulls_with_bounded_force(outlier):
+    """At the optimum of Huber's loss its gradient is zero."""
+    model = Linear(3, noise=0.1, outlier=outlier)
+    found = adjust(model, ALL, np.zeros(5))
+    assert found.settled
+    jacobian, offset = model.stacked()
+    residuals = (offset + jacobian @ found.x) / found.scatter
+    assert np.abs(residuals).max() > HUBER
+    pull = jacobian.T @ np.clip(residuals, -HUBER, HUBER) / found.scatter
+    force = PRIOR * pull + np.divide(found.x, PRIOR, out=np.zeros(5), where=PRIOR > 0.0)
+    # The last step was shorter than 1e-6 standard uncertainties.
+    assert np.abs(force).max() < 1e-6 * np.abs(found.information).sum(axis=1).max()
+
+
+@pytest.mark.parametrize("factor", [1.5, 3.0, 20.0])
+def test_edges_that_scatter_more_count_less(factor):
+    """What is left over, in the enlarged standard deviations, is what one expects."""
+    model = Linear(4, noise=factor)
+    jacobian, offset = model.stacked()
+    found = adjust(model, ALL, np.zeros(5))
+    assert found.settled
+    assert factor / 1.6 < found.scatter < factor * 1.6
+    residuals = (offset + jacobian @ found.x) / found.scatter
+    assert 1 / 1.1 < math.sqrt(residuals @ residuals / found.degrees) < 1.05
+    # The uncertainty is that of Bayes with all σ so enlarged.
+    rows = jacobian[:, PRIOR > 0.0] / found.scatter
+    covariance = np.linalg.inv(rows.T @ rows + np.diag(PRIOR[PRIOR > 0.0] ** -2.0))
+    u, _ = uncertainty(found, np.eye(5)[1], GROUPS)
+    assert u == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-9)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.tuples(*[st.floats(-3, 3)] * 5))
+def test_squares_of_the_parts_add_up(seed, gradient):
+    found = adjust(Linear(seed), ALL, np.zeros(5))
+    u, budget = uncertainty(found, np.array(gradient), GROUPS)
+    assert sum(part**2 for part in budget.values()) == pytest.approx(u**2, rel=1e-9)
+
+
+def test_each_part_is_what_its_source_adds():
+    """Wiggle each input by its own standard uncertainty and look at the estimate itself."""
+    model = Linear(5)
+    found = adjust(model, ALL, np.zeros(5))
+    gradient = np.array([0.3, -1.0, 2.0, 0.5, 1.5])
+    _, budget = uncertainty(found, gradient, GROUPS)
+    _, covariance = posterior(model)
+    jacobian, _ = model.stacked()
+    # The estimate is −C(Jᵀr − P⁻¹x₀): linear in the edges r and in the prior means x₀.
+    by_edges = gradient @ covariance @ jacobian.T
+    by_prior = np.divide(gradient @ covariance, PRIOR, out=np.zeros(5), where=PRIOR > 0.0)
+    expected = {
+        "place": math.hypot(*by_prior[:2]),
+        "edges": math.hypot(*by_edges, by_prior[2]),
+        "rest": math.hypot(*by_prior[3:]),
+    }
+    assert budget == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_drop_s_budget_adds_up(scene):
+    result = case(SCENES[scene], seed=2).analyze()
+    assert result.quantities
+    for measured in result.quantities.values():
+        squares = sum(part**2 for part in measured.budget.values())
+        assert squares == pytest.approx(measured.u**2, rel=1e-9)
+        assert min(measured.budget.values()) > 0.0

@@ -1,0 +1,125 @@
+"""Observation equations and measurands: every derivative against finite differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rig.analysis.adjust import adjust
+from rig.analysis.drop_model import FLOOR, JITTER, DropModel
+from rig.analysis.quantities import _gravity, _impact, _separation, quantities
+from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, UNIFORM, case
+
+TWO_CHAINS = {"uniform", "graded"}
+STEPS = {"alpha": 1e-5, "impulses": 1e-5}  # of the rest: 1e-6 in m, s, m/s² and relative
+
+
+def somewhere(model: DropModel, seed: int) -> np.ndarray:
+    """A point near the true one, with every unknown off its nominal value."""
+    rng = np.random.default_rng(seed)
+    spread = np.minimum(model.unknowns.sd, 0.5e-3)
+    return model.first() + spread * rng.normal(size=spread.size)
+
+
+def steps(model: DropModel) -> np.ndarray:
+    found = np.full(len(model.unknowns), 1e-6)
+    for name, step in STEPS.items():
+        if name in model.unknowns:
+            found[model.unknowns[name]] = step
+    return found
+
+
+def differences(function, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Central differences, the unknowns along the last axis."""
+    columns = []
+    for n, h in enumerate(step):
+        shift = np.zeros_like(x)
+        shift[n] = h
+        columns.append((function(x + shift) - function(x - shift)) / (2 * h))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
+    model, matches = case(SCENES[scene], seed=seed).model()
+    x = somewhere(model, seed)
+    assert model.unknowns.sd.size == len(model.unknowns) == x.size
+    moving = np.zeros(x.size, dtype=np.bool_)
+    for role, match in matches.items():
+        found = model.equations(role, x, match)
+        assert found.residuals.size > 0.9 * sum(
+            train.rods.size for train in model.sides[role].trains
+        )
+        expected = differences(
+            lambda at, role=role, match=match: model.equations(role, at, match).residuals,
+            x,
+            steps(model),
+        )
+        # Heights near 1 m are rounded to 1e-16 m, over steps of 1e-6: 1e-10 of rounding; the
+        # third derivatives (m/s³ and below 1e3) times the step squared are less.
+        np.testing.assert_allclose(found.jacobian, expected, rtol=1e-7, atol=2e-9)
+        moving |= (found.jacobian != 0.0).any(axis=0)
+    idle = {name for name in model.unknowns._blocks if not moving[model.unknowns[name]].any()}
+    assert not idle
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_measurands_have_the_gradients_that_their_uncertainty_is_made_of(scene):
+    model, _ = case(SCENES[scene], seed=3).model()
+    x = somewhere(model, 3)
+
+    def measurands(at: np.ndarray) -> dict:
+        if scene == "fence":
+            return {"gravity_m_s2": _gravity(model, at)}
+        return _impact(model, at) | (_separation(model, at) if scene in TWO_CHAINS else {})
+
+    expected = differences(
+        lambda at: np.array([value for value, _ in measurands(at).values()]), x, steps(model)
+    )
+    gradients = np.stack([gradient for _, gradient in measurands(x).values()])
+    np.testing.assert_allclose(gradients, expected, rtol=1e-7, atol=2e-9)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "names"),
+    [
+        (UNIFORM, "separation_m separation_raw_m release_skew_s speed_m_s fall_time_s"),
+        (GRADED, "separation_m separation_raw_m release_skew_s speed_m_s fall_time_s"),
+        (SINGLE, "speed_m_s fall_time_s"),
+        (FENCE, "gravity_m_s2"),
+    ],
+)
+def test_a_scene_yields_what_it_has(protocol, names):
+    model, matches = case(protocol).model()
+    found = quantities(model, adjust(model, matches, model.first()))
+    assert sorted(found) == sorted(names.split())
+
+
+def test_what_a_scene_lacks_is_no_unknown():
+    uniform, single, fence = (case(p).model()[0].unknowns for p in (UNIFORM, SINGLE, FENCE))
+    assert {"alpha", "impulses", "impact release", "free release", "ripple"} <= set(uniform._blocks)
+    assert not {name for name in single._blocks if name.startswith("free")}
+    assert not {name for name in fence._blocks if name.startswith("impact")}
+    assert not {"alpha", "impulses", "ripple"} & set(fence._blocks)  # its bars are level
+
+
+def test_an_edge_is_as_sure_as_the_chain_is_slow():
+    """σ² = floor² + (V · jitter)², and a flicker is no better than it lasts."""
+    model, matches = case(UNIFORM, seed=3).model()
+    x = model.first()
+    for role, match in matches.items():
+        found = model.equations(role, x, match)
+        trains = model.sides[role].trains
+        times = np.concatenate([t.times[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
+        burst = np.concatenate([t.burst[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
+        _, speed = model.trajectory(role, x).heights(times)
+        expected = [
+            math.sqrt(FLOOR**2 + v**2 * (JITTER**2 + b**2))
+            for v, b in zip(speed, burst, strict=True)
+        ]
+        np.testing.assert_allclose(found.sigma, expected, rtol=1e-12)
+        assert (burst > 0.0).any()
+        assert (burst == 0.0).mean() > 0.9

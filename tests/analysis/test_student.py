@@ -1,0 +1,74 @@
+"""Coverage factors against the incomplete beta function in 30 digits."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+
+from rig.analysis.student import coverage_factor
+
+EPS = 2.0**-53
+
+
+def covered(k, degrees) -> mpf:
+    """P(|t| < k) = 1 − I_x(ν/2, ½) with x = ν/(ν + k²)."""
+    with mp.workdps(30):
+        nu, k = mpf(degrees), mpf(k)
+        x = nu / (nu + k * k)
+        # For x near 1 mpmath's series is slow; the complement I_{1−x}(½, ν/2) is the same number.
+        return mp.betainc(mpf("0.5"), nu / 2, 0, 1 - x, regularized=True)
+
+
+def rounding(degrees: float) -> float:
+    """How far off a probability may be: two lgammas of this size, each rounded twice."""
+    return 4 * EPS * max(1.0, abs(math.lgamma((degrees + 1) / 2)))
+
+
+def assert_covers(degrees: float, probability: float) -> None:
+    k = coverage_factor(degrees, probability)
+    # The bisection stops at 1e-12 of k, and k times the density is below 1.
+    assert abs(float(covered(k, degrees) - mpf(probability))) < 1e-12 + rounding(degrees)
+
+
+@pytest.mark.parametrize("degrees", [1, 1.5, 2, 2.7, 3, 5, 10.3, 30, 100, 1234.5, 1e4, 1e5])
+@pytest.mark.parametrize("probability", [0.5, 0.6827, 0.95, 0.99])
+def test_the_factor_covers_what_it_says(degrees, probability):
+    assert_covers(degrees, probability)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(0, 5).map(lambda exponent: 10.0**exponent))
+def test_any_real_number_of_degrees(degrees):
+    assert_covers(degrees, 0.95)
+
+
+def test_one_and_two_degrees_have_closed_forms():
+    p = 0.95
+    assert coverage_factor(1.0) == pytest.approx(math.tan(math.pi * p / 2), rel=1e-11)
+    assert coverage_factor(2.0) == pytest.approx(p * math.sqrt(2 / (1 - p * p)), rel=1e-11)
+
+
+def test_infinitely_many_degrees_are_the_normal_distribution():
+    normal = float(mp.sqrt(2) * mp.erfinv(mpf("0.95")))
+    # It is taken at ν = 10⁶, where t exceeds the normal quantile by (z² + 1)/4ν to first order.
+    excess = (normal**2 + 1) / 4e6
+    density = 2 * math.exp(-(normal**2) / 2) / math.sqrt(2 * math.pi)
+    error = rounding(1e6) / density / normal
+    assert error < excess / 50
+    assert coverage_factor(math.inf) / normal - 1 == pytest.approx(excess, abs=error)
+    assert coverage_factor(1e9) == coverage_factor(math.inf)
+
+
+def test_more_degrees_never_need_a_larger_factor():
+    factors = [coverage_factor(10 ** (n / 10)) for n in range(61)]
+    assert factors == sorted(factors, reverse=True)
+
+
+@pytest.mark.parametrize("degrees", [0.999, 0.0, -3.0, -math.inf, math.nan])
+def test_fewer_than_one_degree_is_refused(degrees):
+    with pytest.raises(ValueError, match="degrees of freedom"):
+        coverage_factor(degrees)

@@ -1,0 +1,188 @@
+"""Means over runs, their degrees of freedom and their agreement with the model, by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.student import coverage_factor
+from rig.analysis.summary import Incline, mean, summarize
+from rig.model.chain import Chain
+from rig.protocol.plan import runs
+from rig.units import Quantity
+from tests.analysis.drops import FENCE, SINGLE, UNIFORM
+
+AUDIT = Audit(660, 660, 0, 0, 0)
+REFERENCE = {
+    40.0: (0.11546810526538031, 6.9327596650855757),
+    80.0: (0.0098142050953198042, 5.25798131),
+}
+
+
+def measured(value: float, own: float, common: float = 0.0) -> Measured:
+    """A run's value with what is its own and what is common to all runs."""
+    return Measured(value, math.hypot(own, common), 500.0, {"edges": own, "beam heights": common})
+
+
+def test_runs_that_scatter_tell_their_own_uncertainty():
+    """1, 2, 6 scatter by √7; what is common, 0.4, stays."""
+    found = mean([measured(x, own=0.5, common=0.4) for x in (1.0, 2.0, 6.0)])
+    runs_part = math.sqrt(7 / 3)
+    assert found.value == 3.0
+    assert found.u == pytest.approx(math.sqrt(7 / 3 + 0.16), rel=1e-14)
+    assert found.budget == pytest.approx({"runs": runs_part, "common": 0.4}, rel=1e-14)
+    # Welch–Satterthwaite (GUM G.4) with ν = 2 and ∞.
+    assert found.degrees == pytest.approx(2 * found.u**4 / runs_part**4, rel=1e-13)
+    assert found.expanded == coverage_factor(found.degrees) * found.u
+
+
+def test_runs_that_happen_to_agree_are_no_better_than_each_allows():
+    found = mean([measured(x, own=3.0, common=4.0) for x in (10.0, 10.0, 10.3, 9.7)])
+    assert found.value == pytest.approx(10.0)
+    assert found.u == pytest.approx(math.hypot(3 / 2, 4), rel=1e-14)
+    assert found.degrees == math.inf
+    assert found.expanded == coverage_factor(math.inf) * found.u
+
+
+def test_one_run_is_that_run():
+    one = measured(7.0, own=3.0, common=4.0)
+    found = mean([one])
+    assert (found.value, found.u, found.degrees) == (7.0, 5.0, math.inf)
+
+
+def test_two_runs_that_disagree_have_one_degree_of_freedom():
+    found = mean([measured(0.0, own=0.1), measured(2.0, own=0.1)])
+    assert (found.value, found.u) == (1.0, pytest.approx(1.0))
+    assert found.degrees == pytest.approx(1.0)
+    assert found.expanded == pytest.approx(math.tan(0.475 * math.pi), rel=1e-9)
+
+
+def test_every_common_source_stays_and_every_own_one_averages():
+    common = (
+        "clock",
+        "gravity",
+        "drop height",
+        "beam heights",
+        "beam offsets",
+        "rod places",
+        "rod width",
+    )
+    own = ("edges", "single impulses", "hanging height")
+    for names, expected in ((common, 1.0), (own, 0.5)):
+        for name in names:
+            run = Measured(1.0, 1.0, math.inf, {name: 1.0})
+            assert mean([run] * 4).u == pytest.approx(expected), name
+
+
+parts = st.floats(1e-6, 1e3)
+
+
+@given(
+    st.lists(st.tuples(st.floats(-1e3, 1e3), parts, parts), min_size=1, max_size=8),
+    st.floats(0.01, 100),
+)
+def test_a_mean_in_other_units_is_the_same(drawn, factor):
+    one = mean([measured(*run) for run in drawn])
+    other = mean([measured(*(factor * x for x in run)) for run in drawn])
+    assert other.value == pytest.approx(factor * one.value, rel=1e-9, abs=1e-9 * factor)
+    assert other.u == pytest.approx(factor * one.u, rel=1e-6)
+    least = math.hypot(*(common for *_, common in drawn)) / math.sqrt(len(drawn))
+    assert one.u >= least * (1 - 1e-9)
+    assert one.degrees >= 1 or len(drawn) > 1
+    assert one.degrees >= (len(drawn) - 1) * (1 - 1e-9)
+
+
+def test_normalized_error_by_hand():
+    mean_ = Measured(0.120, 0.003, math.inf)
+    line = Incline(40.0, 3, {"separation_m": mean_}, {}, {"separation_m": Quantity(0.110, 0.004)})
+    z = 1.959963984540054
+    assert line.normalized_error("separation_m") == pytest.approx(0.010 / (z * 0.005), rel=2e-6)
+    few = replace(line, means={"separation_m": Measured(0.120, 0.003, 2.0)})
+    wide = math.hypot(4.302652729911275 * 0.003, z * 0.004)
+    assert few.normalized_error("separation_m") == pytest.approx(0.010 / wide, rel=2e-6)
+    assert line.normalized_error("speed_m_s") is None
+    exact = replace(
+        line, means={"separation_m": Measured(0.1, 0.0)}, predicted={"separation_m": Quantity(0.1)}
+    )
+    assert exact.normalized_error("separation_m") is None
+
+
+def results(protocol, values: dict[float, list[float]], verdict="accepted") -> list[DropResult]:
+    """Made-up drops: Δz is the value, V fifty times it."""
+    found = []
+    for incline, numbers in values.items():
+        planned = [run for run in runs(protocol) if run.incline_deg == incline]
+        for run, x in zip(planned, numbers, strict=False):
+            quantities = {"separation_m": measured(x, 1e-4), "speed_m_s": measured(50 * x, 1e-2)}
+            found.append(DropResult(run, 1, verdict, (), AUDIT, quantities))
+    return found
+
+
+def test_inclines_come_in_order_and_only_good_runs_count():
+    drops = results(UNIFORM, {80.0: [0.010], 40.0: [0.113, 0.114, 0.118]})
+    drops[-1] = replace(drops[-1], verdict="marginal")
+    for bad in ("void", "rejected"):
+        drops += results(UNIFORM, {60.0: [0.5], 40.0: [0.5]}, bad)
+    first, second = summarize(UNIFORM, drops)
+    assert (first.incline_deg, first.n, second.incline_deg, second.n) == (40.0, 3, 80.0, 1)
+    assert first.means["separation_m"].value == pytest.approx(0.115)
+    assert first.deviations["separation_m"] == pytest.approx(math.sqrt(7e-6), rel=1e-9)
+    assert first.deviations["speed_m_s"] == pytest.approx(50 * math.sqrt(7e-6), rel=1e-9)
+    assert second.deviations == {}
+    for line in (first, second):
+        separation, speed = REFERENCE[line.incline_deg]
+        assert line.predicted["separation_m"].value == pytest.approx(separation, rel=1e-12)
+        assert line.predicted["speed_m_s"].value == pytest.approx(speed, rel=1e-8)
+    # At 40°: 3.5 mm for β ± 0.05, 4.6 mm for μ ± 0.05 (here 0.02), 0.3 mm for 10 mm (here 2 mm).
+    u = math.hypot(3.5e-3, 4.6e-3 * 0.4, 0.3e-3 * 0.2)
+    assert first.predicted["separation_m"].u == pytest.approx(u, rel=0.02)
+    assert summarize(UNIFORM, []) == []
+
+
+def test_outside_the_model_there_is_nothing_to_compare_with():
+    """Eq. 13 is singular for slender rods on a steep enough friction."""
+    chain = replace(UNIFORM.chains["A"].chain, inertia=0.01)
+    rods = replace(UNIFORM.chains["A"], chain=chain)
+    surface = replace(UNIFORM.surface, friction=Quantity(1.2), pile=None)
+    protocol = replace(UNIFORM, chains={"A": rods, "B": rods}, surface=surface)
+    (line,) = summarize(protocol, results(protocol, {40.0: [0.1, 0.11]}))
+    assert line.predicted == {}
+    assert line.json()["normalized_error"] is None
+    assert line.json()["predicted"] == {}
+
+
+def test_top_rods_of_unlike_chains_start_apart():
+    """The free chain's extra length is there from the beginning; each run has its own."""
+    a = UNIFORM.chains["A"]
+    longer = replace(a, chain=Chain(a.chain.masses, tuple(z * 1.2 for z in a.chain.heights)))
+    protocol = replace(UNIFORM, chains={"A": a, "B": longer})
+    drops = results(protocol, {40.0: [0.1, 0.1]})
+    by_chain = {}
+    for drop in drops:
+        (line,) = summarize(protocol, [drop])
+        by_chain[drop.run.impact] = line.predicted["separation_m"].value
+    assert set(by_chain) == {"A", "B"}
+    assert by_chain["A"] == pytest.approx(REFERENCE[40.0][0] + 0.2 * 1.165, rel=1e-12)
+    assert by_chain["B"] < 0.0
+    (both,) = summarize(protocol, drops)
+    assert both.predicted["separation_m"].value == pytest.approx(sum(by_chain.values()) / 2)
+
+
+def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
+    run = runs(SINGLE)[0]
+    drop = DropResult(run, 1, "accepted", (), AUDIT, {"speed_m_s": measured(6.9, 0.01)})
+    (line,) = summarize(SINGLE, [drop])
+    assert set(line.predicted) == set(line.means) == {"speed_m_s"}
+    assert line.predicted["speed_m_s"].value == pytest.approx(REFERENCE[40.0][1], rel=1e-12)
+    bars = DropResult(
+        runs(FENCE)[0], 1, "accepted", (), AUDIT, {"gravity_m_s2": measured(9.8, 0.01)}
+    )
+    (line,) = summarize(FENCE, [bars])
+    assert line.predicted == {"gravity_m_s2": FENCE.gravity}
+    z = 1.959963984540054
+    assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (z * 0.01), rel=2e-6)

@@ -1,0 +1,129 @@
+"""What the tests of the command line share: short protocols, and what a session must look like."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+from rig.replay import replay
+from rig.session.schema import RunState
+from rig.session.store import Session
+
+ROOT = Path(__file__).parents[2]
+PROTOCOLS = ROOT / "protocols"
+GOOD = {RunState.ACCEPTED, RunState.MARGINAL}
+
+_SHORT = """\
+protocol: 1
+title: A short campaign
+chains:
+  A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, rod_length: 102 mm, tilt: 12 deg}
+  B: {like: A}
+surface:
+  restitution: 0.50 ± 0.05
+  friction: 0.20 ± 0.02
+  pile: {below: 30 deg, restitution: -0.37}
+drop: 180 mm ± 2 mm
+gravity: 9.81 m/s^2
+gates:
+  impact:
+    - {channel: 0, height: 22 mm}
+    - {channel: 1, height: 34 mm}
+    - {channel: 2, height: 70 mm}
+    - {channel: 3, height: 130 mm}
+    - {channel: 4, height: 204 mm}
+    - {channel: 5, height: 350 mm}
+    - {channel: 6, height: 690 mm}
+    - {channel: 7, height: 1078 mm}
+  free:
+    - {channel: 8, height: 20 mm}
+    - {channel: 9, height: 60 mm}
+    - {channel: 10, height: 100 mm}
+    - {channel: 11, height: 140 mm}
+    - {channel: 12, height: 204 mm}
+    - {channel: 13, height: 350 mm}
+    - {channel: 14, height: 690 mm}
+    - {channel: 15, height: 1078 mm}
+  height_uncertainty: 0.3 mm
+release: {channel: 0, pulse: 80 ms}
+plan: {incline: INCLINES, repeats: REPEATS, settle: SETTLE}
+accept: {release_skew: 5 ms, missed_edges: 5 %}
+"""
+
+
+def short(inclines: str = "[40 deg, 60 deg]", repeats: int = 2, settle: str = "1 s") -> str:
+    """Write a protocol of the two-chain experiment with few runs."""
+    text = _SHORT.replace("INCLINES", inclines).replace("REPEATS", str(repeats))
+    return text.replace("SETTLE", settle)
+
+
+def without(key: str, text: str) -> str:
+    """Leave one top-level key out of a protocol."""
+    kept, leaving = [], False
+    for line in text.splitlines():
+        if not line.startswith(" "):
+            leaving = line.startswith(f"{key}:")
+        if not leaving:
+            kept.append(line)
+    return "\n".join(kept) + "\n"
+
+
+def command(*arguments: object) -> list[str]:
+    """Name the program as a user starts it; a warning is an error there too."""
+    return [sys.executable, "-W", "error", "-m", "rig", *map(str, arguments)]
+
+
+def rig(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run ``rig`` as a process of its own."""
+    streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.run(
+        command(*arguments),
+        cwd=ROOT,
+        text=True,
+        timeout=120,
+        check=False,
+        **{**streams, **options},
+    )
+
+
+def truth_of(session: Path) -> list[dict[str, Any]]:
+    """Return the hidden truth, one drop that fell a line."""
+    file = session.with_name(session.name + ".truth.jsonl")
+    return [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+
+
+def log_of(session: Path) -> dict[int, list[tuple[int, RunState]]]:
+    """Return what became of each run, in order."""
+    log: dict[int, list[tuple[int, RunState]]] = defaultdict(list)
+    with Session.open(session, readonly=True) as opened:
+        for entry in opened.states():
+            log[entry.run].append((entry.attempt, entry.state))
+    return dict(log)
+
+
+def drops_of(session: Path) -> list[tuple[int, int]]:
+    """Return run and attempt of every recorded drop, in order of recording."""
+    with Session.open(session, readonly=True) as opened:
+        return [(drop.run, drop.attempt) for drop in opened.drops()]
+
+
+def assert_whole(session: Path, planned: int) -> None:
+    """Assert that a finished session is what it would be, had nobody ever interrupted it."""
+    log, drops = log_of(session), drops_of(session)
+    assert sorted(log) == list(range(1, planned + 1))
+    for run, entries in log.items():
+        good = [n for n, (_, state) in enumerate(entries) if state in GOOD]
+        assert good == [len(entries) - 1], f"run {run} is done once, and nothing follows: {entries}"
+        attempts = [attempt for attempt, _ in entries]
+        assert attempts == sorted(attempts), f"run {run}: {entries}"
+        recorded = [attempt for attempt, state in entries if state == RunState.RECORDED]
+        assert recorded == [attempt for number, attempt in drops if number == run]
+        assert recorded[-1] == attempts[-1]
+        judged = {attempt for attempt, state in entries if state in {*GOOD, RunState.VOID}}
+        assert judged == set(recorded), f"run {run}: every drop counts: {entries}"
+    with Session.open(session, readonly=True) as opened:
+        assert replay(opened).lines[-1] == "identical"

@@ -1,0 +1,151 @@
+"""``rig analyze`` and ``rig report`` of a session on the disk."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from rig.session.store import Session
+from tests.cli.lab import rig, short
+
+SVG = 'xmlns="http://www.w3.org/2000/svg"'
+
+
+@pytest.fixture(scope="module")
+def page(finished, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    done = rig("report", finished.session, "-o", folder / "report.html")
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert done.stderr == f"report: {folder / 'report.html'}\n"
+    return folder / "report.html"
+
+
+def test_the_table_is_the_one_of_the_run(call, finished):
+    done = call("analyze", finished.session)
+    assert (done.code, done.err) == (0, "")
+    assert done.out == finished.table.out
+
+
+def test_analysing_changes_nothing_but_the_results(call, finished, tmp_path):
+    session = finished.copy(tmp_path)
+
+    def contents():
+        with Session.open(session, readonly=True) as opened:
+            return (
+                *(list(opened.byte_log()), opened.pings(), list(opened.drops())),
+                *(opened.states(), opened.results(), opened.identities(), dict(opened.meta)),
+            )
+
+    before = contents()
+    assert call("analyze", session).code == 0
+    assert contents() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["copy.session"]
+
+
+def test_a_write_protected_session_is_analysed(finished, analysis, tmp_path):
+    session = finished.copy(tmp_path)
+    session.chmod(0o444)
+    tmp_path.chmod(0o555)
+    try:
+        done = rig("analyze", session, "--json")
+    finally:
+        tmp_path.chmod(0o755)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == analysis
+
+
+def test_normalized_errors_are_what_they_say(analysis):
+    for line in analysis["summary"]:
+        difference = line["separation_m"]["value"] - line["predicted"]["separation_m"]
+        width = (line["separation_m"]["U95"] ** 2
+                 + (1.96 * line["predicted_u"]["separation_m"]) ** 2) ** 0.5  # fmt: skip
+        assert line["normalized_error"] == pytest.approx(difference / width, rel=1e-3)
+
+
+def test_a_mean_is_the_mean_of_its_runs(analysis):
+    for line in analysis["summary"]:
+        runs = [r for r in analysis["runs"] if r["incline_deg"] == line["incline_deg"]]
+        values = [r["separation_m"]["value"] for r in runs]
+        assert line["n"] == len(runs) == 2
+        assert line["separation_m"]["value"] == pytest.approx(sum(values) / 2, rel=1e-14)
+        spread = abs(values[0] - values[1]) / 2**0.5
+        assert line["separation_sd_m"] == pytest.approx(spread, rel=1e-9)
+
+
+def test_skew_is_what_the_correction_is_for(analysis):
+    """About 4.9 mm of Δz a millisecond: the free chain falls on at its speed of then."""
+    for run in analysis["runs"]:
+        skew = run["release_skew_s"]["value"]
+        shift = run["separation_raw_m"]["value"] - run["separation_m"]["value"]
+        assert shift == pytest.approx(5.0 * skew, rel=0.05)
+
+
+def test_the_report_is_one_page_that_loads_nothing(page):
+    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
+    html = page.read_text("utf-8")
+    loaded = re.findall(r'(?:src|href|srcset|data|action|poster)\s*=\s*["\']([^"\']*)', html)
+    assert all(target.startswith(("#", "data:")) for target in loaded), loaded
+    assert not re.search(r"@import|url\((?!\s*[\"']?#)|<script|<link|<iframe|<object", html)
+    assert "default-src 'none'" in html
+    assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", html)
+
+
+def test_the_report_has_the_stamp_both_figures_and_every_run(page, analysis, finished):
+    html = page.read_text("utf-8")
+    assert html.startswith("<!DOCTYPE html>")
+    assert "<title>SIMULATED – A short campaign</title>" in html
+    assert '<p class="stamp">SIMULATED DATA</p>' in html
+    figures = re.findall(r"<svg\b.*?</svg>", html, re.DOTALL)
+    assert len(figures) == 2
+    assert all("SIMULATED" in figure for figure in figures)
+    assert "Separation and end speed against inclination" in html
+    assert "Runs in order" in html
+    assert "4 runs: 4 accepted" in html
+    with Session.open(finished.session, readonly=True) as session:
+        assert session.meta["protocol_sha256"] in html
+    assert "virtual" in html
+    assert "restitution: 0.50 ± 0.05" in html
+
+
+def test_a_report_tells_no_paths_of_the_machine(page, finished):
+    assert str(finished.session.parent) not in page.read_text("utf-8")
+
+
+def test_the_same_session_gives_the_same_page(call, finished, page, tmp_path):
+    assert call("report", finished.session, "-o", tmp_path / "r.html").code == 0
+    assert (tmp_path / "r.html").read_bytes() == page.read_bytes()
+
+
+def test_a_report_can_be_written_of_a_session_without_a_drop(call, tmp_path, protocol):
+    session = tmp_path / "s"
+    assert call("run", protocol, "--port", "/dev/nonexistent", "--session", session).code == 4
+    done = call("analyze", session, "--json")
+    assert (done.code, json.loads(done.out)["runs"], json.loads(done.out)["summary"]) == (0, [], [])
+    assert call("report", session, "-o", tmp_path / "r.html").code == 0
+    html = (tmp_path / "r.html").read_text("utf-8")
+    assert "No accepted runs" in html
+    assert "SIMULATED" not in html
+    assert call("export", session, "--csv", tmp_path / "csv").code == 0
+    assert (tmp_path / "csv" / "edges.csv").read_text("utf-8") == "run,channel,time_s,state\n"
+    assert call("replay", session).code == 0
+
+
+def test_a_title_cannot_break_the_page(call, tmp_path):
+    protocol, session = tmp_path / "p.yaml", tmp_path / "s"
+    text = short("40 deg", 1).replace("A short campaign", "'<b>\"A & B\"</b>'")
+    protocol.write_text(text, "utf-8")
+    assert call("run", protocol, "--port", "sim://", "--session", session).code == 0
+    assert call("report", session, "-o", tmp_path / "r.html").code == 0
+    html = (tmp_path / "r.html").read_text("utf-8")
+    assert "<b>" not in html
+    assert "&lt;b&gt;" in html
+
+
+def test_a_report_that_cannot_be_written_leaves_the_old_one(call, finished, tmp_path):
+    done = call("report", finished.session, "-o", tmp_path / "none" / "r.html")
+    assert done.code == 2
+    assert done.err.startswith(f"cannot write {tmp_path / 'none' / 'r.html'}: ")
+    assert call("report", finished.session, "-o", tmp_path).code == 2
+    assert list(tmp_path.iterdir()) == []

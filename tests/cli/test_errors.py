@@ -1,0 +1,301 @@
+"""Bad arguments, bad files, closed pipes: one located line a problem, and never a traceback."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+
+import pytest
+
+from rig.session.store import Session
+from tests.cli.lab import PROTOCOLS, ROOT, command, rig, short
+
+
+def assert_told(done, code=2):
+    """Assert that the user was told, on stderr and in words."""
+    assert done.code == code, done
+    assert done.out == ""
+    assert done.err
+    assert "Traceback" not in done.err
+    assert "Error" not in done.err
+
+
+@pytest.fixture
+def files(tmp_path, finished):
+    """Files that are not what a command wants, by name."""
+    made = {
+        "folder": tmp_path,
+        "absent": tmp_path / "absent",
+        "nowhere": tmp_path / "no" / "such" / "folder" / "file",
+        "empty": tmp_path / "empty",
+        "binary": tmp_path / "binary",
+        "cut": tmp_path / "cut",
+        "text": tmp_path / "text",
+        "null": "/dev/null",
+        "nothing": "",
+        "root": "/",
+    }
+    made["empty"].touch()
+    made["binary"].write_bytes(bytes(range(256)) * 40)
+    made["cut"].write_bytes(finished.session.read_bytes()[:30_000])
+    made["text"].write_text("just words\n", "utf-8")
+    return made
+
+
+NOT_A_PROTOCOL = ("folder", "absent", "empty", "binary", "text", "null", "nothing")
+NOT_A_SESSION = ("folder", "absent", "empty", "binary", "cut", "text", "null", "nothing", "root")
+
+
+@pytest.mark.parametrize("name", NOT_A_PROTOCOL)
+def test_what_is_no_protocol_is_refused(call, files, tmp_path, name):
+    new = tmp_path / "new"
+    for arguments in (
+        ("check",),
+        ("predict", "--json"),
+        ("run", "--port", "sim://", "--session", new),
+        ("import", files["text"], "--session", new, "--protocol"),
+    ):
+        assert_told(call(*arguments, files[name]))
+        assert not new.exists()
+
+
+@pytest.mark.parametrize("name", NOT_A_SESSION)
+def test_what_is_no_session_is_refused_and_left_alone(call, files, tmp_path, name):
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for arguments in (
+        ("analyze",),
+        ("analyze", "--json"),
+        ("replay",),
+        ("report", "-o", tmp_path / "out.html"),
+        ("export", "--csv", tmp_path / "out"),
+    ):
+        assert_told(call(*arguments, files[name]))
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", ["folder", "nowhere", "empty", "binary", "cut", "text", "nothing"])
+def test_a_run_does_not_overwrite_another_file(call, files, protocol, name):
+    kept = {path: path.read_bytes() for path in protocol.parent.iterdir()}
+    for port in ("sim://", "/dev/nonexistent"):
+        assert_told(call("run", protocol, "--port", port, "--session", files[name]))
+    assert {path: path.read_bytes() for path in protocol.parent.iterdir()} == kept
+
+
+@pytest.mark.parametrize(
+    "port",
+    [
+        "sim://?protocol=/no/such/file",
+        "sim://?truth=/no/such/folder/file",
+        "sim://?no_such_dial=1",
+        "sim://?skew_sd=3",
+        "sim://?lose=nan",
+        "sim://?missed=2",
+        "sim://?pace=often",
+        "sim://?seed=x",
+        "sim://?seed=1&seed=2",
+        "sim://?quiet=perhaps",
+        "sim://[half",
+    ],
+)
+def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port):
+    assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"))
+
+
+@pytest.mark.parametrize(
+    "port", ["", "nonsense", "/dev/null", "/etc/passwd", "no://such", "hwgrep://nobody", "loop://"]
+)
+def test_a_port_that_cannot_be_opened_is_device_trouble(
+    call, protocol, tmp_path, port, monkeypatch
+):
+    monkeypatch.setattr("rig.link.client.BOOT_WAIT_S", 0.0)
+    monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
+    assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"), 4)
+    with Session.open(tmp_path / "s") as session:
+        assert not session.simulated
+        assert session.states() == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("no-such-command",),
+        ("run",),
+        ("run", "p.yaml", "--port", "sim://"),
+        ("run", "p.yaml", "--port", "sim://", "--session", "s", "--seed", "many"),
+        ("analyze",),
+        ("analyze", "a", "b"),
+        ("report", "s"),
+        ("export", "s"),
+        ("import", "e.csv"),
+        ("replay", "s", "--json"),
+        ("bench",),
+        ("bench", "no-such-benchmark"),
+        ("bench", "accuracy", "--seeds", "0"),
+        ("bench", "accuracy", "--seeds", "few"),
+        ("bench", "accuracy", "--seeds", "1", "--port", "/dev/null"),
+        ("bench", "accuracy", "--seeds", "1", "--protocol", "no/such/file"),
+        ("bench", "accuracy", "--seeds", "1", "--protocol", str(PROTOCOLS / "bead-chain.yaml")),
+    ],
+)
+def test_bad_arguments_are_refused(call, arguments):
+    done = call(*arguments)
+    assert done.code == 2
+    assert done.out == ""
+    assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("--version",)])
+def test_help_goes_to_stdout(call, arguments):
+    done = call(*arguments)
+    assert (done.code, done.err) == (0, "")
+    assert "rig" in done.out
+
+
+def test_every_problem_of_a_protocol_has_its_line_and_column(call, tmp_path):
+    protocol = tmp_path / "bad.yaml"
+    text = short().replace("drop: 180 mm", "drop: 180 kg").replace("repeats: 2", "repeat: 2")
+    protocol.write_text(text + "gravity: 9.8 m/s^2\n", "utf-8")
+    for arguments in (
+        ("check",),
+        ("predict",),
+        ("run", "--port", "sim://", "--session", tmp_path / "s"),
+    ):
+        done = call(*arguments, protocol)
+        assert_told(done)
+        places = [
+            re.fullmatch(rf"{re.escape(str(protocol))}:(\d+):(\d+): (\S+): .+", line)
+            for line in done.err.splitlines()
+        ]
+        assert all(places), done.err
+        lines = text.splitlines()
+        found = {(int(place[1]), place[3]) for place in places}
+        assert {
+            (1 + lines.index("drop: 180 kg ± 2 mm"), "drop"),
+            (len(lines) + 1, "gravity"),
+        } <= found
+        assert any(key == "plan.repeat" for _, key in found)
+
+
+def test_a_protocol_without_gates_points_to_predict(call, tmp_path):
+    beads = PROTOCOLS / "bead-chain.yaml"
+    done = call("run", beads, "--port", "sim://", "--session", tmp_path / "s")
+    assert_told(done)
+    message, hint = done.err.splitlines()
+    assert message == f"{beads} has no gates, so nothing can be measured"
+    assert f"rig predict {beads}" in hint
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_session_of_another_protocol_is_not_continued(call, finished, tmp_path):
+    session, other = finished.copy(tmp_path), tmp_path / "other.yaml"
+    before = session.read_bytes()
+    other.write_text(short().replace("tilt: 12 deg", "tilt: 13 deg"), "utf-8")
+    done = call("run", other, "--port", "sim://", "--session", session)
+    assert_told(done)
+    assert "was made with another protocol (short.yaml)" in done.err
+    assert session.read_bytes() == before
+
+
+def test_simulated_and_real_data_are_never_mixed(call, finished, protocol, tmp_path):
+    session = finished.copy(tmp_path)
+    before = session.read_bytes()
+    done = call("run", finished.protocol, "--port", "/dev/nonexistent", "--session", session)
+    assert_told(done)
+    assert "is a simulated session and /dev/nonexistent is a real port" in done.err
+    assert session.read_bytes() == before
+
+    real = tmp_path / "real"
+    assert call("run", protocol, "--port", "/dev/nonexistent", "--session", real).code == 4
+    before = real.read_bytes()
+    for port in ("sim://", "emu://mega"):
+        done = call("run", protocol, "--port", port, "--session", real)
+        assert_told(done)
+        assert f"is a real session and {port}" in done.err
+    assert real.read_bytes() == before
+    assert not (tmp_path / "real.truth.jsonl").exists()
+
+
+# ------------------------------------------------- where the output goes
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("analyze", "SESSION"),
+        ("analyze", "SESSION", "--json"),
+        ("replay", "SESSION"),
+        ("predict", "PROTOCOL", "--json"),
+        ("check", "PROTOCOL"),
+        ("--help",),
+    ],
+)
+def test_a_closed_pipe_is_no_error(finished, tmp_path, arguments):
+    names = {"SESSION": finished.copy(tmp_path), "PROTOCOL": finished.protocol}
+    ours, theirs = os.pipe()
+    os.close(ours)  # as `head` does when it has seen enough, only sooner
+    try:
+        done = rig(*(names.get(word, word) for word in arguments), stdout=theirs)
+    finally:
+        os.close(theirs)
+    assert done.stderr == ""
+    assert done.returncode == 0
+
+
+def test_a_reader_that_leaves_in_the_middle_is_no_error(finished, tmp_path):
+    """As in ``rig analyze --json | head -1``."""
+    arguments = command("analyze", finished.copy(tmp_path), "--json")
+    with subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout.read(1) == b"{"
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+def test_a_full_disk_behind_stdout_is_told(finished):
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        done = rig("predict", finished.protocol, stdout=full)
+    assert done.returncode == 2
+    assert done.stderr == "rig: [Errno 28] No space left on device\n"
+
+
+@pytest.mark.parametrize("closed", ["1", "2"])
+def test_streams_may_be_closed(finished, tmp_path, closed):
+    session = finished.copy(tmp_path)
+    done = subprocess.run(
+        ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *command("analyze", session)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert done.stdout == ("" if closed == "1" else finished.table.out)
+
+
+def test_an_error_nobody_reads_keeps_its_code(tmp_path):
+    ours, theirs = os.pipe()
+    os.close(ours)
+    try:
+        assert rig("analyze", tmp_path / "none", stderr=theirs).returncode == 2
+    finally:
+        os.close(theirs)
+
+
+def test_names_need_not_be_utf_8(tmp_path, protocol):
+    session = os.fsdecode(os.fsencode(tmp_path) + b"/\xff.session")
+    done = rig("run", protocol, "--port", "sim://", "--session", session)
+    assert done.returncode == 0, done.stderr
+    assert rig("analyze", session).returncode == 0
+
+
+def test_a_terminal_without_greek_letters_is_served(finished, tmp_path):
+    environment = os.environ | {"PYTHONIOENCODING": "latin-1"}
+    done = rig("analyze", finished.copy(tmp_path), env=environment, encoding="latin-1")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "?z ± U (cm)" in done.stdout

@@ -1,0 +1,242 @@
+"""Edges go out as CSV and come in from any timer."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import pytest
+
+from rig.session.store import Session
+from tests.cli.lab import PROTOCOLS, drops_of, short
+
+QUANTITIES = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
+
+
+@pytest.fixture(scope="module")
+def exported(finished, tmp_path_factory):
+    """The finished session's CSV files, as the program itself writes them."""
+    from rig.cli import main
+
+    folder = tmp_path_factory.mktemp("exported") / "csv"
+    assert main(["export", str(finished.session), "--csv", str(folder)]) == 0
+    return folder
+
+
+def table(path):
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.fixture
+def bring(call, finished, exported, tmp_path):
+    """Import an edge file, the exported one by default."""
+
+    def run(*more, events=None, protocol=None, session="imported"):
+        return call(
+            *("import", events or exported / "edges.csv"),
+            *("--protocol", protocol or finished.protocol, "--session", tmp_path / session),
+            *more,
+        )
+
+    return run
+
+
+def test_every_table_is_written(exported, analysis, finished):
+    names = {"README.txt", "edges.csv", "pings.csv", "runs.csv", "states.csv", "summary.csv"}
+    assert {path.name for path in exported.iterdir()} == names
+    for row, run in zip(table(exported / "runs.csv"), analysis["runs"], strict=True):
+        assert int(row["run"]) == run["run"]
+        assert row["verdict"] == run["verdict"]
+        for name in QUANTITIES:
+            assert float(row[name]) == run[name]["value"]
+            assert float(row[f"{name}_U95"]) == run[name]["U95"]
+        assert int(row["edges_matched"]) == run["edges"]["matched"]
+    for row, line in zip(table(exported / "summary.csv"), analysis["summary"], strict=True):
+        assert float(row["separation_m"]) == line["separation_m"]["value"]
+        assert int(row["n"]) == line["n"]
+    with Session.open(finished.session, readonly=True) as session:
+        assert len(table(exported / "states.csv")) == len(session.states())
+        assert len(table(exported / "pings.csv")) == len(session.pings())
+        edges = sum(len(drop.edges) for drop in session.drops())
+    assert len(table(exported / "edges.csv")) == edges
+    assert (exported / "README.txt").read_text("utf-8").startswith("SIMULATED DATA")
+
+
+def test_exporting_twice_gives_the_same_files(call, finished, exported, tmp_path):
+    done = call("export", finished.session, "--csv", tmp_path / "deep" / "er")
+    assert (done.code, done.out) == (0, "")
+    for path in exported.iterdir():
+        assert (tmp_path / "deep" / "er" / path.name).read_bytes() == path.read_bytes()
+
+
+def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_path):
+    done = bring("--clock-uncertainty", "10 ppm", "--simulated")
+    assert (done.code, done.out) == (0, "")
+    edges = sum(run["edges"]["received"] for run in analysis["runs"])
+    assert done.err == f"{edges} edges of 4 runs → {tmp_path / 'imported'}\n"
+    again = json.loads(call("analyze", tmp_path / "imported", "--json").out)
+    for one, two in zip(analysis["runs"], again["runs"], strict=True):
+        assert (one["run"], one["verdict"]) == (two["run"], two["verdict"])
+        assert one["edges"] == two["edges"]
+        for name in QUANTITIES:
+            clock = next(
+                line["u"]
+                for line in one["budget"]
+                if (line["name"], line["quantity"]) == ("clock", name)
+            )
+            assert abs(one[name]["value"] - two[name]["value"]) <= 2.0 * clock + 1e-9, name
+    for one, two in zip(analysis["summary"], again["summary"], strict=True):
+        assert one["separation_m"]["value"] == pytest.approx(two["separation_m"]["value"], abs=1e-6)
+        assert one["speed_m_s"]["value"] == pytest.approx(two["speed_m_s"]["value"], abs=1e-4)
+    assert again["clock"] == {"source": "times as the file gives them", "relative_u": 1e-5}
+
+
+def test_a_clock_that_is_hardly_known_widens_the_uncertainties(bring, call, tmp_path):
+    assert bring("--clock-uncertainty", "10 ppm", session="good").code == 0
+    assert bring(session="poor").code == 0
+    good, poor = (
+        json.loads(call("analyze", tmp_path / name, "--json").out) for name in ("good", "poor")
+    )
+    assert poor["clock"]["relative_u"] == pytest.approx(0.005 / 3**0.5)
+    for one, two in zip(good["runs"], poor["runs"], strict=True):
+        assert two["speed_m_s"]["u"] > one["speed_m_s"]["u"]
+
+
+def test_only_what_is_simulated_is_stamped(bring, call, exported, tmp_path):
+    rows = (exported / "edges.csv").read_text("utf-8").splitlines(keepends=True)
+    events = tmp_path / "one.csv"
+    events.write_text("".join(row for row in rows if row[0] in "r1"), "utf-8")
+    for name, more in (("simulated", ("--simulated",)), ("real", ())):
+        assert bring(*more, session=name, events=events).code == 0
+        session, page = tmp_path / name, tmp_path / f"{name}.html"
+        stamped = name == "simulated"
+        assert json.loads(call("analyze", session, "--json").out)["simulated"] is stamped
+        assert call("analyze", session).out.startswith("SIMULATED DATA\n") is stamped
+        assert call("report", session, "-o", page).code == 0
+        assert ("SIMULATED DATA" in page.read_text("utf-8")) is stamped
+        assert call("export", session, "--csv", tmp_path / f"{name}-csv").code == 0
+        readme = (tmp_path / f"{name}-csv" / "README.txt").read_text("utf-8")
+        assert readme.startswith("SIMULATED DATA") is stamped
+
+
+def test_an_import_is_replayed_without_bytes(bring, call, tmp_path):
+    assert bring().code == 0
+    session = tmp_path / "imported"
+    assert call("replay", session).code == 0
+    assert call("analyze", session).code == 0
+    done = call("replay", session)
+    assert done.out.splitlines() == [
+        "no bytes were recorded: the edges come from a file",
+        "results: 4 identical",
+        "identical",
+    ]
+
+
+def test_what_an_import_lacks_can_be_measured_afterwards(bring, call, exported, finished, tmp_path):
+    rows = (exported / "edges.csv").read_text("utf-8").splitlines(keepends=True)
+    events = tmp_path / "half.csv"
+    events.write_text("".join(row for row in rows if row[0] in "r12"), "utf-8")
+    assert bring("--simulated", "--clock-uncertainty", "10 ppm", events=events).code == 0
+    session = tmp_path / "imported"
+    before = json.loads(call("analyze", session, "--json").out)["runs"]
+    done = call("run", finished.protocol, "--port", "sim://", "--session", session, "--json")
+    assert done.code == 0, done.err
+    assert drops_of(session) == [(1, 1), (2, 1), (3, 1), (4, 1)]
+    assert json.loads(done.out)["runs"][:2] == before, "its own clock stays its own"
+
+
+def refused(done, tmp_path, session="imported"):
+    assert done.code == 2
+    assert done.out == ""
+    assert "Traceback" not in done.err
+    assert not (tmp_path / session).exists()
+    return done.err.splitlines()
+
+
+def test_runs_beyond_the_plan_are_refused(bring, exported, tmp_path):
+    events = tmp_path / "events.csv"
+    events.write_text(
+        (exported / "edges.csv").read_text("utf-8") + "5,0,0.1,1\n7,0,0.1,1\n", "utf-8"
+    )
+    first, hint = refused(bring(events=events), tmp_path)
+    assert first.startswith(f"{events}: run 5 is not in the plan of ")
+    assert first.endswith("which has 4 runs")
+    assert hint.startswith("  hint: ")
+
+
+def test_every_fault_of_a_csv_file_is_located(bring, tmp_path):
+    events = tmp_path / "events.csv"
+    events.write_text(
+        "run,channel,time_s,state\n1,0,0.1,1\n1,0,0.05,0\nx,0,0.1,1\n1,99,0.1,1\n1,0,soon,1\n1,0,1\n",
+        "utf-8",
+    )
+    lines = refused(bring(events=events), tmp_path)
+    places = [re.match(rf"{re.escape(str(events))}:(\d+):(\d+): ", line) for line in lines]
+    assert all(places), lines
+    assert [(int(place[1]), int(place[2])) for place in places] == [
+        (3, 5),
+        (4, 1),
+        (5, 3),
+        (6, 5),
+        (7, 1),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", ":1:1: no edges in this file"),
+        ("run,channel,time_s,state\n", ":1:1: no edges in this file"),
+        ("time,voltage\n0,1\n", ":1:1: the header must be run,channel,time_s,state"),
+        ('run,channel,time_s,state\n1,0,"0.1\n', ":2:1: "),
+    ],
+)
+def test_a_file_of_another_kind_is_refused_in_one_line(bring, tmp_path, text, message):
+    events = tmp_path / "events.csv"
+    events.write_text(text, "utf-8")
+    line, *_ = refused(bring(events=events), tmp_path)
+    assert line.startswith(f"{events}{message}")
+
+
+def test_what_is_missing_is_named(bring, tmp_path):
+    (line,) = refused(bring(events=tmp_path / "none.csv"), tmp_path)
+    assert line == f"cannot read {tmp_path / 'none.csv'}: No such file or directory"
+    (line, *_) = refused(bring(protocol=tmp_path / "none.yaml"), tmp_path)
+    assert line == f"{tmp_path / 'none.yaml'}: there is no such file"
+
+
+def test_a_protocol_without_gates_has_no_edges(bring, tmp_path):
+    line, _ = refused(bring(protocol=PROTOCOLS / "bead-chain.yaml"), tmp_path)
+    assert line.endswith("bead-chain.yaml has no gates, so edges cannot belong to it")
+
+
+@pytest.mark.parametrize("u", ["nan", "-1 ppm", "50", "3 mm", ""])
+def test_an_absurd_clock_is_refused(bring, tmp_path, u):
+    (line, *_) = refused(bring(f"--clock-uncertainty={u}"), tmp_path)
+    assert line.startswith("--clock-uncertainty: ")
+
+
+def test_an_existing_session_is_never_imported_into(bring, tmp_path):
+    assert bring().code == 0
+    before = (tmp_path / "imported").read_bytes()
+    done = bring()
+    assert done.code == 2
+    assert f"{tmp_path / 'imported'} already exists" in done.err
+    (tmp_path / "notes.txt").write_text("mine", "utf-8")
+    assert bring(session="notes.txt").code == 2
+    assert (tmp_path / "notes.txt").read_text("utf-8") == "mine"
+    assert (tmp_path / "imported").read_bytes() == before
+
+
+def test_channels_that_are_no_gates_are_kept_and_told(bring, call, exported, tmp_path):
+    """An idle input does not spoil a timer's file."""
+    protocol, events = tmp_path / "seven.yaml", tmp_path / "events.csv"
+    text = short().replace("    - {channel: 15, height: 1078 mm}\n", "")
+    protocol.write_text(text, "utf-8")
+    events.write_bytes((exported / "edges.csv").read_bytes())
+    done = bring(events=events, protocol=protocol)
+    assert done.code == 0
+    assert "edges of channels 15 are kept but belong to no gate" in done.err
+    assert call("analyze", tmp_path / "imported").code == 0

@@ -1,0 +1,159 @@
+"""``rig predict`` and ``rig check``: what follows from a protocol alone."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.cli.lab import PROTOCOLS, short, without
+
+FIELDS = {
+    "incline_deg",
+    "model",
+    "alpha",
+    "gamma",
+    "separation_m",
+    "speed_m_s",
+    "fall_time_s",
+    "free_fall_speed_m_s",
+    "in_domain",
+    "notes",
+}
+# Discrete model, β 0.5, μ 0.2, ξ 1/3, 25 rods over 1.165 m, h 0.18 m, g 9.81 m/s²; computed
+# elsewhere with 60 digits.
+REFERENCE = {
+    0: (0.105, 0.080175519527158543, 6.2857634799081311, None),  # the pile
+    30: (0.19834747713266998, 0.14455777135466808, 7.5511640917900483, 0.49471049795616742),
+    40: (0.15506060950816171, 0.11546810526538031, 6.9327596650855757, 0.50066864460340956),
+    60: (0.068911961660286844, 0.053585554933341692, 5.8609487859073973, 0.51311334995443199),
+    80: (0.01226400922538273, 0.0098142050953198042, 5.2579813110300101, 0.52173665052246976),
+}
+NO_PILE = (0.25, 0.17762380452368596, 8.3678802518552439, 0.48784955224134661)
+PILE = "  pile: {below: 30 deg, restitution: -0.37}\n"
+SINGULAR = (
+    without("gates", short("[5 deg, 60 deg]"))
+    .replace(PILE, "")
+    .replace("friction: 0.20 ± 0.02", "friction: 1")
+    .replace("tilt: 12 deg", "tilt: 12 deg, inertia: 0.01")
+)
+
+
+@pytest.fixture
+def predict(call, tmp_path):
+    def ask(text):
+        path = tmp_path / "p.yaml"
+        path.write_text(text, "utf-8")
+        done = call("predict", path, "--json")
+        assert done.code == 0, done.err
+        assert done.err == ""
+        return {line["incline_deg"]: line for line in json.loads(done.out)["predictions"]}
+
+    return ask
+
+
+def numbers(line):
+    return tuple(line[key] for key in ("alpha", "separation_m", "speed_m_s", "fall_time_s"))
+
+
+def test_predictions_are_those_of_the_reference(call):
+    done = call("predict", PROTOCOLS / "inclined-uniform.yaml", "--json")
+    assert done.code == 0
+    lines = json.loads(done.out)["predictions"]
+    assert [line["incline_deg"] for line in lines] == list(range(0, 90, 10))
+    for line in lines:
+        assert line.keys() >= FIELDS
+        assert line["in_domain"] is True
+        assert line["gamma"] == pytest.approx(4 / 3, rel=1e-14)
+        # A free chain's top rod at the contact point: √(2 g (h + L)).
+        assert line["free_fall_speed_m_s"] == pytest.approx((2 * 9.81 * 1.345) ** 0.5, rel=1e-14)
+        for found, known in zip(
+            numbers(line), REFERENCE.get(line["incline_deg"], ()), strict=False
+        ):
+            assert known is None or found == pytest.approx(known, rel=1e-13)
+
+
+def test_without_a_pile_a_level_surface_is_a_surface(predict):
+    (line,) = predict(short("0 deg").replace(PILE, "")).values()
+    assert numbers(line) == pytest.approx(NO_PILE, rel=1e-13)
+    assert line["model"] == "discrete"
+
+
+def test_a_graded_chain_is_the_references_too(call):
+    done = call("predict", PROTOCOLS / "graded-chain.yaml", "--json")
+    (line,) = json.loads(done.out)["predictions"]
+    assert line["separation_m"] == pytest.approx(0.20034710240655192, rel=1e-12)
+    assert line["speed_m_s"] == pytest.approx(8.0478400772111967, rel=1e-12)
+
+
+def test_a_pile_and_a_slope_that_does_not_slide_are_noted(predict):
+    lines = predict(short("[0 deg, 40 deg]"))
+    assert lines[0]["model"] == "discrete, pile"
+    assert "pile" in lines[0]["notes"][0]
+    assert lines[40]["notes"] == []
+    # f = μN holds for a rod that slides: θ > arctan μ = 11.3°.
+    lines = predict(short("[10 deg, 12 deg]").replace(PILE, ""))
+    assert lines[10]["in_domain"] is False
+    assert lines[10]["notes"]
+    assert lines[10]["alpha"] > 0.25, "above its value on the level"
+    assert lines[12]["in_domain"] is True
+
+
+def test_where_the_model_has_no_answer_there_are_nulls(predict):
+    lines = predict(SINGULAR)
+    none = lines[5]
+    assert none["in_domain"] is False
+    assert none["notes"]
+    assert numbers(none) == (None,) * 4
+    assert none["gamma"] is None
+    assert none["free_fall_speed_m_s"] == pytest.approx(5.137, abs=1e-3)
+    assert None not in numbers(lines[60])
+
+
+def test_the_table_says_the_same(call, tmp_path):
+    done = call("predict", PROTOCOLS / "inclined-uniform.yaml")
+    assert done.code == 0
+    heading, *rows = done.out.splitlines()
+    assert "Δz (cm)" in heading
+    (row,) = [row for row in rows if row.split()[0] == "40"]
+    assert row.split()[1:3] == ["0.1551", "11.547"]
+    path = tmp_path / "p.yaml"
+    path.write_text(SINGULAR, "utf-8")
+    heading, first, *_ = call("predict", path).out.splitlines()
+    assert first.split()[:3] == ["5", "–", "–"]
+
+
+def test_a_picket_fence_falls_freely(call):
+    done = call("predict", PROTOCOLS / "picket-fence.yaml", "--json")
+    (line,) = json.loads(done.out)["predictions"]
+    assert line.keys() >= FIELDS
+    assert (line["alpha"], line["separation_m"]) == (None, None)
+    assert line["speed_m_s"] == line["free_fall_speed_m_s"]
+    assert line["speed_m_s"] == pytest.approx((2 * 9.81 * 0.75) ** 0.5, rel=1e-14)
+
+
+def test_a_given_alpha_needs_no_surface_numbers(call):
+    done = call("predict", PROTOCOLS / "bead-chain.yaml", "--json")
+    (line,) = json.loads(done.out)["predictions"]
+    assert (line["alpha"], line["gamma"]) == (0.12, 0.0)
+    assert line["separation_u_m"] > 0.0
+
+
+@pytest.mark.parametrize("protocol", sorted(PROTOCOLS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
+    done = call("check", protocol)
+    assert (done.code, done.err) == (0, "")
+    title, blank, scene, *rest = done.out.splitlines()
+    assert f"title: {title}" in protocol.read_text("utf-8")
+    assert (blank, scene) == ("", "Scene")
+    text = protocol.read_text("utf-8")
+    assert ("\nGates\n" in done.out) == ("\ngates:" in text)
+    if "\ngates:" not in text:
+        assert "  no gates: nothing is measured, the scene is only predicted" in rest
+    if "\nsurface:" not in text:
+        assert any(line.startswith("  no surface:") for line in rest)
+
+
+def test_check_counts_the_runs(call, finished):
+    done = call("check", finished.protocol)
+    assert "  4 runs: 2 at each incline (40, 60 deg)" in done.out.splitlines()

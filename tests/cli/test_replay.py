@@ -1,0 +1,120 @@
+"""``rig replay`` believes nothing: a changed byte, edge, clock sample or result is found."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from contextlib import closing
+
+import pytest
+
+GUARDED = ("bytes", "ping", "drop", "edge", "identity", "run_state")
+
+
+def tamper(session, sql, *values):
+    """Change a session behind its back, guards taken away first."""
+    with closing(sqlite3.connect(session)) as connection, connection:
+        for table in GUARDED:
+            for guard in ("update", "delete", "replace"):
+                connection.execute(f"DROP TRIGGER IF EXISTS {table}_no_{guard}")
+        assert connection.execute(sql, values).rowcount == 1
+
+
+def test_a_session_is_identical_to_its_own_bytes(call, finished):
+    before = finished.session.read_bytes()
+    done = call("replay", finished.session)
+    assert done.code == 0
+    drops, clock, results, last = done.out.splitlines()
+    assert drops == "drops: 4 identical"
+    assert clock.startswith("clock samples: ")
+    assert clock.endswith(" identical")
+    assert int(clock.split()[2]) > 4
+    assert (results, last) == ("results: 4 identical", "identical")
+    assert finished.session.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("sql", "found"),
+    [
+        ('UPDATE edge SET tick = tick + 1 WHERE "drop" = 2 AND idx = 100', {"drops"}),
+        ('UPDATE edge SET channel = 15 - channel WHERE "drop" = 1 AND idx = 0', {"drops"}),
+        ('UPDATE "drop" SET fire_tick = fire_tick + 1 WHERE run = 3', {"drops"}),
+        ('UPDATE "drop" SET faults = \'["late"]\' WHERE run = 4', {"drops", "results"}),
+        ("UPDATE ping SET tick = tick + 500 WHERE id = 1", {"clock samples", "results"}),
+        ("DELETE FROM ping WHERE id = 2", {"clock samples", "results"}),
+        ("UPDATE bytes SET host_ns = host_ns + 1 WHERE id = (SELECT max(id) FROM bytes)", set()),
+        ("DELETE FROM result WHERE run = 1", {"results"}),
+    ],
+)
+def test_what_was_tampered_with_is_called_different(call, finished, tmp_path, sql, found):
+    session = finished.copy(tmp_path)
+    tamper(session, sql)
+    done = call("replay", session)
+    *lines, last = done.out.splitlines()
+    different = {line.partition(":")[0] for line in lines if line.endswith("DIFFERENT")}
+    assert different >= found
+    assert different - found <= {"results"}
+    assert done.code == (1 if different else 0)
+    assert last == (
+        f"DIFFERENT: {', '.join(line.partition(':')[0] for line in lines if 'DIFF' in line)}"
+        if different
+        else "identical"
+    )
+
+
+def test_a_single_digit_of_a_stored_result_is_found(call, finished, tmp_path):
+    session = finished.copy(tmp_path)
+    with closing(sqlite3.connect(session)) as connection:
+        (text,) = connection.execute("SELECT json FROM result WHERE run = 2").fetchone()
+    result = json.loads(text)
+    result["separation_m"]["value"] *= 1.0 + 4e-16
+    assert json.dumps(result) != json.dumps(json.loads(text))
+    tamper(session, "UPDATE result SET json = ? WHERE run = 2", json.dumps(result))
+    done = call("replay", session)
+    assert done.code == 1
+    assert done.out.splitlines()[-2:] == ["results: 4 DIFFERENT", "DIFFERENT: results"]
+    assert call("analyze", session).code == 0
+    assert call("replay", session).code == 0, "results are derived: analysing mends them"
+
+
+def test_analysing_does_not_mend_a_changed_edge(call, finished, tmp_path):
+    session = finished.copy(tmp_path)
+    tamper(session, 'UPDATE edge SET tick = tick + 3000 WHERE "drop" = 2 AND idx = 300')
+    assert call("analyze", session).code in {0, 3}
+    done = call("replay", session)
+    assert done.code == 1
+    assert done.out.splitlines()[-1] == "DIFFERENT: drops"
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_changed_bytes_are_found(call, finished, tmp_path, share):
+    session = finished.copy(tmp_path)
+    with closing(sqlite3.connect(session)) as connection:
+        rows = connection.execute(
+            "SELECT id, data FROM bytes WHERE direction = 'rx' AND length(data) > 30 ORDER BY id"
+        ).fetchall()
+    number, data = rows[int(share * len(rows))]
+    changed = bytes([*data[:10], data[10] ^ 0x55, *data[11:]])
+    tamper(session, "UPDATE bytes SET data = ? WHERE id = ?", changed, number)
+    done = call("replay", session)
+    assert done.code == 1
+    assert "drops: 4 DIFFERENT" in done.out
+    assert done.err == ""
+
+
+def test_the_guards_refuse_what_was_done_here(finished, tmp_path):
+    session = finished.copy(tmp_path)
+    with (
+        closing(sqlite3.connect(session)) as connection,
+        pytest.raises(sqlite3.IntegrityError, match="never altered"),
+    ):
+        connection.execute("UPDATE edge SET tick = 1")
+
+
+def test_a_session_without_results_says_how_to_get_them(call, finished, tmp_path):
+    session = finished.copy(tmp_path)
+    with closing(sqlite3.connect(session)) as connection, connection:
+        connection.execute("DELETE FROM result")
+    done = call("replay", session)
+    assert done.code == 0
+    assert "results: none stored yet; rig analyze keeps them" in done.out

@@ -1,0 +1,448 @@
+"""A campaign that is stopped, killed or cut off goes on where it was, and loses nothing."""
+
+from __future__ import annotations
+
+import random
+import signal
+import sqlite3
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from itertools import count
+
+import pytest
+
+from rig.daemon.interrupts import Interrupts
+from rig.daemon.station import Station
+from rig.errors import DeviceError, SessionError
+from rig.link.messages import Phase
+from rig.link.port import open_port
+from rig.ports import completed
+from rig.protocol import reader
+from rig.replay import replay
+from rig.results import calibration, results
+from rig.session.schema import RunState
+from rig.session.store import Session
+from tests.cli.lab import (
+    ROOT,
+    assert_whole,
+    command,
+    drops_of,
+    log_of,
+    rig,
+    short,
+    truth_of,
+)
+
+NAMES = {signal.SIGINT: "SIGINT", signal.SIGTERM: "SIGTERM", signal.SIGKILL: "SIGKILL"}
+
+
+def stopped(arguments, session, number, wait_s):
+    """Start a campaign, and send it a signal some time after it has begun."""
+    process = subprocess.Popen(
+        command(*arguments), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    lock = session.with_name(session.name + ".lock")
+    try:
+        while process.poll() is None and not _holds(lock, process.pid):
+            time.sleep(0.002)
+        time.sleep(wait_s)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            stream.close()
+    assert "Traceback" not in err, err
+    return process.returncode, err
+
+
+def _holds(lock, pid):
+    try:
+        return lock.read_text("ascii").strip() == str(pid)
+    except FileNotFoundError:
+        return False
+
+
+def campaign(folder, numbers, longest_s, seed, pace):
+    """Stop a campaign by one signal after the other, then let it end; return the session."""
+    session = folder / f"{'-'.join(NAMES[number] for number in numbers)}-{seed}"
+    protocol = session.with_suffix(".yaml")
+    protocol.write_text(short("40 deg", 3, "0.2 s"), "utf-8")
+    arguments = (
+        *("run", protocol, "--port", f"sim://?pace={pace}", "--session", session),
+        *("--seed", seed),
+    )
+    moment = random.Random(f"{numbers} {seed}")
+    ends = []
+    for number in numbers:
+        code, err = stopped(arguments, session, number, moment.uniform(0.0, longest_s))
+        assert code in {-number if number == signal.SIGKILL else 130, 0}, (code, err)
+        ends.append(code)
+        if code == 130:
+            assert "the same command goes on" in err
+        with Session.open(session, readonly=True) as opened:
+            assert replay(opened).differences == (), f"after {ends}"
+        if number != signal.SIGKILL:
+            fallen = {(line["run"], line["attempt"]) for line in truth_of(session)}
+            if signal.SIGKILL not in numbers:
+                assert fallen == set(drops_of(session)), "whatever fell is recorded"
+    done = rig(*arguments)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert_whole(session, 3)
+    return session, ends
+
+
+def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path):
+    int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
+    cases = [(int_, int_), (term, term), (kill, kill), (int_, kill, term)]
+    with ThreadPoolExecutor(len(cases)) as pool:
+        made = list(
+            pool.map(
+                lambda case: campaign(tmp_path, case[1], 3.0, case[0], pace=1), enumerate(cases)
+            )
+        )
+    for (_, ends), numbers in zip(made, cases, strict=True):
+        assert ends[0] in {130, -kill}, f"{numbers}: none was stopped"
+    for session, ends in made:
+        with Session.open(session, readonly=True) as opened:
+            clock = calibration(opened).details
+            found = results(opened)
+        assert abs(clock["error_ppm"] + 1300.0) < 5.0 * clock["u_ppm"], ends
+        assert clock["u_ppm"] < 200.0
+        truth = {(line["run"], line["attempt"]): line for line in truth_of(session)}
+        for run in found["runs"]:
+            true = truth[run["run"], run["attempt"]]
+            for name in ("separation_m", "speed_m_s", "release_skew_s"):
+                assert abs(run[name]["value"] - true[name]) < 2.0 * run[name]["U95"], name
+
+
+def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
+    """In virtual time nearly every moment is one of work, not of waiting."""
+    int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
+    cases = [(int_, term), (term, int_), (kill, kill)]
+    with ThreadPoolExecutor(2) as pool:
+        made = pool.map(
+            lambda case: campaign(tmp_path, case[1], 0.25, case[0], pace=0), enumerate(cases)
+        )
+        assert any(code in {130, -kill} for _, ends in made for code in ends)
+
+
+# ------------------------------------------------- moments that chance would seldom choose
+
+
+@pytest.fixture
+def run(call, tmp_path, protocol):
+    return lambda *more: call(
+        "run", protocol, "--port", "sim://", "--session", tmp_path / "s", *more
+    )
+
+
+@pytest.mark.parametrize(
+    ("record", "which"), [("log_bytes", 2), ("add_ping", 1), ("add_identity", 1), ("add_drop", 1)]
+)
+def test_a_signal_between_a_byte_and_what_it_means_waits(run, tmp_path, monkeypatch, record, which):
+    number, store = count(1), getattr(Session, record)
+
+    def interrupted(session, *what, **more):
+        if next(number) == which:
+            signal.raise_signal(signal.SIGINT)
+        store(session, *what, **more)
+
+    monkeypatch.setattr(Session, record, interrupted)
+    done = run()
+    assert next(number) > which
+    assert done.code == 130
+    assert done.out == ""
+    monkeypatch.undo()
+    with Session.open(tmp_path / "s", readonly=True) as session:
+        assert replay(session).differences == ()
+    assert run().code == 0
+    assert_whole(tmp_path / "s", 2)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("state", [RunState.ARMED, RunState.FIRED])
+def test_whoever_stops_before_the_release_sees_nothing_fall(
+    run, tmp_path, monkeypatch, state, number
+):
+    add_state = Session.add_state
+
+    def add(session, run, attempt, new, *more):
+        add_state(session, run, attempt, new, *more)
+        if new == state:
+            signal.raise_signal(number)
+
+    monkeypatch.setattr(Session, "add_state", add)
+    assert run().code == 130
+    assert truth_of(tmp_path / "s") == []
+    monkeypatch.undo()
+    assert run().code == 0
+    assert_whole(tmp_path / "s", 2)
+    assert (1, RunState.INTERRUPTED) in log_of(tmp_path / "s")[1]
+    assert (1, 1) not in drops_of(tmp_path / "s")
+
+
+@pytest.mark.parametrize("state", [RunState.RECORDED, RunState.ACCEPTED])
+def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
+    run, tmp_path, monkeypatch, state
+):
+    add_state = Session.add_state
+
+    def add(session, run, attempt, new, *more):
+        add_state(session, run, attempt, new, *more)
+        if new == state:
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(Session, "add_state", add)
+    assert run().code == 130
+    monkeypatch.undo()
+    assert drops_of(tmp_path / "s") == [(1, 1)]
+    assert run().code == 0
+    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+    assert_whole(tmp_path / "s", 2)
+
+
+def test_results_of_less_than_there_is_are_not_called_different(run, call, tmp_path, monkeypatch):
+    """Half a session is analysed, goes on, and is cut off before it is analysed again."""
+
+    def stop_after(drops):
+        add_drop, number = Session.add_drop, count(1)
+
+        def add(session, drop, **more):
+            add_drop(session, drop, **more)
+            if next(number) == drops:
+                signal.raise_signal(signal.SIGTERM)
+
+        monkeypatch.setattr(Session, "add_drop", add)
+        assert run().code == 130
+        monkeypatch.undo()
+
+    stop_after(1)
+    assert call("analyze", tmp_path / "s").code == 0
+    assert call("replay", tmp_path / "s").code == 0
+    stop_after(1)
+    done = call("replay", tmp_path / "s")
+    assert done.code == 0, done.out
+    assert "results: none stored yet" in done.out
+    assert run().code == 0
+    done = call("replay", tmp_path / "s")
+    assert done.out.splitlines()[-2:] == ["results: 2 identical", "identical"]
+
+
+# ------------------------------------------------- what keeps the signals waiting
+
+
+def test_a_held_signal_comes_at_the_end_of_the_outermost_block():
+    interrupts, reached = Interrupts(), []
+
+    def work():
+        with interrupts.held():
+            with interrupts.held():
+                signal.raise_signal(signal.SIGTERM)
+                reached.append("inner")
+            reached.append("outer")
+        reached.append("behind")
+
+    with interrupts.caught(), pytest.raises(KeyboardInterrupt):
+        work()
+    assert reached == ["inner", "outer"]
+    interrupts.check()
+
+
+def test_without_a_block_a_signal_comes_at_once():
+    interrupts = Interrupts()
+    with interrupts.caught(), pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_the_third_signal_is_obeyed_at_once():
+    interrupts, reached = Interrupts(), []
+
+    def work():
+        with interrupts.held():
+            for number in (1, 2, 3, 4):
+                reached.append(number)
+                signal.raise_signal(signal.SIGINT)
+
+    with interrupts.caught(), pytest.raises(KeyboardInterrupt):
+        work()
+    assert reached == [1, 2, 3]
+
+
+def test_an_error_inside_a_block_goes_first():
+    interrupts = Interrupts()
+
+    def work():
+        with interrupts.held():
+            signal.raise_signal(signal.SIGINT)
+            raise DeviceError("the board restarted")
+
+    with interrupts.caught():
+        with pytest.raises(DeviceError):
+            work()
+        with pytest.raises(KeyboardInterrupt):
+            interrupts.check()
+
+
+def test_a_process_in_the_background_goes_on_ignoring_ctrl_c():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with Interrupts().caught():
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+            assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+# ------------------------------------------------- what the board is left with
+
+
+@pytest.fixture
+def new(tmp_path, protocol):
+    """Make a session and the URL of its simulation."""
+    scene = reader.read(str(protocol))
+
+    def make(name="s"):
+        path = tmp_path / name
+        url = completed("sim://", protocol, path, 1)
+        session = Session.create(path, scene.text, protocol.name, simulated=True, origin=url)
+        return session, url, scene
+
+    return make
+
+
+def controller(station):
+    """Look into the virtual board."""
+    return station._port.board._controller
+
+
+def test_an_armed_release_is_disarmed_by_closing(new):
+    session, url, scene = new()
+    with session:
+        station = Station(session, url)
+        station.connect()
+        inside = controller(station)
+        station.arm(1, 1, scene)
+        assert inside.phase == Phase.ARMED
+        station.close()
+        assert inside.phase == Phase.IDLE
+
+
+def test_a_recording_is_left_alone_by_closing(new):
+    session, url, scene = new()
+    with session:
+        station = Station(session, url)
+        station.connect()
+        inside = controller(station)
+        station.fire(station.arm(1, 1, scene))
+        station.close()
+        assert inside.phase == Phase.RECORDING
+        assert not inside.drop.aborted
+
+
+def test_a_disk_that_fails_neither_fires_nor_keeps_the_release_armed(new, tmp_path):
+    session, url, scene = new()
+    with session, closing(sqlite3.connect(session.path, isolation_level=None)) as other:
+        session._connection.execute("PRAGMA busy_timeout = 0")
+        station = Station(session, url)
+        station.connect()
+        inside = controller(station)
+        token = station.arm(1, 1, scene)
+        other.execute("BEGIN IMMEDIATE")  # from now on nothing can be written
+        with pytest.raises(SessionError):
+            station.fire(token)
+        assert inside.phase == Phase.ARMED
+        with pytest.raises(SessionError):
+            station.close()
+        assert inside.phase == Phase.IDLE
+        other.execute("ROLLBACK")
+        session.commit()
+        assert truth_of(tmp_path / "s") == []
+        assert replay(session).differences == ()
+
+
+def test_a_port_where_nobody_answers_is_closed_again(new, monkeypatch):
+    session, url, _ = new()
+    with session:
+        station = Station(session, url + "&lose=1")
+        opened = []
+        monkeypatch.setattr(
+            "rig.daemon.station.port_clock", lambda port: opened.append(port) or port.clock
+        )
+        with pytest.raises(DeviceError):
+            station.connect()
+        assert [port.is_open for port in opened] == [False]
+        with pytest.raises(DeviceError, match="not connected"):
+            station.device  # noqa: B018
+
+
+@pytest.fixture
+def board_stays(monkeypatch):
+    """Have one board behind the port that opening does not restart, as some do not."""
+    made = []
+
+    def reopen(url):
+        if not made:
+            made.append(open_port(url))
+            made[0].reset_on_open = False
+        else:
+            made[0].open()
+        return made[0]
+
+    monkeypatch.setattr("rig.daemon.station.open_port", reopen)
+    return made
+
+
+def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
+    """Lose the connection just before the drop is read, or just before it is acknowledged."""
+    fail = {RunState.FIRED: "collect", RunState.RECORDED: "_acknowledge"}[state]
+
+    def broken(station, *_):
+        raise DeviceError("connection lost: somebody stumbled")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Station, fail, broken)
+        done = run()
+    assert done.code == 4
+    return done
+
+
+@pytest.mark.parametrize("state", [RunState.FIRED, RunState.RECORDED])
+def test_a_drop_that_the_board_still_holds_is_fetched(
+    run, tmp_path, monkeypatch, board_stays, state
+):
+    cut_off_in_the_fall(run, monkeypatch, state)
+    assert log_of(tmp_path / "s")[1][-1] == (1, state)
+    done = run()
+    assert done.code == 0
+    assert "fetching run 1, attempt 1, from the device" in done.err
+    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+    assert len(truth_of(tmp_path / "s")) == 2
+    assert_whole(tmp_path / "s", 2)
+
+
+def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
+    call, run, tmp_path, protocol, monkeypatch, board_stays
+):
+    def other(name):
+        return call("run", protocol, "--port", "sim://", "--session", tmp_path / name, "--seed", 0)
+
+    assert other("older").code == 0
+    cut_off_in_the_fall(run, monkeypatch)
+    for name in ("newer", "older"):
+        before = drops_of(tmp_path / name) if name == "older" else []
+        done = other(name)
+        assert done.code == 4
+        assert "session" in done.err
+        assert drops_of(tmp_path / name) == before
+    done = run()
+    assert done.code == 0
+    assert "fetching run 1, attempt 1" in done.err
+    assert_whole(tmp_path / "s", 2)

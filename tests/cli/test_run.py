@@ -1,0 +1,403 @@
+"""``rig run`` from beginning to end, and how it fails."""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import subprocess
+from itertools import count
+
+import pytest
+from serial import SerialException
+
+from rig.commands import analyze
+from rig.records import Ping
+from rig.replay import replay
+from rig.session.schema import RunState
+from rig.session.store import Session
+from sim.serial_port import SimulatedSerial
+from tests.cli.lab import (
+    PROTOCOLS,
+    ROOT,
+    assert_whole,
+    command,
+    drops_of,
+    log_of,
+    rig,
+    short,
+    truth_of,
+)
+
+Q = {"value", "u", "U95"}
+RUN = {
+    "run",
+    "incline_deg",
+    "impact_chain",
+    "separation_m",
+    "separation_raw_m",
+    "speed_m_s",
+    "release_skew_s",
+    "edges",
+    "verdict",
+    "reasons",
+}
+LINE = {
+    "incline_deg",
+    "n",
+    "separation_m",
+    "separation_sd_m",
+    "speed_m_s",
+    "predicted",
+    "normalized_error",
+}
+MEASURED = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
+
+
+@pytest.fixture
+def run(call, tmp_path, protocol):
+    """Run the short protocol in this process on a session of the given name."""
+
+    def run(name="s", *more, port="sim://", protocol=protocol):
+        return call("run", protocol, "--port", port, "--session", tmp_path / name, *more)
+
+    return run
+
+
+def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
+    code, out, err = finished.table
+    assert code == 0, err
+    stamp, headings, rule, *rows = out.splitlines()
+    assert stamp == "SIMULATED DATA"
+    assert headings.split()[:2] == ["incline", "(°)"]
+    assert set(rule) == {"─", " "}
+    assert [row.split()[:2] for row in rows] == [["40", "2"], ["60", "2"]]
+    told = [line for line in err.splitlines() if line.startswith("run ")]
+    assert [line.split()[1] for line in told] == ["1/4", "2/4", "3/4", "4/4"]
+    assert "run " not in out
+    assert_whole(finished.session, 4)
+
+
+def test_the_truth_is_apart_from_the_session(finished):
+    truth = truth_of(finished.session)
+    assert [(line["run"], line["attempt"]) for line in truth] == [(n, 1) for n in (1, 2, 3, 4)]
+    stored = finished.session.read_bytes()
+    for line in truth:
+        for name in MEASURED:
+            assert repr(line[name]).encode() not in stored
+
+
+def test_what_is_measured_is_what_happened(finished, analysis):
+    for run, truth in zip(analysis["runs"], truth_of(finished.session), strict=True):
+        assert run["impact_chain"] == truth["impact_chain"]
+        assert run["incline_deg"] == truth["incline_deg"]
+        for name in MEASURED:
+            assert abs(run[name]["value"] - truth[name]) < 2.0 * run[name]["U95"], name
+
+
+def test_json_has_the_agreed_fields(analysis):
+    assert [r["run"] for r in analysis["runs"]] == [1, 2, 3, 4]
+    for one in analysis["runs"]:
+        assert one.keys() >= RUN
+        for name in MEASURED:
+            assert set(one[name]) == Q
+        assert set(one["edges"]) == {"received", "matched", "missed", "spurious", "lost"}
+        assert one["verdict"] == "accepted"
+        assert one["reasons"] == []
+    assert [r["impact_chain"] for r in analysis["runs"]] == ["A", "B", "A", "B"]
+    for line in analysis["summary"]:
+        assert line.keys() >= LINE
+        assert set(line["separation_m"]) == set(line["speed_m_s"]) == Q
+        assert set(line["predicted"]) == {"separation_m", "speed_m_s"}
+        assert abs(line["normalized_error"]) < 1.0
+    assert [(line["incline_deg"], line["n"]) for line in analysis["summary"]] == [(40, 2), (60, 2)]
+
+
+def test_run_and_analyze_say_the_same(run, call, tmp_path):
+    one, two = run("s", "--json"), call("analyze", tmp_path / "s", "--json")
+    assert one.code == two.code == 0
+    assert one.out == two.out
+    assert "run 2/2" in one.err
+    assert two.err == ""
+
+
+def test_a_scene_without_a_surface_gives_gravity(call, tmp_path):
+    fence = PROTOCOLS / "picket-fence.yaml"
+    args = ("run", fence, "--port", "sim://", "--session", tmp_path / "s", "--json", "--seed", 2)
+    found = json.loads(call(*args).out)
+    (line,) = found["summary"]
+    assert set(line["gravity_m_s2"]) == Q
+    assert abs(line["gravity_m_s2"]["value"] - 9.81) < 2.0 * line["gravity_m_s2"]["U95"]
+    for what in (line, *found["runs"]):
+        assert not {"separation_m", "speed_m_s", "release_skew_s"} & set(what)
+
+
+def test_one_chain_gives_a_speed_and_no_separation(call, tmp_path):
+    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8").replace("repeats: 12", "repeats: 2")
+    (tmp_path / "one.yaml").write_text(text, "utf-8")
+    args = ("run", tmp_path / "one.yaml", "--port", "sim://", "--session", tmp_path / "s", "--json")
+    found = json.loads(call(*args).out)
+    assert set(found["summary"][0]["speed_m_s"]) == Q
+    for what in (*found["summary"], *found["runs"]):
+        assert not {"separation_m", "separation_raw_m", "release_skew_s"} & set(what)
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(run, tmp_path):
+    for name, seed in (("one", 3), ("two", 3), ("other", 4)):
+        assert run(name, "--seed", seed).code == 0
+    logs = {}
+    for name in ("one", "two", "other"):
+        with Session.open(tmp_path / name, readonly=True) as session:
+            logs[name] = list(session.byte_log())
+    assert len(logs["one"]) > 100
+    assert logs["one"] == logs["two"]
+    assert [c for c in logs["one"] if c.direction == "rx"] != [
+        c for c in logs["other"] if c.direction == "rx"
+    ]
+    assert truth_of(tmp_path / "one") == truth_of(tmp_path / "two") != truth_of(tmp_path / "other")
+
+
+def test_the_seed_may_stand_in_the_url(run, tmp_path):
+    assert run("one", "--seed", 3).code == run("two", port="sim://?seed=3").code == 0
+    assert truth_of(tmp_path / "one") == truth_of(tmp_path / "two")
+
+
+def test_a_run_that_stays_void_is_code_3_and_still_json(run, tmp_path):
+    done = run("s", "--json", port="sim://?skew_sd=1s")
+    assert done.code == 3
+    found = json.loads(done.out)
+    assert [(r["run"], r["attempt"], r["verdict"]) for r in found["runs"]] == [
+        (1, 3, "void"),
+        (2, 3, "void"),
+    ]
+    assert all(r["reasons"] for r in found["runs"])
+    assert [(r["run"], r["attempt"]) for r in found["superseded"]] == [
+        (1, 1),
+        (1, 2),
+        (2, 1),
+        (2, 2),
+    ]
+    assert found["summary"] == []
+    log = log_of(tmp_path / "s")
+    again = run("s", port="sim://?skew_sd=1s")
+    assert again.code == 3
+    assert log_of(tmp_path / "s") == log, "what stays void is not tried again"
+    assert "No accepted runs" in again.out
+
+
+def test_a_void_run_is_made_again(run, tmp_path):
+    done = run("s", port="sim://?skew_sd=6ms&seed=1")
+    assert done.code == 0
+    assert "release skew" in done.err
+    states = [state for entries in log_of(tmp_path / "s").values() for _, state in entries]
+    assert RunState.VOID in states
+    assert_whole(tmp_path / "s", 2)
+
+
+def test_a_finished_session_is_not_made_again(call, finished, tmp_path):
+    session = finished.copy(tmp_path)
+    log = log_of(session)
+    args = ("run", finished.protocol, "--port", "sim://", "--session", session, "--json")
+    first, second = call(*args), call(*args)
+    assert first.code == second.code == 0
+    assert "run " not in first.err
+    assert log_of(session) == log
+    assert [r["attempt"] for r in json.loads(second.out)["runs"]] == [1, 1, 1, 1]
+
+
+def test_no_such_port_is_device_trouble(run, tmp_path):
+    done = run(port="/dev/nonexistent")
+    assert done.code == 4
+    assert done.out == ""
+    message, hint = done.err.splitlines()
+    assert message == "cannot open /dev/nonexistent: there is no such port"
+    assert hint.startswith("  hint: ")
+    assert drops_of(tmp_path / "s") == []
+
+
+def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(run, call, tmp_path):
+    done = run(port="sim://?lose=0.9")
+    assert done.code == 4
+    assert "did not answer" in done.err
+    assert "Traceback" not in done.err
+    assert done.out == ""
+    assert call("analyze", tmp_path / "s").code == 0
+    assert run().code == 0
+    assert_whole(tmp_path / "s", 2)
+    assert run().code == 0, "the line that never worked is forgotten"
+
+
+def connected(session):
+    with Session.open(session, readonly=True) as opened:
+        return len(opened.identities())
+
+
+def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path):
+    for seed in range(1, 40):
+        session = tmp_path / f"s{seed}"
+        done = run(session.name, "--seed", seed, port="sim://?lose=3%25")
+        assert "Traceback" not in done.err
+        if done.code == 4 and connected(session):
+            break
+    else:
+        pytest.fail("no seed gets through to the board and fails then")
+    assert run(session.name, port="sim://?lose=0").code == 0
+    assert_whole(session, 2)
+    assert run(session.name).code == 0, "the better line is what is gone on with"
+    with Session.open(session, readonly=True) as opened:
+        ports = [identity["port"] for _, identity in opened.identities()]
+    assert ports == [f"sim://?lose=3%25&seed={seed}", *[f"sim://?lose=0&seed={seed}"] * 2]
+
+
+def test_other_chains_are_not_mixed_into_a_simulated_session(run, tmp_path):
+    assert run("s", "--seed", 3).code == 0
+    before = (tmp_path / "s").read_bytes()
+    for more, port in ((("--seed", 4), "sim://"), ((), "sim://?seed=4")):
+        done = run("s", *more, port=port)
+        assert done.code == 2
+        assert "seed" in done.err
+    assert (tmp_path / "s").read_bytes() == before
+    assert run("s").code == run("s", "--seed", 3).code == 0
+
+
+def test_a_session_that_was_moved_can_be_continued(call, tmp_path, protocol):
+    def run(folder):
+        return call("run", folder / "short.yaml", "--port", "sim://", "--session", folder / "s")
+
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.mkdir()
+    (old / "short.yaml").write_bytes(protocol.read_bytes())
+    assert run(old).code == 0
+    old.rename(new)
+    assert run(new).code == 0
+    assert not old.exists()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_cable_that_is_pulled_costs_nothing_that_was_recorded(run, tmp_path, monkeypatch, share):
+    read, reads = SimulatedSerial.read, count(1)
+
+    def counted(port, size=1):
+        next(reads)
+        return read(port, size)
+
+    monkeypatch.setattr(SimulatedSerial, "read", counted)
+    assert run("whole").code == 0
+    pulled, reads = share * next(reads), count(1)
+
+    def pull(port, size=1):
+        if next(reads) > pulled:
+            raise SerialException("read failed: [Errno 5] Input/output error")
+        return read(port, size)
+
+    monkeypatch.setattr(SimulatedSerial, "read", pull)
+    done = run("s")
+    assert done.code == 4
+    assert done.err.splitlines()[-2].startswith("connection lost: read failed")
+    drops = drops_of(tmp_path / "s")
+    with Session.open(tmp_path / "s", readonly=True) as session:
+        assert replay(session).differences == ()
+    monkeypatch.undo()
+    assert run("s").code == 0
+    assert drops_of(tmp_path / "s")[: len(drops)] == drops
+    assert_whole(tmp_path / "s", 2)
+
+
+def test_blocked_beams_that_nobody_clears_are_device_trouble(run, tmp_path):
+    done = run(port="sim://?drop_error=12&seed=2")
+    assert done.code == 4
+    assert "Traceback" not in done.err
+    assert "hint: " in done.err
+    assert log_of(tmp_path / "s") == {}, "nothing was armed"
+    with Session.open(tmp_path / "s", readonly=True) as session:
+        assert len(session.pings()) > 5, "somebody might have cleared them"
+
+
+def test_whoever_is_there_is_asked_before_each_drop(tmp_path):
+    protocol = tmp_path / "short.yaml"
+    protocol.write_text(short(repeats=1), "utf-8")
+    args = ("run", protocol, "--port", "sim://", "--session", tmp_path / "s")
+    ours, terminal = os.openpty()
+    try:
+        os.write(ours, b"\n\n")
+        done = rig(*args, stdin=terminal)
+        assert done.returncode == 0
+        assert "run 1 of 2: incline 40° · impact side: A · free side: B" in done.stderr
+        assert "run 2 of 2: incline 60° · impact side: A · free side: B" in done.stderr
+        assert done.stdout.startswith("SIMULATED DATA\n")
+
+        os.write(ours, b"\n\x04")  # Ctrl-D instead of an answer
+        done = rig(*args[:-1], tmp_path / "t", stdin=terminal)
+        assert done.returncode == 130
+        assert drops_of(tmp_path / "t") == [(1, 1)]
+        assert rig(*args[:-1], tmp_path / "t", "--yes", stdin=terminal).returncode == 0
+        assert_whole(tmp_path / "t", 2)
+    finally:
+        os.close(ours)
+        os.close(terminal)
+
+
+def test_a_campaign_goes_on_when_nobody_listens_to_its_narration(protocol, tmp_path):
+    args = ("run", protocol, "--port", "sim://", "--session", tmp_path / "s", "--json")
+    ours, theirs = os.pipe()
+    os.close(ours)
+    try:
+        done = rig(*args, stderr=theirs)
+    finally:
+        os.close(theirs)
+    assert done.returncode == 0
+    assert len(json.loads(done.stdout)["runs"]) == 2
+
+
+def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path):
+    """While a run is going on, at the speed of a real one."""
+    protocol, session = tmp_path / "two.yaml", tmp_path / "s"
+    protocol.write_text(short("40 deg", 2, "0.2 s"), "utf-8")
+    run = ("run", protocol, "--session", session, "--port")
+    writer = subprocess.Popen(
+        command(*run, "sim://?pace=1"), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    try:
+        assert writer.stderr is not None
+        assert writer.stderr.readline().startswith("run 1/2")
+        reader = rig("analyze", session, "--json")
+        second = rig(*run, "sim://")
+        assert writer.poll() is None, "all this happened while it was being written"
+        assert reader.returncode == 0, reader.stderr
+        assert [r["run"] for r in json.loads(reader.stdout)["runs"]] == [1]
+        assert second.returncode == 2
+        assert f"is being written by process {writer.pid}" in second.stderr
+        out, err = writer.communicate(timeout=60)
+    finally:
+        writer.kill()
+        writer.wait()
+        for stream in (writer.stdout, writer.stderr):
+            stream.close()
+    assert writer.returncode == 0, err
+    assert out.startswith("SIMULATED DATA\n")
+    assert_whole(session, 2)
+
+
+def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
+    call, finished, tmp_path, monkeypatch
+):
+    session = finished.copy(tmp_path)
+    compute = analyze.results
+
+    def slowly(opened, progress):
+        found = compute(opened, progress)
+        with Session.open(session) as writer:
+            writer.add_ping(Ping(1, 2, 3))
+            writer.put_results([], "a later one")
+        return found
+
+    monkeypatch.setattr(analyze, "results", slowly)
+    assert call("analyze", session).code == 0
+    monkeypatch.undo()
+    with sqlite3.connect(session) as connection:
+        assert connection.execute("SELECT count(*) FROM result").fetchone() == (0,)
+    connection.close()
+    assert call("analyze", session).code == 0
+    with Session.open(session, readonly=True) as opened:
+        assert len(opened.results()) == 4
