@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+EXTRAS = {"matplotlib": "report", "mpmath": "bench", "scipy": "bench"}
+"""Packages that only some commands need, and the extra that brings each."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -43,6 +45,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Whoever read our output has seen enough.
         _silence_stdout()
         return 0
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        extra = EXTRAS[error.name]
+        _say(f"rig: this needs {error.name}: pip install 'chainrig[{extra}]'")
+        return BAD_INPUT
     except OSError as error:
         _say(f"rig: {error}")
         _silence_stdout()

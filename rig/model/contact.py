@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from rig.model.chain import Chain
 
-_TERMS = 24  # of the series below: the last is under 1e-18 of the first for x ≤ 2
+_TERMS = 28  # of the series below: the last is under 1e-18 of the first for x ≤ 2
 _SERIES = 2.0  # up to here the series keeps digits that the closed form cancels
 _STEPS = 60  # of Newton's method; it takes fewer than ten
 
@@ -54,14 +54,9 @@ def contact_fall(
     Raises
     ------
     DomainError
-        For a contact time that is not above zero, a negative gain, or where nothing ever moves.
+        As `check_contact`, or where nothing ever moves.
     """
-    if not contact_time > 0.0:
-        raise DomainError(
-            f"a contact time of {contact_time:g} s", "give one above zero, or use the discrete fall"
-        )
-    if min(gains) < 0.0:
-        raise DomainError("a rod that pushes the chain up", "α must not be negative here")
+    check_contact(gains, contact_time)
     tau = 0.5 * contact_time
     time = separation = gained = 0.0
     first = second = 0.0  # τ'a₁ and τ'a₂: speed that is still to come
@@ -69,10 +64,12 @@ def contact_fall(
     for height, gain in zip(chain.heights, gains, strict=True):
         duration = _leg(height - before, speed, gravity, first, second, tau)
         x = duration / tau
-        now, ahead = _ramp(x), math.exp(-x)
-        separation += gained * duration + tau * (first * now[0] + second * now[1])
-        # What has come is the first member of each pair, what is left the rest.
-        grown = first * (-math.expm1(-x) - x * ahead) + second * -math.expm1(-x)
+        one, two = _ramp(x)
+        separation += gained * duration + tau * (first * one + second * two)
+        # What has come of either stage; what is left of it comes later.
+        one, two = _risen(x, one, two)
+        grown = first * one + second * two
+        ahead = math.exp(-x)
         second = (second + first * x) * ahead
         first *= ahead
         gained += grown
@@ -81,6 +78,22 @@ def contact_fall(
         before = height
         first += speed * gain
     return Fall(separation, speed, time)
+
+
+def check_contact(gains: Sequence[float], contact_time: float) -> None:
+    """Refuse what impacts that last cannot be worked out for.
+
+    Raises
+    ------
+    DomainError
+        For a contact time that is not above zero and finite, or a negative gain.
+    """
+    if not 0.0 < contact_time < math.inf:
+        raise DomainError(
+            f"a contact time of {contact_time:g} s", "give one above zero, or use the discrete fall"
+        )
+    if not all(gain >= 0.0 for gain in gains):
+        raise DomainError("a rod that pushes the chain up", "α must not be negative here")
 
 
 def _leg(
@@ -101,7 +114,8 @@ def _leg(
         x = duration / tau
         one, two = _ramp(x)
         fallen = (speed + 0.5 * gravity * duration) * duration + tau * (first * one + second * two)
-        grown = first * (-math.expm1(-x) - x * math.exp(-x)) + second * -math.expm1(-x)
+        one, two = _risen(x, one, two)
+        grown = first * one + second * two
         step = (fallen - distance) / (speed + gravity * duration + grown)
         if not step > 1e-17 * duration:
             break
@@ -124,3 +138,14 @@ def _ramp(x: float) -> tuple[float, float]:
         one += (n - 2) * term
         two -= term
     return one, two
+
+
+def _risen(x: float, one: float, two: float) -> tuple[float, float]:
+    """Speed gained by the two stages after x, in units of all that will come.
+
+    1 − (1 + x)e⁻ˣ and 1 − e⁻ˣ; the first is the difference of the ways `one` and `two` of `_ramp`,
+    which keeps the digits that the closed form cancels where a leg is short against τ.
+    """
+    if x > _SERIES:
+        return -math.expm1(-x) - x * math.exp(-x), -math.expm1(-x)
+    return two - one, -math.expm1(-x)

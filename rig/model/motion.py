@@ -119,9 +119,7 @@ class Motion:
         if not 0.0 <= time_s <= self.end_s:
             raise ValueError(f"{time_s} s is outside the fall, 0 to {self.end_s} s")
         leg = min(bisect_right(self._times, time_s), len(self.hits)) - 1
-        since = min(time_s - self._times[leg], self._legs[leg])
-        if time_s == self.end_s:
-            since = self._legs[leg]
+        since = self._legs[leg] if time_s == self.end_s else time_s - self._times[leg]
         speed = self._speeds[leg] + self.gravity * since
         fallen = (self._speeds[leg] + 0.5 * self.gravity * since) * since
         return Instant(

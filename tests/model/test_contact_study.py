@@ -156,6 +156,16 @@ def test_the_separation_allows_69_microseconds_for_a_thousandth_and_the_speed_40
         )
 
 
+def test_a_rise_of_the_speed_that_comes_back_is_not_missed():
+    taus = [2e-4 * 1.01**k for k in range(300)]
+    rise, at_most = max((change("speed", tau), tau) for tau in taus)
+    assert 2e-4 < at_most < taus[-1]
+    found = longest("speed", 0.98 * rise)
+    assert found < at_most
+    assert change("speed", found) > 0.0
+    assert longest("speed", 1.02 * rise) > at_most
+
+
 def test_a_small_share_is_first_order():
     """Δz falls by 1.6652 m per second of contact time, V rises by 4.0151 m/s."""
     (slope,) = departures(PAPERS, gains_at(40.0), DROP, GRAVITY, [1e-6])

@@ -118,8 +118,10 @@ def test_between_impacts_it_is_the_reference(chain, alpha, gamma, drop, gravity,
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, SHARES)
 def test_the_chains_only_part(chain, alpha, gamma, drop, gravity, speed, shares):
     motion = motion_of(chain, alpha, gamma, drop, gravity, speed)
-    impacts = (hit.time_s for hit in motion.hits)
-    times = sorted({0.0, motion.end_s, *impacts, *(share * motion.end_s for share in shares)})
+    impacts = [hit.time_s for hit in motion.hits]
+    before = [math.nextafter(time, 0.0) for time in impacts]
+    others = [share * motion.end_s for share in shares]
+    times = sorted({0.0, motion.end_s, *impacts, *before, *others})
     seen = [motion.at(time) for time in times]
     size = drop + chain.length
     for one, other in pairwise(seen):
