@@ -46,10 +46,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         _silence_stdout()
         return 0
     except ModuleNotFoundError as error:
-        if error.name not in EXTRAS:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS:
             raise
-        extra = EXTRAS[error.name]
-        _say(f"rig: this needs {error.name}: pip install 'chainrig[{extra}]'")
+        _say(f"rig: this needs {package}: pip install 'chainrig[{EXTRAS[package]}]'")
         return BAD_INPUT
     except OSError as error:
         _say(f"rig: {error}")

@@ -10,6 +10,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.bench.precision import as_json, precision
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import write_atomic
@@ -26,13 +27,6 @@ _PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
 
 def main(arguments: Namespace) -> int:
     """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
-    try:
-        from rig.bench.precision import as_json, precision  # noqa: PLC0415 - needs an extra
-    except ImportError as error:
-        raise InputError(
-            f"the benchmark needs {error.name}",
-            "install it with: pip install 'chainrig[bench,report]' mpmath",
-        ) from error
     folder = Path(arguments.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,14 +63,12 @@ def summary(found: Precision) -> str:
             for gap in found.gaps
             if gap.scene == name and gap.contact_time_s in {None, *_PRINTED_CONTACTS}
         ]
-        gone: dict[tuple[str, str], list[str]] = {}
+        gone: dict[str, list[str]] = {}
         for out in found.left_out:
             if out.scene == name:
-                gone.setdefault((out.method, out.reason), []).append(out.setting)
-        lines += [
-            f"  left out: {method} ({', '.join(settings)}): {reason}"
-            for (method, reason), settings in gone.items()
-        ]
+                what = out.method if out.setting == "all" else f"{out.method} at {out.setting}"
+                gone.setdefault(out.reason, []).append(what)
+        lines += [f"  left out: {'; '.join(what)}: {reason}" for reason, what in gone.items()]
     return "\n".join(lines)
 
 

@@ -1,0 +1,285 @@
+"""The scenes of the precision benchmark, and what is true in each of them to 50 digits.
+
+Every model has a reference of its own: discrete rods, the continuum, and impacts that last. All
+take floats at their exact value, keep no digits by care, since there are plenty, and know nothing
+of how `rig.model` computes: times are (V' − V)/g or closed forms, Δz is a difference of heights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+from itertools import accumulate
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import mpmath
+from mpmath import mp
+
+from rig.bench.extremes import decades, uniform
+from rig.errors import DomainError
+from rig.model import paper
+from rig.model.density import Exponential, Uniform
+from rig.model.fall import kicks
+from rig.model.impact import impact_on
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.model.chain import Chain
+
+DIGITS = 50
+_SPARE = 30  # lost to differences; x³ of a leg that is short against the contact time is the worst
+GATE_M = 0.025
+"""Of the gate above the contact point, m."""
+CONTACT_TIMES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+"""s."""
+
+Model = Literal["discrete", "continuum", "contact"]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One chain on one surface.
+
+    Attributes
+    ----------
+    name
+        For file names.
+    title
+        For people.
+    alpha, gamma
+        Impact coefficients of Eq. 9, taken as given by every method and every reference.
+    density
+        The same chain as a continuum; `None` where Eq. 11 does not apply.
+    spacing_m
+        s of Eq. 11.
+    contact_times
+        For which impacts that last are worked out, longest first, s.
+    drop, gravity
+        m and m/s².
+    """
+
+    name: str
+    title: str
+    chain: Chain
+    alpha: float
+    gamma: float
+    density: Uniform | Exponential | None
+    spacing_m: float
+    contact_times: tuple[float, ...] = CONTACT_TIMES
+    drop: float = paper.DROP
+    gravity: float = paper.GRAVITY
+
+    @property
+    def gains(self) -> list[float]:
+        """ΔV/V of each impact."""
+        return kicks(self.chain, [self.alpha] * self.chain.rods, self.gamma)
+
+
+class Truth(NamedTuple):
+    """Δz (m), V (m/s) and when the top rod is `GATE_M` above the contact point (s)."""
+
+    separation: Decimal
+    speed: Decimal
+    gate: Decimal
+
+
+def scenes() -> tuple[Scene, ...]:
+    """All four, all at 40° on the paper's surface."""
+    length = paper.LENGTH
+    return (
+        scene("uniform", "25 uniform rods at 40°", paper.UNIFORM, Uniform(length)),
+        scene("graded", "graded chain at 40°", paper.graded(), None),
+        # 10,000 legs in 80 digits take seconds for each contact time.
+        scene("rods-10000", "10,000 uniform rods", uniform(10_000), Uniform(length), (1e-3, 1e-6)),
+        scene(
+            "exponential",
+            "25 rods, mass over 12 decades",
+            decades(-12.0),
+            Exponential(length, 12.0),
+        ),
+    )
+
+
+def scene(
+    name: str,
+    title: str,
+    chain: Chain,
+    density: Uniform | Exponential | None,
+    contact_times: tuple[float, ...] = CONTACT_TIMES,
+    *,
+    incline_deg: float = paper.MIDDLE_INCLINE,
+) -> Scene:
+    """Put a chain on the paper's surface."""
+    impact = impact_on(paper.BARE, chain, incline_deg)
+    spacing = chain.length / (chain.rods - 1)
+    return Scene(name, title, chain, impact.alpha, impact.gamma, density, spacing, contact_times)
+
+
+def discrete_truth(scene: Scene) -> Truth:
+    """Rod by rod, Eq. 9 and free fall."""
+    with mp.workdps(DIGITS + _SPARE):
+        g = mp.mpf(scene.gravity)
+        time = gate = mp.mpf(0)
+        speed = arrival = mp.mpf(0)
+        before = -mp.mpf(scene.drop)
+        for height, gain in _stops(scene):
+            arrival = mp.sqrt(speed**2 + 2 * g * (height - before))
+            time += (arrival - speed) / g
+            before = height
+            if gain is None:
+                gate = time
+                speed = arrival
+            else:
+                speed = arrival * (1 + gain)
+        return _truth(_separation(scene, time), arrival, gate)
+
+
+def contact_truth(scene: Scene, contact_time: float) -> Truth:
+    """Impacts that last: pull ΔV·(t/τ'²)·exp(−t/τ') each, τ' = τ/2, leg by leg in closed form.
+
+    Parameters
+    ----------
+    contact_time
+        τ, s.
+    """
+    with mp.workdps(DIGITS + _SPARE):
+        g, tau = mp.mpf(scene.gravity), mp.mpf(contact_time) / 2
+        time = gate = mp.mpf(0)
+        speed = first = second = mp.mpf(0)  # the last two in units of speed still to come
+        before = -mp.mpf(scene.drop)
+        enough = mp.mpf(10) ** -(DIGITS // 2 + 10)  # the step itself doubles the digits
+        for height, gain in _stops(scene):
+            distance = height - before
+            before = height
+            leg = 2 * distance / (speed + mp.sqrt(speed**2 + 2 * g * distance))
+            step = leg
+            # The way is convex in time and no leg is longer than free fall: Newton from above.
+            while abs(step) > enough * leg:
+                x = leg / tau
+                ahead = mp.exp(-x)
+                way = first * (x - 2 + (2 + x) * ahead) + second * (x - 1 + ahead)
+                grown = first * (1 - (1 + x) * ahead) + second * (1 - ahead)
+                fallen = (speed + g * leg / 2) * leg + tau * way
+                step = (fallen - distance) / (speed + g * leg + grown)
+                leg -= step
+            x = leg / tau
+            ahead = mp.exp(-x)
+            speed += g * leg + first * (1 - (1 + x) * ahead) + second * (1 - ahead)
+            second = (second + first * x) * ahead
+            first *= ahead
+            time += leg
+            if gain is None:
+                gate = time
+            else:
+                first += speed * gain
+        return _truth(_separation(scene, time), speed, gate)
+
+
+def continuum_truth(scene: Scene) -> Truth:
+    """Eq. 1 with Eq. 11: in closed form for an even density, else by quadrature of V's closed form.
+
+    Raises
+    ------
+    DomainError
+        Where the scene has no continuum.
+    """
+    with mp.workdps(DIGITS + _SPARE):
+        g, drop = mp.mpf(scene.gravity), mp.mpf(scene.drop)
+        strike = mp.sqrt(2 * g * drop)
+        if isinstance(scene.density, Uniform):
+            speed, passing = _uniform(scene)
+        elif isinstance(scene.density, Exponential):
+            speed, passing = _exponential(scene, scene.density)
+        else:
+            raise DomainError(f"{scene.title}: no continuum")
+        fallen = strike / g
+        late = fallen + passing(mp.mpf(GATE_M))
+        time = late + passing(mp.mpf(0), mp.mpf(GATE_M))
+        return _truth(_separation(scene, time), speed, late)
+
+
+def _stops(scene: Scene) -> list[tuple[mpmath.mpf, mpmath.mpf | None]]:
+    """Heights of the rods with their gains ΔV/V, and of the gate with None, in rising order."""
+    masses = [mp.mpf(mass) for mass in scene.chain.masses]
+    above = [*accumulate(reversed(masses[1:]))][::-1]
+    alpha, gamma = mp.mpf(scene.alpha), mp.mpf(scene.gamma)
+    gains = [alpha * m / (M + gamma * m) for m, M in zip(masses, above, strict=False)]
+    heights = [mp.mpf(height) for height in scene.chain.heights]
+    stops: list[tuple[mpmath.mpf, mpmath.mpf | None]] = [
+        *zip(heights, [*gains, mp.mpf(0)], strict=True),
+        (heights[-1] - mp.mpf(GATE_M), None),
+    ]
+    return sorted(stops, key=lambda stop: stop[0])
+
+
+def _separation(scene: Scene, time: mpmath.mpf) -> mpmath.mpf:
+    """How far free fall from rest still is above the contact point, m."""
+    top = mp.mpf(scene.drop) + mp.mpf(scene.chain.heights[-1])
+    return top - mp.mpf(scene.gravity) * time**2 / 2
+
+
+def _truth(separation: mpmath.mpf, speed: mpmath.mpf, gate: mpmath.mpf) -> Truth:
+    return Truth(*(Decimal(mp.nstr(value, DIGITS)) for value in (separation, speed, gate)))
+
+
+def _uniform(scene: Scene) -> tuple[mpmath.mpf, Callable[..., mpmath.mpf]]:
+    """V at the end by Eq. 14, and the time from one height down to another by S15.
+
+    With v = ((z + γs)/(z₀ + γs))^(1+2α), S15 is ∫ v^(b−1) (c − d v)^(−1/2) dv, b = (1+α)/(1+2α): a
+    hypergeometric function.
+    """
+    z0, h, g = mp.mpf(scene.chain.length), mp.mpf(scene.drop), mp.mpf(scene.gravity)
+    reach, alpha = mp.mpf(scene.gamma) * mp.mpf(scene.spacing_m), mp.mpf(scene.alpha)
+    power = 1 + 2 * alpha
+    whole = z0 + reach
+    b, d = (1 + alpha) / power, 2 * g * whole / power
+    c = 2 * g * h + d
+
+    def primitive(v: mpmath.mpf) -> mpmath.mpf:
+        return v**b / b * mp.hyp2f1(mp.mpf(1) / 2, b, b + 1, v * d / c)
+
+    def passing(low: mpmath.mpf, high: mpmath.mpf = z0) -> mpmath.mpf:
+        low, high = (((z + reach) / whole) ** power for z in (low, high))
+        return whole / power / mp.sqrt(c) * (primitive(high) - primitive(low))
+
+    braces = h * whole ** (2 * alpha) + (whole**power - reach**power) / power
+    return mp.sqrt(2 * g * braces / reach ** (2 * alpha)), passing
+
+
+def _exponential(
+    scene: Scene, density: Exponential
+) -> tuple[mpmath.mpf, Callable[..., mpmath.mpf]]:
+    """The same where M/λ = (1 − e^−kz)/k.
+
+    With c = 1 + kγs and u = c e^kz − 1 the pull k/(c − e^−kz) is d(ln u)/c dz, so that
+    ``V² = u^−p (u₀^p V_h² + (2g/k) ∫ u^p/(1 + u) du)`` from u to u₀, p = 2α/c.
+    """
+    z0, h, g = mp.mpf(scene.chain.length), mp.mpf(scene.drop), mp.mpf(scene.gravity)
+    reach = mp.mpf(scene.gamma) * mp.mpf(scene.spacing_m)
+    rate = mp.mpf(density.decades) * mp.log(10) / z0
+    c = 1 + rate * reach
+    p = 2 * mp.mpf(scene.alpha) / c
+
+    def primitive(u: mpmath.mpf) -> mpmath.mpf:
+        """∫ u^p/(1 + u) du from 0, with u/(1 + u) < 1 as the argument (Pfaff)."""
+        return u ** (p + 1) / (p + 1) / (1 + u) * mp.hyp2f1(1, 1, p + 2, u / (1 + u))
+
+    u0 = c * mp.exp(rate * z0) - 1
+    first, last = 2 * g * h * u0**p, primitive(u0)
+
+    def speed(z: mpmath.mpf) -> mpmath.mpf:
+        u = c * mp.exp(rate * z) - 1
+        return mp.sqrt((first + 2 * g / rate * (last - primitive(u))) / u**p)
+
+    def passing(low: mpmath.mpf, high: mpmath.mpf = z0) -> mpmath.mpf:
+        pieces = max(1, int((high - low) * rate / 4))
+        cuts = [low + (high - low) * i / pieces for i in range(pieces + 1)]
+        with mp.workdps(DIGITS + 5):  # of the time; V inside keeps its digits
+            return mp.quad(lambda z: 1 / exact(z), cuts)
+
+    def exact(z: mpmath.mpf) -> mpmath.mpf:
+        with mp.workdps(DIGITS + _SPARE):
+            return speed(z)
+
+    return speed(mp.mpf(0)), passing

@@ -1,0 +1,340 @@
+"""Error against run time: what is deterministic in it, and that its references hold."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import asdict, replace
+from decimal import Decimal
+
+import pytest
+from mpmath import mp
+
+from rig import cli
+from rig.bench import methods, precision
+from rig.bench.precision_reference import (
+    GATE_M,
+    contact_truth,
+    continuum_truth,
+    discrete_truth,
+    scene,
+    scenes,
+)
+from rig.bench.reference import exact_coefficients, exact_fall
+from rig.bench.stability import relative_error
+from rig.errors import DomainError
+from rig.model import paper
+from rig.model.chain import Chain
+from rig.model.density import Exponential, Uniform
+from tests.model.contact_reference import superposed_fall
+from tests.model.continuum_reference import printed_squared_speed
+
+UNIFORM, GRADED, MANY, EXPONENTIAL = scenes()
+TRUTH = discrete_truth(UNIFORM)
+
+
+def close(found, wanted, digits):
+    return abs(mp.mpf(str(found)) / mp.mpf(str(wanted)) - 1) < mp.mpf(10) ** -digits
+
+
+# References
+
+
+@pytest.mark.parametrize(("incline", "separation", "speed"), [
+    (0.0, "0.17762380452368596", "8.3678802518552439"),
+    (30.0, "0.14455777135466808", "7.5511640917900483"),
+    (40.0, "0.11546810526538031", "6.9327596650855757"),
+    (60.0, "0.053585554933341692", "5.8609487859073973"),
+    (80.0, "0.0098142050953198042", "5.2579813110300101"),
+])  # fmt: skip
+def test_the_discrete_reference_gives_the_table(incline, separation, speed):
+    one = scene("", "", paper.UNIFORM, None, incline_deg=incline)
+    found = discrete_truth(one)
+    # α as a float is all that is left of the difference.
+    assert close(found.separation, separation, 14.5)
+    assert close(found.speed, speed, 14.5)
+
+
+def test_the_discrete_reference_gives_the_graded_chain():
+    found = discrete_truth(GRADED)
+    assert close(found.separation, "0.20034710240655192", 14.5)
+    assert close(found.speed, "8.0478400772111967", 14.5)
+
+
+@pytest.mark.parametrize("one", [UNIFORM, GRADED, EXPONENTIAL], ids=lambda one: one.name)
+def test_the_discrete_reference_against_the_other_one(one):
+    rods, heights = one.chain.rods, one.chain.heights
+    alphas, gammas = [Decimal(one.alpha)] * rods, [Decimal(one.gamma)] * rods
+    found = discrete_truth(one)
+    end = exact_fall(one.chain.masses, heights, alphas, gammas, one.drop, one.gravity)
+    with mp.workdps(60):
+        assert close(found.separation, end.separation, 47)
+        assert close(found.speed, end.speed, 47)
+    # The last leg backwards from the end: the gate is on it in all three.
+    v, g = float(end.speed), one.gravity
+    back = 2.0 * GATE_M / (v + math.sqrt(v * v - 2.0 * g * GATE_M))
+    assert float(end.time) - back == pytest.approx(float(found.gate), abs=1e-14)
+
+
+@pytest.mark.parametrize("tau", [1e-2, 1e-5])
+def test_the_contact_reference_against_summed_pulls(tau):
+    short = replace(UNIFORM, chain=Chain((1.0,) * 6, paper.UNIFORM.heights[:6]))
+    found = contact_truth(short, tau)
+    with mp.workdps(70):
+        end = superposed_fall(
+            short.chain.heights, _exact_gains(short), short.drop, short.gravity, tau, digits=90
+        )
+        assert close(found.separation, mp.nstr(end.separation, 60), 47)
+        assert close(found.speed, mp.nstr(end.speed, 60), 47)
+
+
+def _exact_gains(one):
+    with mp.workdps(90):
+        a, c, n = mp.mpf(one.alpha), mp.mpf(one.gamma), one.chain.rods
+        return [a / (n - 1 - k + c) for k in range(n - 1)] + [mp.mpf(0)]
+
+
+def test_the_continuum_reference_against_the_printed_quadrature():
+    found = continuum_truth(UNIFORM)
+    with mp.workdps(70):
+        given = (
+            mp.mpf(paper.LENGTH),
+            mp.mpf(UNIFORM.gamma) * mp.mpf(UNIFORM.spacing_m),
+            mp.mpf(UNIFORM.alpha),
+            mp.mpf(UNIFORM.drop),
+            mp.mpf(UNIFORM.gravity),
+            mp.mpf(0),
+        )
+        time = mp.sqrt(2 * given[3] / given[4]) + mp.quad(
+            lambda z: 1 / mp.sqrt(printed_squared_speed(z, *given)), [GATE_M, 0.1, 0.4, given[0]]
+        )
+        assert close(found.gate, mp.nstr(time, 60), 45)
+        speed = mp.sqrt(printed_squared_speed(mp.mpf(0), *given))
+        assert close(found.speed, mp.nstr(speed, 60), 47)
+
+
+def test_an_exponential_density_of_no_decades_is_even():
+    even = continuum_truth(UNIFORM)
+    flat = continuum_truth(replace(UNIFORM, density=Exponential(paper.LENGTH, 1e-13)))
+    for one, other in zip(even, flat, strict=True):
+        assert close(one, other, 12)
+
+
+def test_the_exponential_reference_against_an_integration():
+    truth = continuum_truth(EXPONENTIAL)
+    setting = line("continuum DOP853", EXPONENTIAL).settings[-1]
+    answer = setting.solve()
+    assert relative_error(answer.separation_m, truth.separation) < 1e-12
+    assert relative_error(answer.speed_m_s, truth.speed) < 1e-12
+    assert precision.absolute_error(setting.gate().time_s, truth.gate) < 1e-13
+
+
+def test_no_continuum_is_said():
+    with pytest.raises(DomainError):
+        continuum_truth(GRADED)
+
+
+def test_the_scenes_have_the_coefficients_of_40_degrees():
+    alpha, gamma = exact_coefficients(0.5, 0.2, 40.0, paper.UNIFORM.inertia)
+    for one in scenes():
+        assert relative_error(one.alpha, alpha) < 1e-15
+        assert relative_error(one.gamma, gamma) < 1e-15
+
+
+# Methods
+
+
+@pytest.mark.parametrize("one", [UNIFORM, GRADED, MANY, EXPONENTIAL], ids=lambda one: one.name)
+def test_the_event_exact_fall_is_exact(one):
+    truth = discrete_truth(one)
+    for method in methods.methods(one)[:2]:
+        (setting,) = method.settings
+        answer = setting.solve()
+        assert relative_error(answer.separation_m, truth.separation) <= 1e-14
+        assert relative_error(answer.speed_m_s, truth.speed) <= 1e-14
+        assert precision.absolute_error(setting.gate().time_s, truth.gate) <= 1e-14
+        assert answer.evaluations == one.chain.rods
+
+
+def line(name, one=UNIFORM):
+    return next(method for method in methods.methods(one) if method.name == name)
+
+
+def errors(method, truth):
+    return [
+        relative_error(setting.solve().separation_m, truth.separation)
+        for setting in method.settings
+    ]
+
+
+@pytest.mark.parametrize("advance", [methods.euler, methods.rk4])
+def test_impacts_at_the_ends_of_steps_leave_first_order_to_either(advance):
+    """RK4 gains nothing in order: the impacts lie off its grid."""
+    steps = [1e-2 / 1.37**n for n in range(18)]
+    found = [
+        relative_error(
+            methods.step_by_step(
+                UNIFORM.chain, UNIFORM.gains, UNIFORM.drop, UNIFORM.gravity, step, advance
+            ).speed_m_s,
+            TRUTH.speed,
+        )
+        for step in steps
+    ]
+    assert slope(steps, found) == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("advance", "order"), [(methods.euler, 1.0), (methods.rk4, 4.0)])
+def test_orders_without_impacts(advance, order):
+    def oscillator(state):
+        return state[1], -state[0]
+
+    steps, found = [0.1, 0.05, 0.025], []
+    for step in steps:
+        state = (1.0, 0.0)
+        for _ in range(round(1.0 / step)):
+            state = advance(oscillator, state, step)
+        found.append(abs(state[0] - math.cos(1.0)))
+    assert slope(steps, found) == pytest.approx(order, abs=0.1)
+
+
+def slope(sizes, found):
+    xs, ys = [math.log(size) for size in sizes], [math.log(error) for error in found]
+    mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
+    return sum((x - mx) * (y - my) for x, y in zip(xs, ys, strict=True)) / sum(
+        (x - mx) ** 2 for x in xs
+    )
+
+
+@pytest.mark.parametrize("name", ["legs LSODA", "continuum DOP853", "continuum LSODA"])
+def test_a_tighter_tolerance_is_better_in_the_large(name):
+    method = line(name)
+    truth = TRUTH if method.model == "discrete" else continuum_truth(UNIFORM)
+    found = errors(method, truth)
+    # Over three decades of tolerance, whatever happens from one to the next.
+    assert all(tight < 0.1 * loose for loose, tight in zip(found, found[3:], strict=False))
+    assert found[-1] < 1e-12
+
+
+@pytest.mark.parametrize("solver", ["RK45", "DOP853"])
+def test_legs_are_parabolas_and_exact_at_any_tolerance(solver):
+    """Free fall is of second order in time: only the event is left to be found."""
+    assert max(errors(replace(line(f"legs {solver}"), settings=line(f"legs {solver}").settings[:3]),
+                      TRUTH)) < 1e-13  # fmt: skip
+
+
+def test_quadratures_converge_to_the_last_digits():
+    truth = continuum_truth(UNIFORM)
+    for name in ("continuum Gauss–Legendre", "continuum tanh–sinh"):
+        found = errors(line(name), truth)
+        assert found[0] > 1e-4
+        assert found[-1] < 1e-14
+
+
+def test_the_gate_is_passed_at_the_same_time_by_every_continuum_method():
+    truth = continuum_truth(UNIFORM)
+    for method in methods.methods(UNIFORM):
+        gate = method.settings[-1].gate
+        if method.model == "continuum" and gate is not None and "Radau" not in method.name:
+            found = gate().time_s
+            assert precision.absolute_error(found, truth.gate) < 1e-11, method.name
+
+
+def test_the_closed_form_of_contacts_is_exact():
+    for setting in line("contact closed form").settings:
+        truth = contact_truth(UNIFORM, setting.contact_time_s)
+        answer = setting.solve()
+        assert relative_error(answer.separation_m, truth.separation) <= 1e-14
+        assert precision.absolute_error(setting.gate().time_s, truth.gate) <= 1e-14
+
+
+def test_a_spent_budget_is_said():
+    with pytest.raises(methods.BudgetError, match="more than 50 evaluations"):
+        methods.leg_by_leg(UNIFORM.chain, UNIFORM.gains, 0.18, 9.81, "RK45", 1e-6, budget=50)
+
+
+def test_many_rods_leave_solvers_out_and_say_so():
+    names = {method.name for method in methods.methods(MANY)}
+    gone = dict(methods.absent(MANY))
+    assert not names & set(gone)
+    assert "10000 legs" in gone["legs Radau"]
+    assert isinstance(MANY.density, Uniform)
+
+
+# The sweep
+
+
+@pytest.fixture(scope="module")
+def quick():
+    told: list[str] = []
+    return precision.precision(quick=True, progress=told.append), told
+
+
+TIMES = ("median_s", "lower_s", "upper_s", "turns")
+
+
+def untimed(found):
+    rows = [asdict(point) for point in found.points]
+    return [{key: row[key] for key in row if key not in TIMES} for row in rows]
+
+
+def test_errors_and_counts_are_the_same_each_time(quick):
+    again = precision.precision(quick=True)
+    assert untimed(again) == untimed(quick[0])
+    assert (again.gaps, again.left_out) == (quick[0].gaps, quick[0].left_out)
+
+
+def test_the_sweep_has_every_model_and_says_what_it_left_out(quick):
+    found, told = quick
+    assert {point.model for point in found.points} == {"discrete", "continuum", "contact"}
+    assert all(point.lower_s <= point.median_s <= point.upper_s for point in found.points)
+    assert any("RK45" in line for line in told)
+    reasons = {(out.scene, out.method): out.reason for out in found.left_out}
+    assert "5000 steps" in reasons["uniform", "contact RK45"]
+    assert "evenly spaced" in reasons["graded", "continuum, every method"]
+    swept = {(p.scene, p.method, p.setting) for p in found.points}
+    assert not swept & {(out.scene, out.method, out.setting) for out in found.left_out}
+
+
+def test_models_apart_are_no_method_s_error(quick):
+    gaps = {(gap.scene, gap.contact_time_s): gap for gap in quick[0].gaps}
+    assert gaps["uniform", None].speed_relative == pytest.approx(0.057, abs=5e-4)
+    assert abs(gaps["uniform", 1e-6].separation_relative) == pytest.approx(1.44e-5, rel=0.01)
+
+
+def test_the_cheapest_keeps_to_the_error():
+    def point(method, error, median):
+        return precision.Point("s", method, "discrete", "", 0.0, None, error, 0.0, None, 1, 1,
+                               median, median, median, 3)  # fmt: skip
+
+    points = [point("poor", 1e-4, 1.0), point("good", 1e-10, 2.0), point("slow", 0.0, 3.0)]
+    points.append(point("V only", None, 0.1))
+    found = [one.method for one in precision.cheapest(points, (1e-3, 1e-9, 1e-12))]
+    assert found == ["poor", "good", "slow"]
+    assert precision.cheapest(points[:1], (1e-9,))[0].method is None
+
+
+def test_the_command_writes_all_of_it(quick, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(precision, "precision", lambda **_options: quick[0])
+    assert cli.main(["bench", "precision", "--quick", "-o", str(tmp_path / "new")]) == 0
+    printed = capsys.readouterr().out
+    assert "cheapest method" in printed
+    assert "left out" in printed
+    with (tmp_path / "new" / "precision.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(quick[0].points)
+    text = (tmp_path / "new" / "precision.json").read_text(encoding="utf-8")
+    assert json.loads(text)["gaps"]
+    for name in ("uniform", "graded"):
+        svg = (tmp_path / "new" / f"precision-{name}.svg").read_text(encoding="utf-8")
+        ET.fromstring(svg)
+
+
+def test_a_missing_scipy_is_said(monkeypatch, tmp_path, capsys):
+    monkeypatch.delitem(sys.modules, "rig.bench.precision", raising=False)
+    monkeypatch.delitem(sys.modules, "rig.bench.methods", raising=False)
+    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
+    assert cli.main(["bench", "precision", "-o", str(tmp_path)]) == 2
+    assert "pip install" in capsys.readouterr().err
