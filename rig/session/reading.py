@@ -129,7 +129,9 @@ class Reader:
 
     def _rows(self, sql: str, *values: object) -> Iterator[tuple[Any, ...]]:
         with translated(self.path):
-            yield from self._opened().execute(sql, values)
+            # Not the cursor itself: it would be closed with this generator, which a traceback can
+            # keep alive until after the database.
+            yield from iter(self._opened().execute(sql, values).fetchone, None)
 
     def _one(self, sql: str) -> Any:
         return next(self._rows(sql))[0]
