@@ -31,8 +31,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     # The matrices here are small: more threads only get into each other's way.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _open_streams()
-    arguments = _parser().parse_args(argv)
     try:
+        try:
+            arguments = _parser().parse_args(argv)
+        finally:
+            sys.stdout.flush()  # of --help, here, where a closed pipe is understood
         code: int = import_module(f"rig.commands.{arguments.module}").main(arguments)
         sys.stdout.flush()
     except RigError as error:
