@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-EXTRAS = {"matplotlib": "report", "mpmath": "bench", "scipy": "bench"}
+EXTRAS = {"distributed": "cluster", "matplotlib": "report", "mpmath": "bench", "scipy": "bench"}
 """Packages that only some commands need, and the extra that brings each."""
 
 
@@ -120,6 +120,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     _json(predict)
 
+    _sweep(command("sweep", "map the model's Δz and V over a grid of parameters"))
+
     imported = command("import", "make a session from the edges of another timer", "import_edges")
     imported.add_argument("events", metavar="EVENTS.csv", help="columns run,channel,time_s,state")
     imported.add_argument("--protocol", required=True, metavar="FILE", help="what was dropped")
@@ -149,6 +151,16 @@ def _parser() -> argparse.ArgumentParser:
 
     _session(command("replay", "feed the recorded bytes through the whole stack and compare"))
 
+    flash = command("flash", "write the firmware onto a board and verify it")
+    flash.add_argument("--board", required=True, choices=("mega", "uno"), help="its kind")
+    flash.add_argument(
+        "--port", required=True, metavar="PATH", help="its device, such as /dev/ttyACM0"
+    )
+    flash.add_argument(
+        "--hex", metavar="FILE", help="the firmware, if not the one that comes with this program"
+    )
+    flash.add_argument("--avrdude", metavar="PATH", help="where avrdude is, if not found by itself")
+
     bench = command("bench", "measure accuracy against hidden truth, and speed as ratios")
     benches = bench.add_subparsers(required=True, metavar="BENCH")
     accuracy = benches.add_parser("accuracy", help="errors of Δz, V and skew, coverage, matches")
@@ -172,12 +184,52 @@ def _parser() -> argparse.ArgumentParser:
     )
     precision.add_argument("--quick", action="store_true", help="a small subset, in seconds")
     _json(precision)
+    scenes = benches.add_parser("scenes", help="what each scene loads, takes and evaluates")
+    scenes.set_defaults(module="bench_scenes")
+    scenes.add_argument(
+        "--protocols", default="protocols", metavar="DIR", help="ready protocols to be measured too"
+    )
+    scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
+    scenes.add_argument("-o", "--output", metavar="DIR", help="folder for CSV, JSON and a picture")
+    _json(scenes)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")
     bulk.add_argument("--rounds", type=_count, default=15, metavar="N", help="of measurement")
     _json(bulk)
     return parser
+
+
+def _sweep(sweep: argparse.ArgumentParser) -> None:
+    _protocol(sweep)
+    sweep.add_argument(
+        "--vary",
+        action="append",
+        required=True,
+        metavar="NAME=LOW..HIGH:COUNT",
+        help="an axis, as in restitution=-0.4..0.9:200 or drop=100mm..300mm:50; once for each "
+        "axis. NAME=VALUE, as in incline=40deg, holds a parameter at another value than the "
+        "protocol's. Where the plan has several inclines and none is given here, each is a layer: "
+        "an axis of its own",
+    )
+    sweep.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help="its ending chooses the kind: .csv a row a point; .npz arrays; .svg curves or two "
+        "maps, of one or two axes at one incline",
+    )
+    who = sweep.add_mutually_exclusive_group()
+    who.add_argument(
+        "--jobs", type=_count, metavar="N", help="processes at most (default: one a core)"
+    )
+    who.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="compute on a Dask cluster instead, such as tcp://lab-server:8786; its workers need "
+        "the same chainrig",
+    )
 
 
 def _count(text: str) -> int:

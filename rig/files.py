@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from rig.errors import InputError
 
@@ -31,15 +31,28 @@ def write_atomic(path: str | os.PathLike[str], text: str) -> None:
     InputError
         If the place cannot be written: no such folder, no permission, disk full.
     """
+    with replacing(path) as stream:
+        stream.write(text.encode("utf-8"))
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """Provide a stream whose content takes the place of a file when the block has ended well.
+
+    As `write_atomic`, for content that comes in pieces; nothing but writing belongs in the block.
+
+    Raises
+    ------
+    InputError
+        As in `write_atomic`.
+    """
     target = Path(os.path.realpath(path))
-    data = text.encode("utf-8")
     try:
         if target.is_dir():
             raise InputError(f"cannot write {path}: it is a folder", "name a file in it")
-        if target.exists() and not target.is_file():
-            target.write_bytes(data)
-            return
-        _replace(target, data)
+        through = target.exists() and not target.is_file()
+        with target.open("wb") if through else _replacing(target) as stream:
+            yield stream
     except OSError as error:
         raise InputError(
             f"cannot write {path}: {error.strerror or error}",
@@ -57,11 +70,12 @@ def sync_directory(path: Path) -> None:
             os.close(handle)
 
 
-def _replace(target: Path, data: bytes) -> None:
+@contextmanager
+def _replacing(target: Path) -> Iterator[BinaryIO]:
     with _temporary(target) as temporary:
         # Plain open, not tempfile: the result keeps the permissions of the user's umask.
         with temporary.open("xb") as stream:
-            stream.write(data)
+            yield stream
             stream.flush()
             # Without it the rename may reach the disk before the content does, and a power cut
             # would leave an empty file under the right name.

@@ -42,9 +42,12 @@ class Certificate:
     overflows
         Snapshots lost because the memory was full.
     glitches
-        Pulses too short to be stamped.
+        Snapshots of pulses too short to be seen.
     late
         Stamps that may be late by more than the usual latency.
+    release_sense
+        Ticks from the fire stamp to the first change of the release-sense input; `None` when it
+        did not change.
     """
 
     events: int
@@ -52,6 +55,7 @@ class Certificate:
     overflows: int = 0
     glitches: int = 0
     late: int = 0
+    release_sense: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

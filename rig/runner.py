@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 from rig import __version__
 from rig.analysis.drop import analyze_drop
 from rig.daemon.interrupts import Interrupts
-from rig.daemon.station import Station
+from rig.daemon.station import DISCARD, Station
 from rig.errors import DeviceError, InputError, SessionError
 from rig.link.messages import Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated, truth_file
 from rig.protocol import reader
+from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from rig.report.numbers import plus_minus
 from rig.results import calibration, results
@@ -37,7 +38,11 @@ _CLOCK_U = 1e-4
 """How well the device's clock must be known before a drop, relative: a resonator that is off by
 0.13 % spreads a chain's edges over the wrong rods."""
 _CLOCK_S = 2.0  # of clock samples are plenty for that
-_LOOKS = 5  # how often a blocked gate is looked at again when nobody is there to clear it
+_LOOKS = 5  # how often to try again what a device refuses when nobody is there to help
+_HELP = (Reason.GATE_BLOCKED, Reason.STOPPED)
+"""Refusals that somebody at the rig can end."""
+_DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
+"""Refusals to fire after which the drop can be prepared again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +104,7 @@ def run_protocol(
             f"{source} has no gates, so nothing can be measured",
             f"rig predict {source} says what the model expects",
         )
+    check_measurable(protocol)
     path = Path(session_path)
     fresh = completed(url, Path(source), path, seed)
     interrupts = Interrupts() if interrupts is None else interrupts
@@ -166,6 +172,7 @@ class Campaign:
         self.session = station.session
         self.operator = operator
         self.plan = runs(protocol)
+        self._unfired = 0  # refusals to fire in a row
 
     def carry_out(self) -> None:
         """Do every run that is not done yet, in order."""
@@ -196,11 +203,11 @@ class Campaign:
 
     def _fetch(self, run: int, attempt: int) -> None:
         """Take the drop that the device holds, if it is one of this session's."""
-        entries = [e for e in self.session.states() if (e.run, e.attempt) == (run, attempt)]
-        if not entries:
+        fired = (run, attempt, RunState.FIRED)
+        if fired not in ((e.run, e.attempt, e.state) for e in self.session.states()):
             raise DeviceError(
                 f"the device holds a drop (run {run}, attempt {attempt}) of another session",
-                "continue that session first; resetting the board discards the drop",
+                f"continue that session first; {DISCARD}",
             )
         self.operator.say(f"fetching run {run}, attempt {attempt}, from the device")
         self.station.fetch(run, attempt)
@@ -223,10 +230,11 @@ class Campaign:
         # A chain that falls is recorded to the end: it took somebody minutes to hang.
         with station.interrupts.held():
             try:
-                station.fire(token)
+                if not self._fire(run, attempt, token):
+                    return
                 drop = station.collect(run.number, attempt)
             except KeyboardInterrupt:
-                self._interrupted(run, attempt)
+                self._interrupted(run, attempt, "interrupted by the operator")
                 raise
         self._judge(run, drop)
 
@@ -242,27 +250,43 @@ class Campaign:
         self.station.wait(settle)
 
     def _arm(self, run: Run, attempt: int) -> int:
-        """Arm, and go on asking for free beams as long as one is blocked."""
+        """Arm; let the release cool, and ask for free beams and a closed emergency stop."""
         looks = 0
         while True:
             try:
                 return self.station.arm(run.number, attempt, self.protocol)
             except DeviceRefusedError as refusal:
-                if refusal.reason is not Reason.GATE_BLOCKED:
-                    raise
                 looks += 1
-                if self.operator.ask is not None:
-                    self.operator.ask(f"not armed: {refusal.message}; {refusal.hint}")
-                elif looks >= _LOOKS:
-                    raise
-                self.station.wait(1.0)
+                self._put_right(refusal, last=looks >= _LOOKS)
 
-    def _interrupted(self, run: Run, attempt: int) -> None:
+    def _put_right(self, refusal: DeviceRefusedError, *, last: bool) -> None:
+        """End what keeps the device from arming: wait, or ask whoever is there."""
+        cooling = refusal.reason is Reason.COOLING
+        if refusal.reason in _HELP and self.operator.ask is not None:
+            self.operator.ask(f"not armed: {refusal.message}; {refusal.hint}")
+        elif last or not (cooling or refusal.reason in _HELP):
+            raise refusal
+        self.station.wait(refusal.detail / 1000 if cooling else 1.0)
+
+    def _fire(self, run: Run, attempt: int, token: int) -> bool:
+        """Let go; `False` when the device would not and the drop can be prepared again."""
+        try:
+            self.station.fire(token)
+        except DeviceRefusedError as refusal:
+            self._interrupted(run, attempt, refusal.message)
+            self._unfired += 1
+            alone = self.operator.ask is None
+            if refusal.reason not in _DISTURBED or (alone and self._unfired >= _LOOKS):
+                raise
+            self.operator.say(f"not fired: {refusal.message}; {refusal.hint}")
+            return False
+        self._unfired = 0
+        return True
+
+    def _interrupted(self, run: Run, attempt: int, why: str) -> None:
         with suppress(DeviceError):
             self.station.abort()
-        self.station.state(
-            run.number, attempt, RunState.INTERRUPTED, ("interrupted by the operator",)
-        )
+        self.station.state(run.number, attempt, RunState.INTERRUPTED, (why,))
 
     def _judge(self, run: Run, drop: Drop) -> None:
         """Analyse a recorded drop and log the verdict."""

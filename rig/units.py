@@ -6,7 +6,6 @@ The number is scaled by an exact fraction and rounded once, so ``48.5 mm`` is th
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from dataclasses import dataclass
@@ -46,6 +45,7 @@ class Dimension(Enum):
     ACCELERATION = ("an acceleration", "9.81 m/s^2")
     SPEED = ("a speed", "5.2 m/s")
     MASS = ("a mass", "35 g")
+    DENSITY = ("a density", "1.2 kg/m^3")
     FREQUENCY = ("a frequency", "1 Hz")
     NUMBER = ("a plain number", "0.50 ± 0.05")
 
@@ -95,6 +95,8 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
     "kg": (Dimension.MASS, Fraction(1)),
     "g": (Dimension.MASS, Fraction(1, 1000)),
     "mg": (Dimension.MASS, Fraction(1, 10**6)),
+    "kg/m^3": (Dimension.DENSITY, Fraction(1)),
+    "g/cm^3": (Dimension.DENSITY, Fraction(1000)),
     "Hz": (Dimension.FREQUENCY, Fraction(1)),
     "kHz": (Dimension.FREQUENCY, Fraction(1000)),
     "1": (Dimension.NUMBER, Fraction(1)),
@@ -102,8 +104,11 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
     "ppm": (Dimension.NUMBER, Fraction(1, 10**6)),
 }
 # The micro sign and the Greek letter look alike and both come off keyboards.
-_SPELLINGS = str.maketrans({"μ": "µ", "²": "^2", "°": "deg"})
-_ALIASES = {"um": "µm", "us": "µs", "m/s2": "m/s^2", "cm/s2": "cm/s^2", "ft/s2": "ft/s^2"}
+_SPELLINGS = str.maketrans({"μ": "µ", "²": "^2", "³": "^3", "°": "deg"})
+_ALIASES = {
+    "um": "µm", "us": "µs", "m/s2": "m/s^2", "cm/s2": "cm/s^2", "ft/s2": "ft/s^2",
+    "kg/m3": "kg/m^3", "g/cm3": "g/cm^3",
+}  # fmt: skip
 _RELATIVE = ("%", "ppm")
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -193,6 +198,8 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     name = _ALIASES.get(name, name)
     accepted = f"{dimension.noun} is written in {', '.join(dimension.units)}"
     if name not in UNITS:
+        import difflib  # noqa: PLC0415 - only a mistake needs it
+
         near = {known.casefold(): known for known in dimension.units}
         close = difflib.get_close_matches(name.casefold(), near, n=1, cutoff=0.5)
         guess = f"did you mean {near[close[0]]}? " if close else ""

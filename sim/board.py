@@ -13,18 +13,21 @@ from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Decoder, crc16
+from rig.link.messages import Phase
 from sim.controller import Controller
 from sim.counter import Counter
+from sim.inputs import Inputs
 from sim.transmitter import Transmitter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from sim.lab_interface import Lab
 
 CAPACITY = 1024
 MAX_PULSE_US = 500_000
-EXTERNAL_RESET = 2  # the AVR's EXTRF in MCUSR
+LATE_TICKS = 256
+POWER_ON, EXTERNAL_RESET = 1, 2  # the AVR's PORF and EXTRF in MCUSR
 _EXECUTION_NS = 60_000  # from a request's last byte to its execution
 _BATCH = 16  # events worth a frame of their own
 _OLDEST_NS = 10_000_000  # an event waits no longer than this for company
@@ -47,6 +50,8 @@ class VirtualBoard:
         Of the line.
     capacity
         Events that fit its memory.
+    streams
+        Whether that memory is for the latest events only.
     start_tick
         The counter at virtual time 0; by default from the seed.
     protocol_version
@@ -62,6 +67,7 @@ class VirtualBoard:
         ppm: float = 0.0,
         baudrate: int = 500_000,
         capacity: int = CAPACITY,
+        streams: bool = False,
         start_tick: int | None = None,
         protocol_version: int = wire.PROTOCOL_VERSION,
     ) -> None:
@@ -77,6 +83,8 @@ class VirtualBoard:
             releases=4,
             max_pulse_us=MAX_PULSE_US,
             capacity=capacity,
+            streams=int(streams),
+            late_ticks=LATE_TICKS,
             channels=_CHANNELS,
         )
         self._random = random.Random(f"board {seed}")  # noqa: S311 - a simulation, not secrets
@@ -85,6 +93,7 @@ class VirtualBoard:
         self._now_ns = 0
         self._boot_ns: int | None = None
         self._boot_cause = EXTERNAL_RESET
+        self._inputs = Inputs()
         self._forget()
 
     def receive(self, start_ns: int, data: bytes) -> None:
@@ -107,18 +116,22 @@ class VirtualBoard:
             self._inbox.append((at - self.line.byte_ns, piece[:-1]))
 
     def reset(self, at_ns: int, cause: int = EXTERNAL_RESET) -> None:
-        """Restart, as opening the port does to a Mega; all is forgotten, the drop too.
+        """Restart, as opening the port does to a Mega; all is forgotten but a drop it holds.
 
         Parameters
         ----------
         at_ns
             When.
         cause
-            For the BOOT frame.
+            For the BOOT frame; after `POWER_ON` the drop is forgotten too.
         """
         self.advance(at_ns)
         self.line.clear(at_ns)
+        before = self._controller
         self._forget()
+        if before.drop and before.phase is Phase.HOLDING and not cause & POWER_ON:
+            self._controller.drop = before.drop
+            before.drop.aborted = False  # so it must be acknowledged
         self.counter.start = self._random.getrandbits(32)
         self._boot_ns = at_ns + _BOOT_NS
         self._boot_cause = cause
@@ -132,6 +145,30 @@ class VirtualBoard:
             Mask of the blocked ones from now on.
         """
         self._controller.touch(gates)
+
+    def stop(self, opened: bool) -> None:
+        """Open or close the emergency stop, now."""
+        self._inputs.stopped = opened
+        if opened:
+            self._tell(self._controller.stop(self._now_ns))
+
+    def reference(self, times_ns: Iterable[int]) -> None:
+        """Have the 1 Hz reference give pulses.
+
+        Parameters
+        ----------
+        times_ns
+            When, in order of time.
+        """
+        self._inputs.pulses_ns.extend(times_ns)
+
+    def sense(self, seconds: float | None) -> None:
+        """Have the release-sense input change so long after each FIRE to come, or never."""
+        self._inputs.sense_s = seconds
+
+    def outputs(self) -> int:
+        """Mask of the release outputs that are on now."""
+        return self._controller.release.on(self._now_ns)
 
     def advance(self, until_ns: int) -> None:
         """Let happen what happens until a moment."""
@@ -150,7 +187,9 @@ class VirtualBoard:
         self._inbox: deque[tuple[int, bytes]] = deque()
         self._last: tuple[int, int, int] | None = None  # type, seq and CRC of the last request
         self._answer = b""
-        self._controller = Controller(self.lab, self.counter, self.identity, self._random)
+        self._controller = Controller(
+            self.lab, self.counter, self.identity, self._inputs, self._random
+        )
         self._oldest_ns = 0
 
     def _upcoming(self) -> tuple[int, Callable[[], None]] | None:
@@ -160,8 +199,12 @@ class VirtualBoard:
         found: list[tuple[int, Callable[[], None]]] = []
         free_ns = self.line.free_ns
         state = self._controller
+        if self._inputs.pulses_ns:
+            found.append((self._inputs.pulses_ns[0], self._reference_pulse))
         if state.coming:
             found.append((state.coming[0].when_ns, self._gate_changes))
+        if state.sense_ns is not None:
+            found.append((state.sense_ns, self._sense))
         if state.end_ns is not None:
             found.append((max(state.end_ns, free_ns), self._close))
             if state.drop is not None and state.drop.unsent:
@@ -169,7 +212,7 @@ class VirtualBoard:
                 due_ns = self._now_ns if full else self._oldest_ns + _OLDEST_NS
                 found.append((max(due_ns, free_ns), self._stream))
         if state.order is not None:
-            found.append((max(state.deadline_ns, free_ns), self._time_out))
+            found.append((max(state.lapses_ns, free_ns), self._lapse))
         if self._inbox:
             found.append((max(self._inbox[0][0] + _EXECUTION_NS, free_ns), self._listen))
         return min(found, key=lambda item: item[0]) if found else None
@@ -177,6 +220,8 @@ class VirtualBoard:
     def _boot(self) -> None:
         self._boot_ns = None
         self._inbox.clear()  # nobody listened
+        while self._inputs.pulses_ns and self._inputs.pulses_ns[0] <= self._now_ns:
+            self._inputs.pulses_ns.popleft()
         self.line.send(self._now_ns, DELIMITER)  # the reset may have cut a frame short
         self._send(wire.Boot(self._boot_cause))
 
@@ -189,6 +234,15 @@ class VirtualBoard:
                 self._oldest_ns = change.when_ns
             state.drop.store(change.tick, change.state)
 
+    def _reference_pulse(self) -> None:
+        self._controller.reference_pulse(self.counter.tick_at(self._inputs.pulses_ns.popleft()))
+
+    def _sense(self) -> None:
+        state = self._controller
+        if state.drop is not None and state.sense_ns is not None:
+            state.drop.sense_tick = self.counter.tick_at(state.sense_ns)
+        state.sense_ns = None
+
     def _stream(self) -> None:
         drop = self._controller.drop
         if drop is not None:
@@ -199,15 +253,17 @@ class VirtualBoard:
 
     def _close(self) -> None:
         state = self._controller
-        state.end_ns = None
+        state.end_ns = state.sense_ns = None
         state.coming.clear()
         if state.drop is not None:
             while state.drop.unsent:
                 self._stream()
             self._send(state.drop.certificate())
 
-    def _time_out(self) -> None:
-        disarmed = self._controller.time_out()
+    def _lapse(self) -> None:
+        self._tell(self._controller.lapse(self._now_ns))
+
+    def _tell(self, disarmed: wire.Disarmed | None) -> None:
         if disarmed is not None:
             self._send(disarmed)
 
@@ -220,6 +276,7 @@ class VirtualBoard:
             this = (frame.type, frame.seq, crc16(bytes(frame[:3]) + frame.payload))
             if frame.seq == 0:
                 continue  # could not be answered
+            self._controller.heard(self._now_ns)
             if this != self._last:
                 self._last = this
                 answer = self._controller.answer(frame, self._now_ns)

@@ -6,8 +6,9 @@ from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.link import messages as wire
-from rig.link.messages import Phase, Reason
+from rig.link.messages import DisarmReason, Phase, Reason
 from sim.recording import Recording
+from sim.release import Release
 from sim.snapshots import take_snapshots
 
 if TYPE_CHECKING:
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
 
     from rig.link.frames import Frame
     from sim.counter import Counter
+    from sim.inputs import Inputs
     from sim.lab_interface import Lab
+
+_SILENCE_NS = wire.HOST_SILENCE_MS * 10**6
 
 
 class Coming(NamedTuple):
@@ -37,6 +41,8 @@ class Controller:
         The device's time.
     identity
         What it says it is and can do.
+    inputs
+        What else it is wired to.
     tokens
         Where tokens come from.
 
@@ -44,23 +50,37 @@ class Controller:
     ----------
     gates
         Mask of the beams blocked now.
-    order, deadline_ns
-        While armed: the ARM request, and when it lapses.
+    order
+        While armed: the ARM request.
     drop
         While recording or holding.
     coming, end_ns
         While recording: what the gates are going to do, and when the recording ends.
+    sense_ns
+        While recording: when the release-sense input is going to change, or `None`.
+    release
+        The outputs.
     """
 
     def __init__(
-        self, lab: Lab, counter: Counter, identity: wire.Identity, tokens: random.Random
+        self,
+        lab: Lab,
+        counter: Counter,
+        identity: wire.Identity,
+        inputs: Inputs,
+        tokens: random.Random,
     ) -> None:
         self.gates = 0
         self.order: wire.Arm | None = None
-        self.deadline_ns = 0
         self.drop: Recording | None = None
         self.coming: deque[Coming] = deque()
         self.end_ns: int | None = None
+        self.sense_ns: int | None = None
+        self.release = Release()
+        self._deadline_ns = 0  # of the arming
+        self._heard_ns = 0  # the latest request
+        self._reference = wire.ReferencePulse(0, 0)
+        self._inputs = inputs
         self._lab = lab
         self._counter = counter
         self._identity = identity
@@ -78,16 +98,38 @@ class Controller:
             return Phase.RECORDING
         return Phase.IDLE if self.drop is None else Phase.HOLDING
 
+    @property
+    def lapses_ns(self) -> int:
+        """While armed: when it disarms itself if nothing comes."""
+        return min(self._deadline_ns, self._heard_ns + _SILENCE_NS)
+
     def touch(self, gates: int) -> None:
         """Change the beams by hand (arming asks the lab again)."""
         if self.order is not None:
             self._changed |= (self.gates ^ gates) & self.order.gates
         self.gates = gates
 
-    def time_out(self) -> wire.Disarmed | None:
-        """Disarm, when armed."""
+    def stop(self, now_ns: int) -> wire.Disarmed | None:
+        """Do what the opening of the emergency stop demands; a recording goes on to its end."""
+        self.release.off(now_ns)
+        return self._disarm(DisarmReason.STOPPED)
+
+    def heard(self, now_ns: int) -> None:
+        """Note that the host is there: any request says so, a repeated or refused one too."""
+        self._heard_ns = now_ns
+
+    def lapse(self, now_ns: int) -> wire.Disarmed | None:
+        """Disarm, when armed: nothing came."""
+        in_time = now_ns < self._deadline_ns
+        return self._disarm(DisarmReason.HOST_SILENT if in_time else DisarmReason.TIMEOUT)
+
+    def reference_pulse(self, tick: int) -> None:
+        """Count a pulse of the 1 Hz reference."""
+        self._reference = wire.ReferencePulse((self._reference.count + 1) % 2**16, tick)
+
+    def _disarm(self, reason: DisarmReason) -> wire.Disarmed | None:
         order, self.order = self.order, None
-        return wire.Disarmed(order.label, wire.DisarmReason.TIMEOUT) if order else None
+        return wire.Disarmed(order.label, reason) if order else None
 
     def answer(self, frame: Frame, now_ns: int) -> wire.DeviceMessage:
         """Execute a request.
@@ -128,6 +170,8 @@ class Controller:
                 return self._read(request)
             case wire.Acknowledge():
                 return self._acknowledge(request)
+            case wire.Reference():
+                return self._reference
         raise AssertionError(request)
 
     def _identify(self, request: wire.Identify) -> wire.DeviceMessage:
@@ -159,6 +203,10 @@ class Controller:
             and order.record_ms
         ):
             return wire.Refused(Reason.BAD_PARAMETER, 0)
+        if self._inputs.stopped:
+            return wire.Refused(Reason.STOPPED, 0)
+        if order.release and (wait_ms := self.release.cooling_ms(self._now_ns)):
+            return wire.Refused(Reason.COOLING, wait_ms)
         self.gates = self._lab.rest(order.label)
         if blocked := self.gates & order.gates:
             return wire.Refused(Reason.GATE_BLOCKED, blocked)
@@ -166,7 +214,7 @@ class Controller:
         self.order = order
         self._changed = 0
         self._token = self._random.randrange(1, 2**32)
-        self.deadline_ns = self._now_ns + order.timeout_ms * 10**6
+        self._deadline_ns = self._now_ns + order.timeout_ms * 10**6
         return wire.Armed(self._token)
 
     def _fire(self, request: wire.Fire) -> wire.DeviceMessage:
@@ -175,13 +223,18 @@ class Controller:
             return wire.Refused(Reason.NOT_ARMED, 0)
         if request.token != self._token:
             return wire.Refused(Reason.WRONG_TOKEN, 0)
+        if self._inputs.stopped:
+            return wire.Refused(Reason.STOPPED, 0)
         if blocked := self.gates & order.gates:
             return wire.Refused(Reason.GATE_BLOCKED, blocked)
         if self._changed:
             return wire.Refused(Reason.GATE_UNSTEADY, self._changed)
         tick = self._counter.tick_at(self._now_ns)
+        if order.release:  # nothing is on outside of a recording
+            pulse_us = min(order.pulse_us, order.record_ms * 1000)
+            self.release.pulse(order.release, self._now_ns, pulse_us)
         changes = self._lab.drop(order.label)
-        snapshots, glitches = take_snapshots(changes, 0, order.gates, self._counter.hz)
+        snapshots = take_snapshots(changes, 0, order.gates, self._counter.hz)
         self.coming.extend(
             Coming(
                 self._now_ns + round(s.ticks / self._counter.hz * 1e9),
@@ -190,13 +243,16 @@ class Controller:
             )
             for s in snapshots
         )
-        self.drop = Recording(order, tick, self._identity.capacity, glitches)
+        self.drop = Recording(order, tick, self._identity)
         self.end_ns = self._now_ns + order.record_ms * 10**6
+        if self._inputs.sense_s is not None:
+            self.sense_ns = self._now_ns + round(self._inputs.sense_s * 1e9)
         self.order = None
         return wire.Fired(tick)
 
     def _abort(self) -> wire.DeviceMessage:
         self.order = None
+        self.release.off(self._now_ns)
         if self.drop is not None:
             self.drop.aborted = True
         if self.end_ns is not None:
@@ -211,6 +267,8 @@ class Controller:
             return self.drop.certificate()
         if request.first >= len(self.drop):
             return wire.Refused(Reason.BAD_PARAMETER, 0)
+        if request.first < self.drop.first_kept:
+            return wire.Refused(Reason.NOT_KEPT, self.drop.first_kept)
         return self.drop.part(request.first, request.count)
 
     def _acknowledge(self, request: wire.Acknowledge) -> wire.DeviceMessage:

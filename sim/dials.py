@@ -94,10 +94,10 @@ _LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
 _SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose"}
 
 
-def read_dials(settings: Mapping[str, str]) -> Dials:
+def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
     """Dials from a URL's query, for example ``skew_sd=2ms&clock=-1300 ppm``.
 
-    ``quiet=1`` starts from `Dials.quiet` instead of the defaults.
+    ``quiet=1`` starts from `Dials.quiet` instead of the defaults; `scheme` is the URL's.
 
     Raises
     ------
@@ -107,14 +107,14 @@ def read_dials(settings: Mapping[str, str]) -> Dials:
     rest = dict(settings)
     quiet = rest.pop("quiet", "0")
     if quiet not in {"0", "1"}:
-        raise InputError(f"sim://: quiet: {quiet!r} is neither 0 nor 1")
+        raise InputError(f"{scheme}://: quiet: {quiet!r} is neither 0 nor 1")
     dials = Dials.quiet() if quiet == "1" else Dials()
     changes: dict[str, float] = {}
     for name, text in rest.items():
         if name not in _NAMES:
             close = get_close_matches(name, _NAMES, 1)
             raise InputError(
-                f"sim://: unknown dial {name!r}",
+                f"{scheme}://: unknown dial {name!r}",
                 f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(_NAMES)}",
             )
         dimension = (
@@ -127,11 +127,15 @@ def read_dials(settings: Mapping[str, str]) -> Dials:
         try:
             changes[name] = parse(text, dimension).value
         except UnitError as error:
-            raise InputError(f"sim://: {name}: {error}") from None
+            raise InputError(f"{scheme}://: {name}: {error}") from None
         if changes[name] < 0.0 and name not in {"clock", "restitution"}:
-            raise InputError(f"sim://: {name}: {text} is negative; zero or more is accepted")
+            raise InputError(f"{scheme}://: {name}: {text} is negative; zero or more is accepted")
         if changes[name] > 1.0 and name in _SHARES:
-            raise InputError(f"sim://: {name}: {text} is more than all", "a share is 0 to 100 %")
+            raise InputError(
+                f"{scheme}://: {name}: {text} is more than all", "a share is 0 to 100 %"
+            )
         if changes[name] <= -1.0 and name == "clock":
-            raise InputError(f"sim://: clock: {text} would stop it", "a real one is off by < 0.5 %")
+            raise InputError(
+                f"{scheme}://: clock: {text} would stop it", "a real one is off by < 0.5 %"
+            )
     return replace(dials, **changes)

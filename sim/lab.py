@@ -15,6 +15,7 @@ from rig.link.messages import unpack_label
 from rig.model.chain import Chain
 from rig.model.fall import hits, kicks
 from rig.model.impact import impact_on
+from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive
 from sim.camera import camera_reading
@@ -53,6 +54,11 @@ class ChainLab:
         Chooses the rig, the chains and all drops.
     tell
         Called with the hidden truth of each drop.
+
+    Raises
+    ------
+    InputError
+        If chains that start with a speed, or fall in air, are asked for.
     """
 
     def __init__(
@@ -62,6 +68,7 @@ class ChainLab:
         seed: int,
         tell: Callable[[Truth], None] = lambda _: None,
     ) -> None:
+        check_measurable(protocol)
         self.protocol = protocol
         self.dials = dials
         self.seed = seed

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import zlib
+from typing import TYPE_CHECKING
 
-from rig.link.messages import EVENTS_PER_FRAME, Arm, DropCertificate, EventsFrame
+from rig.link.messages import EVENTS_PER_FRAME, DropCertificate, EventsFrame
 from rig.link.wiretypes import Event
 
-_LATE_BELOW = 100
-"""Just after an overflow of the 16-bit timer a stamp can have waited for the overflow interrupt."""
+if TYPE_CHECKING:
+    from rig.link.messages import Arm, Identity
+
+_MOST = 0xFFFF  # an event's number is a u16
 
 
 class Recording:
@@ -20,10 +23,8 @@ class Recording:
         The ARM request.
     fire_tick
         When it was fired.
-    capacity
-        Events that fit.
-    glitches
-        Pulses too short to be stamped.
+    identity
+        How many events the board can keep, and what counts as late.
 
     Attributes
     ----------
@@ -31,17 +32,21 @@ class Recording:
         How many events were streamed already.
     aborted
         Whether ABORT came since: then the same label may be armed again.
+    sense_tick
+        When the release-sense input changed, or `None`.
     """
 
-    def __init__(self, order: Arm, fire_tick: int, capacity: int, glitches: int) -> None:
+    def __init__(self, order: Arm, fire_tick: int, identity: Identity) -> None:
         self.order = order
         self.sent = 0
         self.aborted = False
+        self.sense_tick: int | None = None
         self._fire_tick = fire_tick
-        self._capacity = capacity
+        self._identity = identity
+        # All of them, for the certificate; a real board that streams keeps a running CRC.
         self._events: list[Event] = []
         self._overflows = 0
-        self._glitches = glitches
+        self._glitches = 0
         self._late = 0
 
     def __len__(self) -> int:
@@ -52,13 +57,23 @@ class Recording:
         """Events not streamed yet."""
         return len(self._events) - self.sent
 
+    @property
+    def first_kept(self) -> int:
+        """Number of the oldest event that can still be read."""
+        streams, capacity = self._identity.streams, self._identity.capacity
+        return max(0, len(self._events) - capacity) if streams else 0
+
     def store(self, tick: int, state: int) -> None:
-        """Take one snapshot, or count it as lost when the memory is full."""
-        if len(self._events) >= self._capacity:
+        """Take one snapshot, or count it as lost when there is no place for it."""
+        waiting = self.unsent if self._identity.streams else len(self._events)
+        if waiting >= self._identity.capacity or len(self._events) >= _MOST:
             self._overflows = min(self._overflows + 1, 0xFFFF)
             return
+        if self._events:
+            self._late += (tick - self._events[-1].tick) % 2**32 < self._identity.late_ticks
+        # All gates were clear, or FIRE had been refused.
+        self._glitches += state == (self._events[-1].state if self._events else 0)
         self._events.append(Event(tick, state))
-        self._late += (tick & 0xFFFF) < _LATE_BELOW
 
     def part(self, first: int, count: int) -> EventsFrame:
         """Give some events, at most a frame full."""
@@ -74,10 +89,12 @@ class Recording:
             label=self.order.label,
             fire_tick=self._fire_tick,
             gates=self.order.gates,
-            initial_state=0,  # the gates that count were clear, or FIRE had been refused
+            initial_state=0,
             events=len(self._events),
             crc32=zlib.crc32(packed),
             overflows=self._overflows,
-            glitches=min(self._glitches, 0xFFFF),
+            glitches=self._glitches,
             late=self._late,
+            sensed=int(self.sense_tick is not None),
+            sense_tick=self.sense_tick or 0,
         )

@@ -11,7 +11,7 @@ from sim.clock import VirtualClock
 from sim.line import LineFaults
 
 if TYPE_CHECKING:
-    from sim.board import VirtualBoard
+    from sim.board_interface import Board
 
 _CALL_NS = 1_000  # a call takes time too: without this, polling would stop the clock
 
@@ -45,7 +45,7 @@ class SimulatedSerial(SerialBase):
         self,
         port: str | None = None,
         *,
-        board: VirtualBoard | None = None,
+        board: Board | None = None,
         clock: VirtualClock | None = None,
         seed: int = 0,
         jitter_s: float = 0.3e-3,
@@ -71,7 +71,7 @@ class SimulatedSerial(SerialBase):
         self._to_board = LineFaults(corrupt, lose, seed=2 * seed)
         self._to_host = LineFaults(corrupt, lose, seed=2 * seed + 1)
 
-    def make_board(self) -> VirtualBoard:
+    def make_board(self) -> Board:
         """Build the board that `self.port` names; may call `disturb` too."""
         raise SerialException("no virtual board behind this port")
 
@@ -113,10 +113,7 @@ class SimulatedSerial(SerialBase):
         clock = self.clock
         end_ns = None if self.timeout is None else clock.now_ns() + round(self.timeout * 1e9)
         while len(self._buffer) < size:
-            next_ns = board.line.next_arrival_ns()
-            arrives = next_ns is not None
-            if next_ns is None:
-                next_ns = board.next_ns()
+            next_ns, arrives = self.upcoming(board, end_ns)
             if next_ns is None and end_ns is None:
                 raise SerialException("waiting without a time-out for a board that is silent")
             if end_ns is not None and (next_ns is None or next_ns > end_ns):
@@ -130,6 +127,28 @@ class SimulatedSerial(SerialBase):
         data = bytes(self._buffer[:size])
         del self._buffer[:size]
         return data
+
+    def upcoming(
+        self,
+        board: Board,
+        end_ns: int | None,  # noqa: ARG002 - for boards that can run ahead
+    ) -> tuple[int | None, bool]:
+        """Find out how far a read may jump.
+
+        Parameters
+        ----------
+        board
+            The one that is connected.
+        end_ns
+            When the read gives up; the host sends nothing before. `None`: never.
+
+        Returns
+        -------
+        int or None, bool
+            When the board will do something (`None`: never), and whether a byte arrives then.
+        """
+        arrival_ns = board.line.next_arrival_ns()
+        return (board.next_ns(), False) if arrival_ns is None else (arrival_ns, True)
 
     def write(self, data: Any, /) -> int:
         """Send bytes; they leave at line rate, and this returns at once."""
@@ -152,7 +171,7 @@ class SimulatedSerial(SerialBase):
     def reset_output_buffer(self) -> None:
         """Do nothing: what was written is on its way."""
 
-    def _pass(self, ns: int) -> VirtualBoard:
+    def _pass(self, ns: int) -> Board:
         """Let time pass and collect what arrived."""
         if not self.is_open or self.board is None:
             raise PortNotOpenError

@@ -1,4 +1,4 @@
-"""What a pin-change interrupt makes of light and shadow: snapshots, and missed glitches."""
+"""What a pin-change interrupt makes of light and shadow: snapshots, some of them of glitches."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Snapshot(NamedTuple):
 
 def take_snapshots(
     changes: Iterable[tuple[float, int, bool]], initial: int, gates: int, hz: float
-) -> tuple[list[Snapshot], int]:
+) -> list[Snapshot]:
     """Turn changes of single beams into snapshots of all gates.
 
     Parameters
@@ -36,39 +36,36 @@ def take_snapshots(
 
     Returns
     -------
-    list of Snapshot, int
-        In order of time, and how many pulses were too short to be seen.
+    list of Snapshot
+        In order of time. A pulse too short to be seen leaves one with the state of the one before.
     """
-    seen, glitches = _without_glitches(changes, initial, gates)
     snapshots: list[Snapshot] = []
     state = initial & gates
-    for seconds, channel, blocked in seen:
-        state = state | 1 << channel if blocked else state & ~(1 << channel)
+    for seconds, flipped in _looks(changes, initial, gates):
+        state ^= flipped
         ticks = round(seconds * hz)
         if snapshots and snapshots[-1].ticks == ticks:
             snapshots.pop()
         snapshots.append(Snapshot(ticks, state))
-    return snapshots, glitches
+    return snapshots
 
 
-def _without_glitches(
+def _looks(
     changes: Iterable[tuple[float, int, bool]], initial: int, gates: int
-) -> tuple[list[tuple[float, int, bool]], int]:
-    """Remove pulses shorter than `GLITCH_S`, and changes to the state a gate is in already."""
-    kept: list[tuple[float, int, bool] | None] = []
-    last: dict[int, int] = {}  # index of each channel's last kept change
+) -> list[tuple[float, int]]:
+    """When the interrupt looks, and which gate differs then: none after a glitch."""
+    looks: list[tuple[float, int]] = []
+    last: dict[int, int] = {}  # index of each channel's last change that was seen
     state = initial
-    glitches = 0
     for seconds, channel, blocked in changes:
-        if not gates >> channel & 1 or bool(state >> channel & 1) == blocked:
+        bit = 1 << channel
+        if not gates & bit or bool(state & bit) == blocked:
             continue
-        state ^= 1 << channel
+        state ^= bit
         at = last.pop(channel, None)
-        previous = None if at is None else kept[at]
-        if at is not None and previous is not None and seconds - previous[0] < GLITCH_S:
-            kept[at] = None
-            glitches += 1
+        if at is not None and seconds - looks[at][0] < GLITCH_S:
+            looks[at] = looks[at][0], 0
         else:
-            last[channel] = len(kept)
-            kept.append((seconds, channel, blocked))
-    return [change for change in kept if change is not None], glitches
+            last[channel] = len(looks)
+            looks.append((seconds, bit))
+    return looks

@@ -15,6 +15,7 @@ BASES = {
     Dimension.ACCELERATION: "m/s^2",
     Dimension.SPEED: "m/s",
     Dimension.MASS: "kg",
+    Dimension.DENSITY: "kg/m^3",
     Dimension.FREQUENCY: "Hz",
     Dimension.NUMBER: "",
 }
@@ -70,6 +71,7 @@ def test_lengths_are_read_to_the_last_bit(text, value, u):
         ("40°", Dimension.ANGLE, 40.0, 0.0),
         ("9.81 m/s²", Dimension.ACCELERATION, 9.81, 0.0),
         ("9.81 m / s2", Dimension.ACCELERATION, 9.81, 0.0),
+        ("1.2 kg/m³", Dimension.DENSITY, 1.2, 0.0),
         ("90 km/h", Dimension.SPEED, 25.0, 0.0),
     ],
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.drop import TimeScale, analyze_drop
 from rig.analysis.summary import Incline, summarize
 from rig.errors import InputError
+from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
 
 if TYPE_CHECKING:
@@ -74,13 +75,14 @@ def analyze(
     Raises
     ------
     InputError
-        A drop of a run that is not planned, or a scene without gates.
+        A drop of a run that is not planned, or a scene that cannot be measured.
     """
     if protocol.gates is None:
         raise InputError(
             "this protocol has no gates, so there is nothing to analyse",
             "rig predict PROTOCOL says what the model expects",
         )
+    check_measurable(protocol)
     planned = {run.number: run for run in planned_runs(protocol)}
     rejected = rejected or {}
     results: list[DropResult] = []

@@ -20,8 +20,12 @@ LEAD = 0.1
 RESTLESS = 2.0
 """Scatter of the edges about the adjusted motion, relative to the assumed one, that is remarked."""
 
-LATE = 0.02
-"""Share of late stamps that a drop may have without remark."""
+LATE = 0.2
+"""Share of stamps so close behind another that they may be late which a drop may have without
+remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
+
+GLITCHES = 0.02
+"""Pulses too short to be timed, relative to the edges, that a drop may have without remark."""
 
 
 class Judgement(NamedTuple):
@@ -104,6 +108,9 @@ def _doubts(
         )
     if not estimate.settled:
         doubts.append("the adjustment did not settle: no motion fits these edges well")
-    if drop.certificate is not None and drop.certificate.late > LATE * max(1, len(drop.edges)):
-        doubts.append(f"{drop.certificate.late} time stamps may be late")
+    device, edges = drop.certificate, max(1, len(drop.edges))
+    if device is not None and device.late > LATE * edges:
+        doubts.append(f"{device.late} time stamps may be late")
+    if device is not None and device.glitches > GLITCHES * edges:
+        doubts.append(f"{device.glitches} pulses were too short to be timed")
     return doubts

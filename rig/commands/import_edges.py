@@ -10,6 +10,7 @@ from rig.commands.output import say
 from rig.errors import InputError
 from rig.link.clock import SystemClock
 from rig.protocol import reader
+from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from rig.session.edges_csv import read_edges
 from rig.session.schema import RunState
@@ -72,6 +73,7 @@ def _fits(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
             f"{protocol.source} has no gates, so edges cannot belong to it",
             "add the gates the edges come from",
         )
+    check_measurable(protocol)
     planned = len(runs(protocol))
     strangers = sorted({drop.run for drop in drops if drop.run > planned})
     if strangers:

@@ -7,8 +7,6 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rig.report.table import summary_table
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -44,5 +42,7 @@ def print_results(found: Mapping[str, Any], *, as_json: bool) -> int:
     else:
         if found["simulated"]:
             print("SIMULATED DATA")
+        from rig.report.table import summary_table  # noqa: PLC0415 - few commands print one
+
         print(summary_table(found))
     return VOID if any(run["verdict"] == "void" for run in found["runs"]) else 0

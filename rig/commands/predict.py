@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from rig.commands.output import print_json
 from rig.errors import InputError
-from rig.model.fall import fall, free_fall_speed
-from rig.model.predict import predict
+from rig.predictions import predictions
 from rig.protocol import reader
 
 if TYPE_CHECKING:
     from argparse import Namespace
-
-    from rig.protocol.scene import Protocol
 
 
 def main(arguments: Namespace) -> int:
@@ -25,60 +22,12 @@ def main(arguments: Namespace) -> int:
         return 0
     if arguments.protocol is None:
         raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
-    protocol = reader.read(arguments.protocol)
-    found = predictions(protocol)
+    found = predictions(reader.read(arguments.protocol))
     if arguments.json:
         print_json({"predictions": found})
     else:
         print(table(found))
     return 0
-
-
-def predictions(protocol: Protocol) -> list[dict[str, Any]]:
-    """Predict each incline of the plan; where chains are unlike, the first one strikes."""
-    first, *others = protocol.chains.values()
-    chain = first.chain
-    if protocol.surface is None:
-        down = fall(chain, 0.0, 0.0, protocol.drop.value, protocol.gravity.value)
-        free = free_fall_speed(chain, protocol.drop.value, protocol.gravity.value)
-        return [
-            {
-                "incline_deg": 0.0,
-                "model": "free fall",
-                "alpha": None,
-                "gamma": None,
-                "separation_m": None,
-                "speed_m_s": free,
-                "fall_time_s": down.time_s,
-                "free_fall_speed_m_s": free,
-                "in_domain": True,
-                "notes": [],
-            }
-        ]
-    longer = others[0].chain.length - chain.length if others else 0.0
-    found = []
-    for incline in dict.fromkeys(protocol.plan.inclines):
-        one = predict(chain, protocol.surface, incline, protocol.drop, protocol.gravity)
-        notes = list(one.notes)
-        if longer:
-            notes.append(f"chains are unlike: {first.name} strikes")
-        found.append(
-            {
-                "incline_deg": incline,
-                "model": one.model,
-                "alpha": one.alpha,
-                "gamma": one.gamma,
-                "separation_m": None if one.separation is None else one.separation + longer,
-                "separation_u_m": one.separation_u,
-                "speed_m_s": one.speed,
-                "speed_u_m_s": one.speed_u,
-                "fall_time_s": one.time,
-                "free_fall_speed_m_s": one.free_fall_speed,
-                "in_domain": one.in_domain,
-                "notes": notes,
-            }
-        )
-    return found
 
 
 def table(found: list[dict[str, Any]]) -> str:

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 RECORD_MS = 1500
 """How long after the release to record: no drop of a lab lasts longer."""
 ARM_TIMEOUT_MS = 10_000
+DISCARD = "taking the power from the board discards the drop, a reset does not"
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
+_ARMED_PING_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
 
 
 class Station:
@@ -115,13 +117,17 @@ class Station:
         return self._device
 
     def wait(self, seconds: float, stop: Callable[[], bool] | None = None) -> None:
-        """Let time pass and use it to compare clocks, at uneven intervals."""
+        """Let time pass and use it to compare clocks, at uneven intervals.
+
+        What is armed stays so: the device hears from this program often enough.
+        """
         until = self.clock.now_ns() + round(seconds * 1e9)
         while not (stop is not None and stop()):
             left = (until - self.clock.now_ns()) * 1e-9
             if left <= 0.0:
                 break
-            self.clock.sleep(min(left, _PING_S * self._uneven.uniform(0.5, 1.5)))
+            longest = _PING_S * self._uneven.uniform(0.5, 1.5)
+            self.clock.sleep(min(left, longest if self._armed is None else _ARMED_PING_S))
             with self.interrupts.held():
                 self.device.ping()
         with self.interrupts.held():
@@ -136,7 +142,7 @@ class Station:
         return None
 
     def arm(self, run: int, attempt: int, protocol: Protocol) -> int:
-        """Prepare a drop; the release stays off until `fire`.
+        """Prepare a drop; the release stays off until `fire`. Until then wait with `wait` only.
 
         Returns
         -------
@@ -163,9 +169,16 @@ class Station:
             return token
 
     def fire(self, token: int) -> None:
-        """Let go. What was armed is on the disk as fired before the request leaves."""
+        """Let go. What was armed is on the disk as fired before the request leaves.
+
+        Raises
+        ------
+        DeviceRefusedError
+            Nothing was let go: a beam was disturbed, or the device has disarmed itself.
+        """
         run, attempt = self._armed or (0, 0)
         with self.interrupts.held():
+            self.device.ping()  # a slow disk may take most of the silence allowed, twice
             self.state(run, attempt, RunState.FIRED)
             self.interrupts.check()  # whoever asked to stop until now sees nothing fall
             self.device.fire(token)
@@ -194,7 +207,7 @@ class Station:
                 raise DeviceError(
                     f"the device holds another drop of run {run}, attempt {attempt}, than this "
                     "session",
-                    "continue the session it belongs to; resetting the board discards the drop",
+                    f"continue the session it belongs to; {DISCARD}",
                 )
             self._acknowledge(drop)
             return None

@@ -33,6 +33,8 @@ class Assembly:
         The device's account, once it is in.
     reset
         Whether the device restarted while the drop was open.
+    first_kept
+        Number of the oldest event that can still be read, as far as the device has said so.
     """
 
     def __init__(self, label: int) -> None:
@@ -41,6 +43,7 @@ class Assembly:
         self.fire_tick: int | None = None
         self.certificate: DropCertificate | None = None
         self.reset = False
+        self.first_kept = 0
         self._events: dict[int, Event] = {}
 
     @property
@@ -52,13 +55,17 @@ class Assembly:
         """Take events; what was there already is replaced, so a re-read repairs."""
         self._events.update(enumerate(frame.events, start=frame.first))
 
-    def missing(self, at_most: int = EVENTS_PER_FRAME) -> list[tuple[int, int]]:
-        """List the stretches of events still to be read.
+    def missing(
+        self, at_most: int = EVENTS_PER_FRAME, *, readable: bool = False
+    ) -> list[tuple[int, int]]:
+        """List the stretches of events that are not known.
 
         Parameters
         ----------
         at_most
             Longest stretch to list as one.
+        readable
+            Whether to leave out what the device does not keep any more.
 
         Returns
         -------
@@ -67,7 +74,7 @@ class Assembly:
         """
         total = self.certificate.events if self.certificate else 0
         stretches: list[tuple[int, int]] = []
-        for index in range(total):
+        for index in range(self.first_kept if readable else 0, total):
             if index in self._events:
                 continue
             if stretches:
@@ -83,9 +90,10 @@ class Assembly:
         certificate = self.certificate
         return certificate is not None and not self.missing() and self._crc() == certificate.crc32
 
-    def forget_events(self) -> None:
-        """Drop the events, to read all of them again."""
-        self._events.clear()
+    def forget_events(self, latest: int | None = None) -> None:
+        """Drop the events, to read them again; only the latest so many, when said."""
+        first = max(0, len(self._events) - latest) if latest is not None else 0
+        self._events = {index: e for index, e in self._events.items() if index < first}
 
     def drop(self, tick_hz: int) -> Drop:
         """Make the raw record of what is known now.
@@ -140,7 +148,7 @@ class Assembly:
             # Behind a gap it is not known when the gates changed: no edge is better than a
             # wrong one.
             changed = state ^ now if index == expected else 0
-            tick = (event.tick - fire_tick + _WRAP // 2) % _WRAP - _WRAP // 2
+            tick = _since(fire_tick, event.tick)
             while changed:
                 lowest = changed & -changed
                 edges.append(Edge(tick, lowest.bit_length() - 1, bool(now & lowest)))
@@ -160,16 +168,22 @@ class Assembly:
             return tuple(faults)
         gaps = self.missing(at_most=_WRAP)
         if gaps:
+            first = gaps[0][0]
             count = sum(count for _, count in gaps)
-            faults.append(f"{count} of {seen.events} events missing, from number {gaps[0][0]}")
+            how = "no longer kept by the device" if first < self.first_kept else "missing"
+            faults.append(f"{count} of {seen.events} events {how}, from number {first}")
         elif self._crc() != seen.crc32:
             faults.append("the events do not match the certificate's CRC-32")
         if seen.overflows:
             faults.append(f"{seen.overflows} events lost: the device's memory was full")
-        if seen.glitches:
-            faults.append(f"{seen.glitches} pulses too short to be timed")
         return tuple(faults)
 
 
 def _account(seen: DropCertificate) -> Certificate:
-    return Certificate(seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late)
+    sense = _since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
+    return Certificate(seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
+
+
+def _since(fire_tick: int, tick: int) -> int:
+    """Ticks from the fire stamp; negative before it."""
+    return (tick - fire_tick + _WRAP // 2) % _WRAP - _WRAP // 2

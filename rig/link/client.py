@@ -9,6 +9,7 @@ from rig.link import messages as wire
 from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.refusals import DeviceRefusedError
+from rig.link.transcript import Received
 from rig.records import Ping
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ BOOT_WAIT_S = 2.0
 _LONGEST_RECORD_S = 65.535  # record_ms is a u16
 _LATE_S = 0.25  # how much later than announced a certificate may come before the host asks
 _SMALLEST_READ = 4
+_FIRE_WAIT_S = 0.05
+"""Two FIREs may be lost before an armed device takes the host for gone."""
 
 
 class Device:
@@ -57,10 +60,16 @@ class Device:
     ) -> None:
         self._samples: list[Ping] = []
         self._record_ms: dict[int, int] = {}  # of the last armed drop, by label
+        self._disarmed: wire.DisarmReason | None = None  # by itself, since it was armed
 
         def know(record: Record) -> None:
-            if isinstance(record, Ping):
-                self._samples.append(record)
+            match record:
+                case Ping():
+                    self._samples.append(record)
+                case Received(message=wire.Armed()):
+                    self._disarmed = None
+                case Received(message=wire.Disarmed(reason=reason)):
+                    self._disarmed = reason
             if on_record is not None:
                 on_record(record)
 
@@ -118,6 +127,10 @@ class Device:
         """Ask what the device is doing."""
         return self._line.request(wire.Status(), wire.State)
 
+    def reference(self) -> wire.ReferencePulse:
+        """Ask for the latest pulse of the 1 Hz reference; its count is 0 when none is wired."""
+        return self._line.request(wire.Reference(), wire.ReferencePulse)
+
     def arm(
         self,
         *,
@@ -130,6 +143,9 @@ class Device:
     ) -> int:
         """Prepare a drop; the parameters are those of `rig.link.messages.Arm`.
 
+        From now until `fire` the device wants to hear a request, any request, every
+        `HOST_SILENCE_MS`: else it disarms itself.
+
         Returns
         -------
         int
@@ -138,7 +154,8 @@ class Device:
         Raises
         ------
         DeviceRefusedError
-            A gate is blocked, another drop is held, a parameter is out of range.
+            A gate is blocked, the release is too warm, another drop is held, a parameter is out
+            of range, the emergency stop is open.
         """
         request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
         token = self._line.request(request, wire.Armed).token
@@ -157,8 +174,19 @@ class Device:
         -------
         int
             The tick (u32) of the release.
+
+        Raises
+        ------
+        DeviceRefusedError
+            A gate is blocked or was since arming, or the device is not armed any more; nothing
+            was released.
         """
-        return self._line.request(wire.Fire(token), wire.Fired).tick
+        try:
+            return self._line.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
+        except DeviceRefusedError as refused:
+            if refused.reason is not wire.Reason.NOT_ARMED:
+                raise
+            raise DeviceRefusedError(refused.reason, refused.detail, self._disarmed) from None
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""
@@ -250,9 +278,10 @@ class Device:
         if drop.certificate is None:
             self._line.request(wire.Read(label, 0, 0), wire.DropCertificate)
         self._read_missing(drop)
-        if not drop.sound():
+        if not drop.missing() and not drop.sound():
             # Two CRC-16 collisions in one drop are all but impossible: once more is enough.
-            drop.forget_events()
+            known = self.transcript.identity
+            drop.forget_events(known.capacity if known else None)
             self._read_missing(drop)
         return self.transcript.pending(label)
 
@@ -270,17 +299,21 @@ class Device:
         """Ask for missing events in ever smaller pieces: on a bad line short frames get through."""
         size = wire.EVENTS_PER_FRAME
         failures = 0
-        while missing := drop.missing(at_most=size):
+        while missing := drop.missing(at_most=size, readable=True):
             first, count = missing[0]
             try:
                 self._line.request(wire.Read(drop.label, first, count), wire.EventsFrame, tries=2)
+            except DeviceRefusedError as refused:
+                # What it does not keep any more stays missing, and makes the drop faulty.
+                if refused.reason is not wire.Reason.NOT_KEPT or refused.detail <= first:
+                    raise
             except DeviceTimeoutError:
                 failures += 1
                 if failures > self._line.tries:
                     raise
                 size = max(_SMALLEST_READ, size // 2)
             else:
-                if drop.missing(at_most=size)[:1] == missing[:1]:
+                if drop.missing(at_most=size, readable=True)[:1] == missing[:1]:
                     raise DeviceError(
                         "the device did not send the events it was asked for",
                         "its firmware is faulty: rig flash, then rig selftest",

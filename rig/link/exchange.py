@@ -62,7 +62,11 @@ class Exchange:
         self._seq = 0
 
     def request(
-        self, message: wire.HostMessage, expected: type[Answer], tries: int | None = None
+        self,
+        message: wire.HostMessage,
+        expected: type[Answer],
+        tries: int | None = None,
+        wait: float = _FIRST_WAIT_S,
     ) -> Answer:
         """Send a request until it is answered; every repeat has the same seq.
 
@@ -74,6 +78,8 @@ class Exchange:
             Which message answers it.
         tries
             How often to send it, if not as often as usual.
+        wait
+            How long to wait for the first answer, s; longer from try to try.
 
         Returns
         -------
@@ -93,7 +99,6 @@ class Exchange:
         seq = self._seq
         code, payload = wire.pack(message)
         data = encode(Frame(code, seq, 0, payload))
-        wait = _FIRST_WAIT_S
         for _ in range(tries or self.tries):
             self.write(data)
             answer = self.wait(wait, lambda got: got.ack == seq)

@@ -5,7 +5,11 @@ wire is written down a second time. Host requests have codes below 0x80, device 
 
 How a drop goes: ARM → ARMED(token) → FIRE(token) → FIRED, then EVENTS as they come and a
 CERTIFICATE when `record_ms` is over. The device holds the drop until ACKNOWLEDGE names its label
-and CRC; until then READ gives any part of it again.
+and CRC; until then READ gives any part of it again. A device that `streams` has memory for the
+latest `capacity` events only, and refuses to read older ones with NOT_KEPT.
+
+While armed, the host must be heard at least every `HOST_SILENCE_MS`; from FIRE until the
+certificate it keeps silent, so that nothing but gates interrupts the device.
 
 Rules for a device: a frame that cannot be read, or with seq 0, is passed over in silence. A request
 with the type, seq and CRC of the one before it is a repeat (its answer was lost): ARMED, FIRED,
@@ -42,6 +46,7 @@ __all__ = [
     "CODES",
     "EVENTS_PER_FRAME",
     "FIELDS",
+    "HOST_SILENCE_MS",
     "PROTOCOL_VERSION",
     "TABLE",
     "Abort",
@@ -68,6 +73,8 @@ __all__ = [
     "Pong",
     "Read",
     "Reason",
+    "Reference",
+    "ReferencePulse",
     "Refused",
     "State",
     "Status",
@@ -80,6 +87,8 @@ __all__ = [
 PROTOCOL_VERSION = 1
 EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
 """Six-byte events that fit behind an EVENTS frame's label and index."""
+HOST_SILENCE_MS = 250
+"""An armed device that heard no request for so long disarms itself."""
 
 
 class Phase(IntEnum):
@@ -105,12 +114,17 @@ class Reason(IntEnum):
     WRONG_CRC = 9
     VERSION = 10  # detail: the device's protocol version
     UNKNOWN_MESSAGE = 11  # detail: its code
+    STOPPED = 12  # the emergency stop is open
+    COOLING = 13  # the release was on too much; detail: milliseconds still to wait
+    NOT_KEPT = 14  # detail: number of the first event that can still be read
 
 
 class DisarmReason(IntEnum):
     """Why the device disarmed by itself."""
 
     TIMEOUT = 1
+    HOST_SILENT = 2
+    STOPPED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,8 +202,25 @@ class Acknowledge:
 
 
 @dataclass(frozen=True, slots=True)
+class Reference:
+    """Ask for the latest pulse of the 1 Hz reference."""
+
+
+@dataclass(frozen=True, slots=True)
 class Identity:
-    """Who the device is; `channels` names its gate inputs, separated by spaces."""
+    """Who the device is and what it can do.
+
+    Attributes
+    ----------
+    capacity
+        Events it can keep.
+    streams
+        1 when it keeps the latest events only, 0 when it keeps a drop whole.
+    late_ticks
+        A stamp that follows the one before it within so many ticks may be late by as much.
+    channels
+        Names of the gate inputs, separated by spaces.
+    """
 
     protocol_version: U8
     board: Name
@@ -200,6 +231,8 @@ class Identity:
     releases: U8
     max_pulse_us: U32
     capacity: U16
+    streams: U8
+    late_ticks: U16
     channels: Line
 
 
@@ -249,7 +282,10 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class EventsFrame:
-    """Events number `first` and on. Stamps are already corrected for the board's mean latency."""
+    """Events number `first` and on. Stamps are already corrected for the board's mean latency.
+
+    An event with the state of the one before it is a glitch: a pulse over before it was looked at.
+    """
 
     label: U32
     first: U16
@@ -258,7 +294,19 @@ class EventsFrame:
 
 @dataclass(frozen=True, slots=True)
 class DropCertificate:
-    """The device's own account of a drop; `crc32` is over its events as they are on the wire."""
+    """The device's own account of a drop.
+
+    Attributes
+    ----------
+    crc32
+        Over the events as they are on the wire.
+    overflows
+        Events for which there was no memory.
+    glitches, late
+        How many of the events are glitches, and how many have a stamp that may be late.
+    sensed, sense_tick
+        Whether the release-sense input changed after FIRE, and when first.
+    """
 
     label: U32
     fire_tick: U32
@@ -269,6 +317,8 @@ class DropCertificate:
     overflows: U16
     glitches: U16
     late: U16
+    sensed: U8
+    sense_tick: U32
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +339,17 @@ class Boot:
     cause: U8
 
 
-HostMessage: TypeAlias = Identify | Ping | Status | Arm | Fire | Abort | Read | Acknowledge
+@dataclass(frozen=True, slots=True)
+class ReferencePulse:
+    """Answer to REFERENCE: how many pulses there were, and the tick of the latest."""
+
+    count: U16
+    tick: U32
+
+
+HostMessage: TypeAlias = (
+    Identify | Ping | Status | Arm | Fire | Abort | Read | Acknowledge | Reference
+)
 DeviceMessage: TypeAlias = (
     Identity
     | Pong
@@ -302,6 +362,7 @@ DeviceMessage: TypeAlias = (
     | DropCertificate
     | Disarmed
     | Boot
+    | ReferencePulse
 )
 Message: TypeAlias = HostMessage | DeviceMessage
 
@@ -314,6 +375,7 @@ TABLE: dict[int, type[Message]] = {
     0x06: Abort,
     0x07: Read,
     0x08: Acknowledge,
+    0x09: Reference,
     0x81: Identity,
     0x82: Pong,
     0x83: State,
@@ -325,6 +387,7 @@ TABLE: dict[int, type[Message]] = {
     0x89: DropCertificate,
     0x8A: Disarmed,
     0x8B: Boot,
+    0x8C: ReferencePulse,
 }
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}

@@ -13,7 +13,8 @@ from rig.link.clock import Clock, SystemClock
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
 READ_TIMEOUT_S = 0.02
-_HANDLERS = "sim"  # the package where pyserial finds sim:// and replay://
+_HANDLERS = ("sim", "rig_emulator")  # packages where pyserial finds sim:// and emu://
+_EMULATOR = "install it: pip install ./firmware/emulator (needs gcc and Debian's libsimavr-dev)"
 
 _LOOK = "`rig ports` lists what is there"
 _ABSENT = ("there is no such port", f"is the board plugged in? {_LOOK}")
@@ -70,8 +71,9 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
     DeviceError
         When it cannot be opened; the hint says what to try.
     """
-    if _HANDLERS not in serial.protocol_handler_packages:
-        serial.protocol_handler_packages.append(_HANDLERS)
+    for package in _HANDLERS:
+        if package not in serial.protocol_handler_packages:
+            serial.protocol_handler_packages.append(package)
     try:
         port: Any = serial.serial_for_url(  # a subclass of SerialBase
             url, baudrate=baudrate, timeout=READ_TIMEOUT_S, exclusive=True
@@ -82,6 +84,8 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
         cause, hint = _CAUSES.get(error.errno or 0, (str(error), _LOOK))
         raise DeviceError(f"cannot open {url}: {cause}", hint) from error
     except ValueError as error:
+        if url.lower().startswith("emu://"):  # pyserial says no more of a handler it cannot import
+            raise DeviceError("the emulator is not installed, or is broken", _EMULATOR) from error
         raise DeviceError(f"cannot open {url}: {error}", _LOOK) from error
     opened: Port = port
     return opened

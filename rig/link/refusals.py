@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
-from rig.link.messages import PROTOCOL_VERSION, Reason
+from rig.link.messages import PROTOCOL_VERSION, DisarmReason, Reason
 
 if TYPE_CHECKING:
     from rig.link.messages import Refused
@@ -49,9 +49,36 @@ ADVICE: dict[Reason, tuple[str, str]] = {
         f"{PROTOCOL_VERSION}",
         "bring both to the same version: rig flash",
     ),
+    Reason.STOPPED: (
+        "the emergency stop is open",
+        "see that nobody is in danger and close it, then arm again",
+    ),
+    Reason.COOLING: (
+        "the release must rest for {detail} ms more",
+        "wait that long, then arm again: its coil may be on for a quarter of the time",
+    ),
+    Reason.NOT_KEPT: (
+        "the device keeps events from number {detail} on only",
+        "repeat the run; a board with more memory keeps a drop whole",
+    ),
     Reason.UNKNOWN_MESSAGE: (
         "the device does not know this request",
         "its firmware is older than this program: rig flash",
+    ),
+}
+
+DISARMED: dict[DisarmReason, tuple[str, str]] = {
+    DisarmReason.TIMEOUT: (
+        "the device disarmed itself: it waited too long to be fired",
+        "arm again",
+    ),
+    DisarmReason.HOST_SILENT: (
+        "the device disarmed itself: this program was silent for too long",
+        "a busy computer, a slow disk or a bad cable does that; arm again",
+    ),
+    DisarmReason.STOPPED: (
+        "the device disarmed itself: the emergency stop was opened",
+        ADVICE[Reason.STOPPED][1],
     ),
 }
 
@@ -65,17 +92,22 @@ class DeviceRefusedError(DeviceError):
         The device's reason.
     detail
         What the reason's definition says it is.
+    disarmed
+        Why the device had disarmed itself before, where that is the cause.
     """
 
-    def __init__(self, reason: Reason, detail: int) -> None:
-        message, hint = ADVICE[reason]
+    def __init__(self, reason: Reason, detail: int, disarmed: DisarmReason | None = None) -> None:
+        message, hint = ADVICE[reason] if disarmed is None else DISARMED[disarmed]
         gates = [str(n) for n in range(16) if detail >> n & 1]
         named = f"gate {gates[0]} is" if len(gates) == 1 else f"gates {', '.join(gates)} are"
+        if not gates:  # a flicker so short that the device cannot say whose
+            named = "a gate is"
         if reason is Reason.GATE_UNSTEADY:
             named = named.rsplit(" ", 1)[0]
         super().__init__(message.format(gates=named, detail=detail), hint)
         self.reason = reason
         self.detail = detail
+        self.disarmed = disarmed
 
 
 def refusal(answer: Refused) -> DeviceRefusedError:

@@ -183,6 +183,8 @@ class Transcript:
                 label = self._tokens.get(asked.token)
                 if label in self._drops:
                     self._drops[label].fire_tick = tick
+            case wire.Refused(wire.Reason.NOT_KEPT, first) if isinstance(asked, wire.Read):
+                self.assembly(asked.label).first_kept = first
             case wire.EventsFrame(label=label) if label not in self._given:
                 self.assembly(label).add(message)
             case wire.DropCertificate(label=label) if label not in self._given:

@@ -51,12 +51,15 @@ class Impacts:
         False where `rig.model.impact` gives no finite α and γ, Eq. 13 being singular.
     in_domain
         True where `valid` and `rig.model.impact.impact_on` has nothing to note.
+    sliding
+        False where f = μN does not hold, the incline being below arctan μ.
     """
 
     alpha: Floats
     gamma: Floats
     valid: Flags
     in_domain: Flags
+    sliding: Flags
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,7 +287,11 @@ def _impacts(alpha: Floats, gamma: Floats, sliding: Flags, shape: tuple[int, ...
     alpha[~valid] = gamma[~valid] = np.nan
     in_domain = valid & sliding & (alpha >= 0.0) & (alpha <= 0.5)
     return Impacts(
-        alpha.reshape(shape), gamma.reshape(shape), valid.reshape(shape), in_domain.reshape(shape)
+        alpha.reshape(shape),
+        gamma.reshape(shape),
+        valid.reshape(shape),
+        in_domain.reshape(shape),
+        sliding.reshape(shape),
     )
 
 

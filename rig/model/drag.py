@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from itertools import accumulate
-from math import atanh, exp, expm1, inf, log, log1p, sinh, sqrt, tanh
+from math import atanh, cos, exp, expm1, inf, log, log1p, radians, sinh, sqrt, tanh
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
@@ -48,6 +48,29 @@ def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
         list(accumulate(map(Fraction, reversed(each))))[::-1] for each in (drags, chain.masses)
     ]
     return [float(drag / mass) for drag, mass in zip(*falling, strict=True)]
+
+
+def cylinder_drag(
+    coefficient: float, density: float, diameter: float, length: float, tilt_deg: float
+) -> float:
+    """Drag over speed squared of a rod that falls broadside: c = ½ ρ C d L cos³(tilt), kg/m.
+
+    Only the flow across a tilted rod pushes on it: the square of that speed takes cos², and the
+    part of the force that points up one cos more (the cross-flow principle; S. F. Hoerner,
+    Fluid-Dynamic Drag, 1965, chapter III). That rods shield each other is left out.
+
+    Parameters
+    ----------
+    coefficient
+        C of the cylinder across the flow: about 1.1 at the speeds of a lab.
+    density
+        ρ of the air, kg/m³.
+    diameter, length
+        Of the rod, m.
+    tilt_deg
+        Of the rod against the horizontal.
+    """
+    return 0.5 * coefficient * density * diameter * length * cos(radians(tilt_deg)) ** 3
 
 
 def drag_hits(

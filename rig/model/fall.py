@@ -203,6 +203,19 @@ def free_fall_speed(chain: Chain, drop: float, gravity: float, initial_speed: fl
     return math.sqrt(initial_speed**2 + 2.0 * gravity * (drop + chain.length))
 
 
+def free_fall(
+    chain: Chain, drop: float, gravity: float, initial_speed: float = 0.0
+) -> tuple[float, float]:
+    """Speed of the top rod at the contact point and time since release, nothing being struck.
+
+    Raises
+    ------
+    DomainError
+        Where nothing would ever move.
+    """
+    return _leg(drop + chain.length, initial_speed, gravity)
+
+
 def _leg(distance: float, speed: float, gravity: float) -> tuple[float, float]:
     """Speed at the end of a free-fall leg and its duration."""
     if distance == 0.0:

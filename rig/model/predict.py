@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DomainError
 from rig.model.fall import Fall, fall, free_fall_speed
 from rig.model.impact import Impact, impact_on
+from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from rig.model.chain import Chain
     from rig.model.surface import Surface
-    from rig.units import Quantity
+
+AT_REST = Quantity(0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +27,12 @@ class Prediction:
     Attributes
     ----------
     model
-        ``discrete`` and what α rests on.
+        ``discrete`` and what α rests on; ``drag`` where there is air.
     alpha, gamma, separation, speed, time
         `None` where the model has no answer; `notes` says why.
     separation_u, speed_u
-        Standard uncertainties that follow from those of β, μ (or α), drop and gravity; `None`
-        also where Eq. 13 is singular within the uncertainty of μ.
+        Standard uncertainties that follow from those of β, μ (or α), drop, gravity, initial speed
+        and drag; `None` also where Eq. 13 is singular within the uncertainty of μ.
     in_domain
         False when any note says that the case leaves the model's domain.
     """
@@ -49,24 +51,68 @@ class Prediction:
     speed_u: float | None = None
 
 
+class _Inputs(NamedTuple):
+    """Everything a fall follows from, once the chain is known."""
+
+    alpha: float
+    gamma: float
+    drop: float
+    gravity: float
+    speed: float
+    drag: float  # times what is given
+
+
 def predict(
-    chain: Chain, surface: Surface, incline_deg: float, drop: Quantity, gravity: Quantity
+    chain: Chain,
+    surface: Surface,
+    incline_deg: float,
+    drop: Quantity,
+    gravity: Quantity,
+    *,
+    initial_speed: Quantity = AT_REST,
+    kappas: Sequence[float] = (),
+    drag_u: float = 0.0,
 ) -> Prediction:
     """Predict Δz, V and t at one incline by the discrete model (Eqs. 8 to 13).
 
+    Parameters
+    ----------
+    initial_speed
+        Of both chains at release, downward, m/s.
+    kappas
+        κ on the leg before each impact, 1/m, as from `rig.model.drag.leg_drags`; empty without
+        air.
+    drag_u
+        Relative standard uncertainty common to them.
+
+    Notes
+    -----
     Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
     that would leave what is possible, by less and to one side; the slope counts either way.
     """
-    vacuum = free_fall_speed(chain, drop.value, gravity.value)
+    free, drops = _ways_down(chain, kappas)
+    free_speed = free(drop.value, gravity.value, initial_speed.value)
+    air = ", drag" if kappas else ""
     try:
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
-        return Prediction(incline_deg, "discrete", vacuum, in_domain=False, notes=(error.message,))
-    centre = fall(chain, impact.alpha, impact.gamma, drop.value, gravity.value)
+        return Prediction(
+            incline_deg, f"discrete{air}", free_speed, in_domain=False, notes=(error.message,)
+        )
+    inputs = _Inputs(
+        impact.alpha, impact.gamma, drop.value, gravity.value, initial_speed.value, 1.0
+    )
+    centre = drops(inputs)
     notes = impact.notes
     separation_u = speed_u = None
     try:
-        spread = list(_spread(chain, surface, impact, incline_deg, drop, gravity))
+        spread = [
+            (drops(low), drops(high), weight)
+            for low, high, weight in (
+                *_moved_impacts(chain, surface, impact, incline_deg, inputs),
+                *_moved(inputs, drop, gravity, initial_speed, Quantity(1.0, drag_u)),
+            )
+        ]
     except DomainError as error:
         notes = (*notes, f"no uncertainty: within that of μ, {error.message}")
     else:
@@ -76,8 +122,8 @@ def predict(
         notes = (*notes, "rods gather on a pile: taken as level with the pile's restitution")
     return Prediction(
         incline_deg,
-        "discrete" if impact.basis in {"surface", "level"} else f"discrete, {impact.basis}",
-        vacuum,
+        ("discrete" if impact.basis in {"surface", "level"} else f"discrete, {impact.basis}") + air,
+        free_speed,
         in_domain=not impact.notes,
         notes=notes,
         alpha=impact.alpha,
@@ -90,50 +136,69 @@ def predict(
     )
 
 
-def _spread(
-    chain: Chain,
-    surface: Surface,
-    impact: Impact,
-    incline_deg: float,
-    drop: Quantity,
-    gravity: Quantity,
-) -> Iterator[tuple[Fall, Fall, float]]:
-    """Falls with one input at a time moved down and up, and u over the distance between them."""
-    h, g, gamma = drop.value, gravity.value, impact.gamma
+def _ways_down(
+    chain: Chain, kappas: Sequence[float]
+) -> tuple[Callable[[float, float, float], float], Callable[[_Inputs], Fall]]:
+    """The speed of free fall from drop, gravity and initial speed; the fall from its inputs."""
+    if not kappas:
+        return (
+            lambda drop, gravity, speed: free_fall_speed(chain, drop, gravity, speed),
+            lambda x: fall(chain, x.alpha, x.gamma, x.drop, x.gravity, x.speed),
+        )
+    from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
+    from rig.model.fall import kicks  # noqa: PLC0415
 
-    def at(alpha: float) -> Fall:
-        return fall(chain, alpha, gamma, h, g)
+    def in_air(x: _Inputs) -> Fall:
+        gains = kicks(chain, [x.alpha] * chain.rods, x.gamma)
+        scaled = [x.drag * kappa for kappa in kappas]
+        return drag_fall(chain, gains, scaled, x.drop, x.gravity, x.speed)
+
+    return (
+        lambda drop, gravity, speed: drag_leg(drop + chain.length, speed, gravity, kappas[0])[0],
+        in_air,
+    )
+
+
+_Step = tuple[_Inputs, _Inputs, float]
+
+
+def _moved_impacts(
+    chain: Chain, surface: Surface, impact: Impact, incline_deg: float, inputs: _Inputs
+) -> Iterator[_Step]:
+    """Inputs with what α rests on moved down and up, and u over the distance between them."""
+
+    def moved(low: float, high: float, weight: float) -> _Step:
+        return inputs._replace(alpha=low), inputs._replace(alpha=high), weight
 
     if chain.alpha is not None:
-        for low, high, weight in _steps(chain.alpha):
-            yield at(low), at(high), weight
-    else:
-        struck = surface.pile if impact.basis == "pile" and surface.pile else surface
-        for low, high, weight in _steps(struck.restitution):
-            alphas = [
-                impact_on(surface, chain, incline_deg, restitution=beta).alpha
-                for beta in (low, high)
-            ]
-            yield at(alphas[0]), at(alphas[1]), weight
-        if impact.basis == "surface":
-            for low, high, weight in _steps(surface.friction, least=0.0):
-                alphas = [
-                    impact_on(surface, chain, incline_deg, friction=mu).alpha for mu in (low, high)
-                ]
-                yield at(alphas[0]), at(alphas[1]), weight
+        for step in _steps(chain.alpha):
+            yield moved(*step)
+        return
+    struck = surface.pile if impact.basis == "pile" and surface.pile else surface
+    for *ends, weight in _steps(struck.restitution):
+        low, high = (
+            impact_on(surface, chain, incline_deg, restitution=beta).alpha for beta in ends
+        )
+        yield moved(low, high, weight)
+    if impact.basis == "surface":
+        for *ends, weight in _steps(surface.friction, least=0.0):
+            low, high = (impact_on(surface, chain, incline_deg, friction=mu).alpha for mu in ends)
+            yield moved(low, high, weight)
+
+
+def _moved(
+    inputs: _Inputs, drop: Quantity, gravity: Quantity, speed: Quantity, drag: Quantity
+) -> Iterator[_Step]:
+    """Inputs with one of the others at a time moved down and up, and the weight."""
     for low, high, weight in _steps(drop, least=0.0):
-        yield (
-            fall(chain, impact.alpha, gamma, low, g),
-            fall(chain, impact.alpha, gamma, high, g),
-            weight,
-        )
+        yield inputs._replace(drop=low), inputs._replace(drop=high), weight
     # Half of g is far enough for a slope, and a fall without gravity has no end.
-    for low, high, weight in _steps(gravity, least=g / 2):
-        yield (
-            fall(chain, impact.alpha, gamma, h, low),
-            fall(chain, impact.alpha, gamma, h, high),
-            weight,
-        )
+    for low, high, weight in _steps(gravity, least=gravity.value / 2):
+        yield inputs._replace(gravity=low), inputs._replace(gravity=high), weight
+    for low, high, weight in _steps(speed, least=0.0):
+        yield inputs._replace(speed=low), inputs._replace(speed=high), weight
+    for low, high, weight in _steps(drag, least=0.0):
+        yield inputs._replace(drag=low), inputs._replace(drag=high), weight
 
 
 def _steps(given: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
@@ -12,16 +11,17 @@ from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.rods import Rods, read_rods
 from rig.protocol.scene import RodChain
-from rig.protocol.yamltree import Mapping, Node
-from rig.units import Dimension, Quantity, format_quantity, quoted
+from rig.protocol.spacing import Spacing, fits, place_rods, read_spacing
+from rig.protocol.yamltree import Mapping, Node, Sequence
+from rig.units import Dimension, Quantity, quoted
 
 if TYPE_CHECKING:
     from rig.protocol.fields import Faults
     from rig.protocol.yamltree import Place
 
 CHAIN_KEYS = (
-    "like", "rods", "length", "diameter", "rod_length", "tilt", "spacing", "inertia",
-    "alpha", "gamma", "position_uncertainty", "width_uncertainty",
+    "like", "rods", "length", "diameter", "mass", "masses", "rod_length", "tilt", "spacing",
+    "inertia", "alpha", "gamma", "position_uncertainty", "width_uncertainty",
 )  # fmt: skip
 LENGTH = Range(Dimension.LENGTH, 1e-3, 100.0, "m")
 ROD_LENGTH = Range(Dimension.LENGTH, 1e-6, 10.0, "m")
@@ -127,6 +127,7 @@ def _inherit(one: _Described, described: dict[str, _Described | None]) -> Mappin
         return one.node
     own = {getattr(key, "text", None) for key, _ in one.node.entries}
     taken: set[str | None] = set(own) | {"like"}
+    taken |= _displaced(one.node, base.node)
     entries = list(one.node.entries)
     for key, value in base.node.entries:
         text = getattr(key, "text", None)
@@ -136,13 +137,34 @@ def _inherit(one: _Described, described: dict[str, _Described | None]) -> Mappin
     return Mapping(one.node.place, entries, one.node.size)
 
 
+def _displaced(own: Mapping, base: Mapping) -> set[str | None]:
+    """Keys of the base that would contradict the chain's own."""
+    mine, theirs = (
+        {getattr(key, "text", None): value for key, value in node.entries} for node in (own, base)
+    )
+    gone: set[str | None] = set()
+    for one, other in (("mass", "masses"), ("masses", "mass")):
+        if one in mine:
+            gone.add(other)
+    if isinstance(mine.get("spacing"), Sequence):
+        gone.add("length")
+    if "length" in mine and isinstance(theirs.get("spacing"), Sequence):
+        gone.add("spacing")
+    return gone
+
+
 def _chain(name: str, section: Section, *, seen_by_gates: bool) -> RodChain | None:
     """Build one chain from its fields."""
     rods = read_rods(section, seen_by_gates=seen_by_gates)
-    length = section.take("length", fields.exact(LENGTH), required="1165 mm")
+    spacing = section.take("spacing", read_spacing, Spacing())
+    if isinstance(section.values.get("spacing"), Sequence):
+        length: float | None = math.nan
+        if "length" in section:
+            section.fault("length", "the listed spacing says it; leave it out", at_key=True)
+    else:
+        length = section.take("length", fields.exact(LENGTH), required="1165 mm")
     rod_length = section.take("rod_length", fields.exact(ROD_LENGTH), math.nan)
     tilt = section.take("tilt", fields.exact(TILT), 0.0)
-    spacing = section.take("spacing", fields.choice("equal-pitch", "equal-gaps"), "equal-pitch")
     inertia = section.take("inertia", fields.exact(INERTIA), UNIFORM_ROD_INERTIA)
     alpha = section.take("alpha", fields.quantity(ALPHA), Quantity(math.nan))
     gamma = section.take("gamma", fields.exact(GAMMA), math.nan)
@@ -153,50 +175,34 @@ def _chain(name: str, section: Section, *, seen_by_gates: bool) -> RodChain | No
     if inertia is None or alpha is None or gamma is None or position_u is None or width_u is None:
         return None
     widths = tuple(d / math.cos(math.radians(tilt)) for d in rods.diameters)
-    heights = _heights(rods, length, spacing)
-    if not _fits(section, heights, widths, rod_length * math.sin(math.radians(tilt))):
+    heights = place_rods(section, rods.diameters, length, spacing)
+    if heights is None:
+        return None
+    if not fits(section, heights, widths, rod_length * math.sin(math.radians(tilt))):
+        return None
+    masses = _masses(section, rods, heights)
+    if masses is None:
         return None
     chain = Chain(
-        masses=rods.masses,
+        masses=masses,
         heights=heights,
         inertia=inertia,
         alpha=None if math.isnan(alpha.value) else alpha,
         gamma=None if math.isnan(gamma) else gamma,
     )
-    return RodChain(name, chain, widths, tilt, position_u, width_u)
+    return RodChain(
+        name, chain, widths, tilt, position_u, width_u, rods.diameters, rod_length,
+        weighed=rods.weighed or "masses" in section,
+    )  # fmt: skip
 
 
-def _heights(rods: Rods, length: float, spacing: str) -> tuple[float, ...]:
-    """Return the heights of the rods' middles above the bottom rod's, m.
+def _masses(section: Section, rods: Rods, heights: tuple[float, ...]) -> tuple[float, ...] | None:
+    """Return the masses, `None` if they are faulty."""
+    if "masses" not in section:
+        return rods.masses
+    if rods.weighed:
+        section.fault("masses", "mass is given too; keep one of them", at_key=True)
+        return None
+    from rig.protocol.masses import read_masses  # noqa: PLC0415 - few chains list theirs
 
-    Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, the gap being whatever
-    makes the whole chain `length` long.
-    """
-    last = len(rods.diameters) - 1
-    if spacing == "equal-pitch":
-        return tuple(length * rod / last for rod in range(last + 1))
-    halves = [(lower + upper) / 2 for lower, upper in pairwise(rods.diameters)]
-    gap = (length - math.fsum(halves)) / last
-    # The top is set, not summed, so that the length is exactly what the file says.
-    return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)
-
-
-def _fits(
-    section: Section, heights: tuple[float, ...], widths: tuple[float, ...], rise: float
-) -> bool:
-    """Check that no two neighbours overlap as seen from the side, nor touch with their ends."""
-    for rod, ((low, high), (lower, upper)) in enumerate(
-        zip(pairwise(heights), pairwise(widths), strict=True), start=1
-    ):
-        pitch, needed = high - low, (lower + upper) / 2
-        if not pitch > needed:
-            apart, thick = (format_quantity(Quantity(x), "mm") for x in (pitch, needed))
-            message = f"rods {rod} and {rod + 1} overlap: {apart} apart but {thick} thick"
-            section.fault("length", message)
-            return False
-        if rise >= pitch:  # never true of an unknown rod length, which is a NaN
-            shown = format_quantity(Quantity(rise), "mm")
-            message = f"tilted ends rise {shown}, so rods {rod} and {rod + 1} would touch"
-            section.fault("rod_length", message)
-            return False
-    return True
+    return section.take("masses", read_masses(heights))

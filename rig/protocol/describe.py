@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from rig.protocol.measurable import unmeasurable
 from rig.protocol.plan import runs
-from rig.protocol.scene import SIDES
+from rig.protocol.scene import AT_REST, SIDES
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
-    from rig.protocol.scene import Gate, Protocol, RodChain
+    from rig.protocol.scene import Drag, Gate, Protocol, RodChain
 
+_EVEN = 1e-9  # metres by which rounding may change an even spacing
 DEVICE_EVENTS = 1024
 """Events the timer holds before the host must have read them."""
 
@@ -70,7 +73,20 @@ def _scene(protocol: Protocol) -> list[str]:
     if surface is not None or protocol.gates is not None:
         datum = "contact point" if surface is not None else "datum of the gates"
         lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {datum}")
+    if protocol.initial_speed != AT_REST:
+        lines.append(f"initial speed: {format_quantity(protocol.initial_speed, 'm/s')} downward")
+    if protocol.drag is not None:
+        lines.append(f"drag: {_drag(protocol.drag)}")
     return lines
+
+
+def _drag(drag: Drag) -> str:
+    """Say what the air does."""
+    if drag.terminal_speed is not None:
+        return f"terminal speed {format_quantity(drag.terminal_speed, 'm/s')}"
+    assert drag.coefficient is not None
+    density = _number(drag.air_density, "kg/m^3")
+    return f"coefficient {format_quantity(drag.coefficient, '1')} in air of {density}"
 
 
 def _chain(rods: RodChain) -> str:
@@ -81,6 +97,11 @@ def _chain(rods: RodChain) -> str:
     if thick > 0:
         span = f"{thin * 1e3:.1f}" if thin == thick else f"{thin * 1e3:.1f} to {thick * 1e3:.1f}"
         text += f", {span} mm wide in the beam"
+    pitches = [high - low for low, high in pairwise(chain.heights)]
+    if max(pitches) - min(pitches) > _EVEN:
+        text += f", rods {min(pitches) * 1e3:.1f} to {max(pitches) * 1e3:.1f} mm apart"
+    if rods.weighed:
+        text += f", {_number(math.fsum(chain.masses), 'g')}"
     if min(chain.masses) != max(chain.masses):
         ratio = max(chain.masses) / min(chain.masses)
         text += f", graded: heaviest rod {ratio:.3g} times the lightest"
@@ -130,6 +151,7 @@ def _consequences(protocol: Protocol) -> list[str]:
             )
     if protocol.gates is None:
         return lines
+    lines += [f"note: only predicted, not run: {reason}" for reason in unmeasurable(protocol)]
     edges = 0
     for side in SIDES:
         per_chain = [_passing(protocol, gate) for gate in protocol.gates.on(side)]
@@ -165,4 +187,6 @@ def _left_out(protocol: Protocol) -> list[str]:
             lines.append("no friction given: taken as 0 at every incline")
     if protocol.gates is None:
         lines.append("no gates: nothing is measured, the scene is only predicted")
+    if protocol.drag is None:
+        lines.append("no drag: the air is left out")
     return lines

@@ -6,7 +6,6 @@ fault and returns ``None``; so one pass over a file finds everything that is wro
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -49,6 +48,11 @@ class Section:
         All keys it may have; others, and repeated ones, are noted at once.
     lenient
         Do not note missing keys (used when the chain named by `like` is itself faulty).
+
+    Attributes
+    ----------
+    strange
+        Whether any key is not accepted: what seems to be missing may be that one, misspelt.
     """
 
     def __init__(
@@ -62,6 +66,7 @@ class Section:
     ) -> None:
         self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
         self.keys, self.values = unique_entries(node, path, faults)
+        self.strange = not self.keys.keys() <= set(accepted)
         for key, place in self.keys.items():
             if key not in accepted:
                 close = did_you_mean(key, accepted)
@@ -112,6 +117,8 @@ def join(path: str, key: str) -> str:
 
 def did_you_mean(word: str, known: tuple[str, ...]) -> str:
     """Return ``did you mean …? `` for the nearest known word, or nothing."""
+    import difflib  # noqa: PLC0415 - only a mistake needs it
+
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word[:40].casefold(), folded, n=1)
     return f"did you mean {folded[close[0]]}? " if close else ""

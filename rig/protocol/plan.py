@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from typing import TYPE_CHECKING, TypeVar
 
 from rig.protocol.scene import Run
@@ -67,6 +66,8 @@ def _shuffled(items: list[T], seed: int) -> list[T]:
     Python promises the sequence of ``random()`` for a given seed across versions and platforms,
     but not what ``shuffle()`` makes of it.
     """
+    import random  # noqa: PLC0415 - most plans are not shuffled
+
     source = random.Random(seed)  # noqa: S311 - a reproducible order, not a secret
     result = list(items)
     for last in range(len(result) - 1, 0, -1):

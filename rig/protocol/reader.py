@@ -1,4 +1,7 @@
-"""From a protocol file to a checked `Protocol`, or to every problem in it at once."""
+"""From a protocol file to a checked `Protocol`, or to every problem in it at once.
+
+What a file does not name is not loaded either: the readers of its parts are imported where used.
+"""
 
 from __future__ import annotations
 
@@ -9,27 +12,25 @@ from rig.errors import InputError
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
 from rig.protocol.fields import Faults, Range, Section
-from rig.protocol.gates import check_clear, read_gates
-from rig.protocol.scene import Accept, Plan, Protocol, Release
-from rig.protocol.settings import read_accept, read_plan, read_release
-from rig.protocol.site import gravity_at
-from rig.protocol.surface import read_surface
+from rig.protocol.scene import AT_REST, Accept, Plan, Protocol, Release
 from rig.protocol.yamltree import Mapping, Place, Scalar, load
 from rig.units import Dimension, Quantity
 
 if TYPE_CHECKING:
     import os
 
+    from rig.model.surface import Surface
     from rig.protocol.fields import Converter
-    from rig.protocol.scene import RodChain
+    from rig.protocol.scene import Drag, Gates, RodChain
     from rig.protocol.yamltree import Node
 
 MAX_BYTES = 1_000_000
 KEYS = (
-    "protocol", "title", "chains", "surface", "drop", "gravity", "site",
+    "protocol", "title", "chains", "surface", "drop", "initial_speed", "gravity", "site", "drag",
     "gates", "release", "plan", "accept", "notes",
 )  # fmt: skip
 DROP = Range(Dimension.LENGTH, 0.0, 100.0, "m")
+INITIAL_SPEED = Range(Dimension.SPEED, 0.0, 1000.0, "m/s")
 GRAVITY = Range(Dimension.ACCELERATION, 1e-3, 1000.0, "m/s^2")
 LATITUDE = Range(Dimension.ANGLE, -90.0, 90.0, "deg")
 HEIGHT = Range(Dimension.LENGTH, -500.0, 9000.0, "m")
@@ -124,26 +125,16 @@ def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
     if not has_surface and count > 1:
         message = f"found {count} chains; a scene with no surface has one"
         top.fault("chains", message)
-    surface = None
-    if has_surface:
-        # Of a chain that could not be read nobody knows whether it gives its α.
-        needed = chains is not None and any(c.chain.alpha is None for c in chains.values())
-        surface = read_surface(top.values["surface"], faults, needs_restitution=needed)
+    surface = _surface(top, chains) if has_surface else None
     example = "180 mm ± 2 mm" if has_surface or has_gates else ""
     drop = top.take("drop", fields.quantity(DROP), Quantity(0.0), required=example)
-    release = top.take("release", read_release, Release())
-    plan = top.take("plan", read_plan(surface=has_surface), Plan())
-    accept = top.take("accept", read_accept, Accept())
-    gates = None
-    if has_gates:
-        found = read_gates(top.values["gates"], faults, surface=has_surface, chains=count)
-        if found is not None:
-            gates, located = found
-            if chains is not None and drop is not None and "drop" in top:
-                check_clear(located, chains.values(), drop, faults, surface=has_surface)
+    start = top.take("initial_speed", fields.quantity(INITIAL_SPEED), AT_REST)
+    drag = _drag(top, chains) if "drag" in top else None
+    release, plan, accept = _settings(top)
+    gates = _gates(top, chains, drop) if has_gates else None
     if title is None or chains is None or gravity is None or drop is None:
         return None
-    if release is None or plan is None or accept is None:
+    if release is None or plan is None or accept is None or start is None:
         return None
     return Protocol(
         title=title,
@@ -155,6 +146,8 @@ def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
         release=release,
         plan=plan,
         accept=accept,
+        initial_speed=start,
+        drag=drag,
         text=text,
         source=faults.source,
     )
@@ -166,6 +159,42 @@ def _version(node: Node, key: str, faults: Faults) -> int | None:
         return 1
     faults.add(node.place, key, f"found {node}; this software reads protocol: 1")
     return None
+
+
+def _settings(top: Section) -> tuple[Release | None, Plan | None, Accept | None]:
+    """Read ``release``, ``plan`` and ``accept``."""
+    if not any(key in top for key in ("release", "plan", "accept")):
+        return Release(), Plan(), Accept()
+    from rig.protocol.settings import read_settings  # noqa: PLC0415 - see above
+
+    return read_settings(top)
+
+
+def _surface(top: Section, chains: dict[str, RodChain] | None) -> Surface | None:
+    from rig.protocol.surface import read_surface  # noqa: PLC0415 - see above
+
+    # Of a chain that could not be read nobody knows whether it gives its α.
+    needed = chains is not None and any(rods.chain.alpha is None for rods in chains.values())
+    return read_surface(top.values["surface"], top.faults, needs_restitution=needed)
+
+
+def _drag(top: Section, chains: dict[str, RodChain] | None) -> Drag | None:
+    from rig.protocol.drag import read_drag  # noqa: PLC0415 - see above
+
+    return read_drag(top.values["drag"], chains.values() if chains else (), top.faults)
+
+
+def _gates(top: Section, chains: dict[str, RodChain] | None, drop: Quantity | None) -> Gates | None:
+    from rig.protocol.gates import check_clear, read_gates  # noqa: PLC0415 - see above
+
+    surface, count = "surface" in top, _count(top.values.get("chains"))
+    found = read_gates(top.values["gates"], top.faults, surface=surface, chains=count)
+    if found is None:
+        return None
+    gates, located = found
+    if chains is not None and drop is not None and "drop" in top:
+        check_clear(located, chains.values(), drop, top.faults, surface=surface)
+    return gates
 
 
 def _chains(*, seen_by_gates: bool) -> Converter[dict[str, RodChain]]:
@@ -206,4 +235,8 @@ def _site(node: Node, key: str, faults: Faults) -> Quantity | None:
     section = Section(inner, key, faults, ("latitude", "height"))
     latitude = section.take("latitude", fields.exact(LATITUDE), required="61.19 deg")
     height = section.take("height", fields.exact(HEIGHT), required="30 m")
-    return None if latitude is None or height is None else gravity_at(latitude, height)
+    if latitude is None or height is None:
+        return None
+    from rig.protocol.site import gravity_at  # noqa: PLC0415 - see above
+
+    return gravity_at(latitude, height)

@@ -1,4 +1,4 @@
-"""The ``rods`` of a chain: a number of like rods, or groups of like rods from the bottom up."""
+"""The ``rods`` of a chain: a number of like rods, or single rods and groups from the bottom up."""
 
 from __future__ import annotations
 
@@ -21,10 +21,14 @@ MOST_RODS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Rods:
-    """Diameter (m; 0 where unknown) and mass of each rod, bottom up."""
+    """Diameter (m; 0 where unknown) and mass of each rod, bottom up.
+
+    `weighed` says that masses are in kg; else only their ratios mean something.
+    """
 
     diameters: tuple[float, ...]
     masses: tuple[float, ...]
+    weighed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,20 +41,24 @@ class _Group:
 
 
 def read_rods(section: Section, *, seen_by_gates: bool) -> Rods | None:
-    """Read ``rods`` and the ``diameter`` common to them from a chain's section.
+    """Read ``rods``, and ``diameter`` and ``mass`` common to them, from a chain's section.
 
     Masses are those given, else proportional to the cross-section (like material) with the
     bottom rod's as 1, else all 1.
     """
     common = section.take("diameter", fields.exact(DIAMETER))
+    each = section.take("mass", fields.exact(MASS))
     groups = section.take("rods", _groups, required="25")
     if groups is None or ("diameter" in section and common is None):
+        return None
+    if "mass" in section and each is None:
         return None
     total = sum(group.count for group in groups)
     if not 2 <= total <= MOST_RODS:
         section.fault("rods", f"found {total} rods; 2 to {MOST_RODS} are wanted")
         return None
-    if len({group.mass is None for group in groups}) > 1:
+    weights = [each if group.mass is None else group.mass for group in groups]
+    if len({mass is None for mass in weights}) > 1:
         section.fault("rods", "mass is given for some groups only; give it for all or none")
         return None
     known = [common if group.diameter is None else group.diameter for group in groups]
@@ -59,11 +67,11 @@ def read_rods(section: Section, *, seen_by_gates: bool) -> Rods | None:
         return None
     diameters = [0.0 if d is None else d for d in known]
     masses = [
-        group.mass if group.mass is not None else (d / diameters[0]) ** 2 if diameters[0] else 1.0
-        for group, d in zip(groups, diameters, strict=True)
+        mass if mass is not None else (d / diameters[0]) ** 2 if diameters[0] else 1.0
+        for mass, d in zip(weights, diameters, strict=True)
     ]
-    each = [group.count for group in groups]
-    return Rods(_spread(diameters, each), _spread(masses, each))
+    counts = [group.count for group in groups]
+    return Rods(_spread(diameters, counts), _spread(masses, counts), None not in weights)
 
 
 def _spread(values: list[float], counts: list[int]) -> tuple[float, ...]:
@@ -90,7 +98,7 @@ def _group(node: Node, key: str, faults: Faults) -> _Group | None:
     if inner is None:
         return None
     section = Section(inner, key, faults, ("count", "diameter", "mass"))
-    count = section.take("count", fields.whole(1, MOST_RODS), required="4")
+    count = section.take("count", fields.whole(1, MOST_RODS), 1)
     diameter = section.take("diameter", fields.exact(DIAMETER))
     mass = section.take("mass", fields.exact(MASS))
     if count is None or any(

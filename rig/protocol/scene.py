@@ -7,15 +7,18 @@ empty, and every later stage leaves it out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import nan
 from typing import TYPE_CHECKING, Literal
+
+from rig.units import Quantity
 
 if TYPE_CHECKING:
     from rig.model.chain import Chain
     from rig.model.surface import Surface
-    from rig.units import Quantity
 
 Side = Literal["impact", "free"]
 Order = Literal["ABBA", "alternate", "fixed"]
+AT_REST = Quantity(0.0)
 SIDES: tuple[Side, ...] = ("impact", "free")
 
 
@@ -37,6 +40,12 @@ class RodChain:
         Standard uncertainty of each rod's place on the string, m.
     width_u
         Standard uncertainty of the effective width common to the rods, m.
+    diameters
+        Of the rods, m; 0 where unknown; bottom up.
+    rod_length
+        Of every rod, m; NaN where unknown.
+    weighed
+        Whether the masses are in kg; else only their ratios mean something.
     """
 
     name: str
@@ -45,6 +54,9 @@ class RodChain:
     tilt_deg: float = 0.0
     position_u: float = 0.0003
     width_u: float = 0.0001
+    diameters: tuple[float, ...] = ()
+    rod_length: float = nan
+    weighed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +91,32 @@ class Gates:
     def mask(self) -> int:
         """Bit mask of the channels in use."""
         return sum(1 << gate.channel for gate in self.gates)
+
+
+@dataclass(frozen=True, slots=True)
+class Drag:
+    """Drag of the air, as the square of the speed.
+
+    Attributes
+    ----------
+    coefficient
+        C of every rod across the flow; `None` where the terminal speed is given.
+    air_density
+        kg/m³; used with the coefficient.
+    terminal_speed
+        At which drag balances the weight of a chain and of every part of it, m/s.
+    """
+
+    coefficient: Quantity | None = None
+    air_density: float = 1.204  # dry, 20 °C, 1013.25 hPa
+    terminal_speed: Quantity | None = None
+
+    @property
+    def relative_u(self) -> float:
+        """Relative standard uncertainty of the drag."""
+        if self.terminal_speed is not None:
+            return 2.0 * self.terminal_speed.u / self.terminal_speed.value
+        return self.coefficient.u / self.coefficient.value if self.coefficient else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +160,10 @@ class Protocol:
     drop
         Height of the bottom rod's middle above the contact point (with no surface: above the
         datum of the gate heights) before release; `None` where no gates measure it.
+    initial_speed
+        Of every chain as it is let go, downward, m/s.
+    drag
+        `None` where the air is left out.
     gates
         `None` for a scene that is only predicted.
     text
@@ -137,6 +179,8 @@ class Protocol:
     release: Release = field(default_factory=Release)
     plan: Plan = field(default_factory=Plan)
     accept: Accept = field(default_factory=Accept)
+    initial_speed: Quantity = AT_REST
+    drag: Drag | None = None
     text: str = ""
     source: str = ""
 

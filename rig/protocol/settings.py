@@ -26,7 +26,20 @@ RELEASE_SKEW = Range(Dimension.TIME, 0.0, 10.0, "ms", open_low=True)
 MISSED_EDGES = Range(Dimension.NUMBER, 0.0, 1.0, "%")
 
 
-def read_release(node: Node, key: str, faults: Faults) -> Release | None:
+def read_settings(top: Section) -> tuple[Release | None, Plan | None, Accept | None]:
+    """Read all three from the root of a protocol; `None` for what is faulty.
+
+    Without a surface there is nothing to incline.
+    """
+    plan = _plan(surface="surface" in top)
+    return (
+        top.take("release", _release, Release()),
+        top.take("plan", plan, Plan()),
+        top.take("accept", _accept, Accept()),
+    )
+
+
+def _release(node: Node, key: str, faults: Faults) -> Release | None:
     """Convert to the release actuator."""
     inner = fields.mapping(node, key, faults)
     if inner is None:
@@ -38,7 +51,7 @@ def read_release(node: Node, key: str, faults: Faults) -> Release | None:
     return None if channel is None or pulse is None else Release(channel, pulse)
 
 
-def read_accept(node: Node, key: str, faults: Faults) -> Accept | None:
+def _accept(node: Node, key: str, faults: Faults) -> Accept | None:
     """Convert to the limits of a valid run."""
     inner = fields.mapping(node, key, faults)
     if inner is None:
@@ -50,8 +63,8 @@ def read_accept(node: Node, key: str, faults: Faults) -> Accept | None:
     return None if skew is None or missed is None else Accept(skew, missed)
 
 
-def read_plan(*, surface: bool) -> Converter[Plan]:
-    """Return a converter to the plan; without a surface there is nothing to incline."""
+def _plan(*, surface: bool) -> Converter[Plan]:
+    """Return the converter to the plan."""
 
     def convert(node: Node, key: str, faults: Faults) -> Plan | None:
         inner = fields.mapping(node, key, faults)

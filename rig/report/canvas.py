@@ -61,7 +61,7 @@ class Canvas:
     Attributes
     ----------
     axes
-        The panels from top to bottom, with one horizontal axis in common.
+        The panels row by row, with one horizontal axis in common.
     svg
         The text, once the block has ended.
     """
@@ -74,7 +74,12 @@ class Canvas:
 
 @contextmanager
 def canvas(
-    heights: tuple[float, ...], width_in: float = 7.0, *, simulated: bool
+    heights: tuple[float, ...],
+    width_in: float = 7.0,
+    *,
+    simulated: bool,
+    columns: int = 1,
+    description: str | None = None,
 ) -> Iterator[Canvas]:
     """Set the style up, hand out empty panels, and make the SVG text at the end.
 
@@ -86,6 +91,10 @@ def canvas(
         Of the figure, inches.
     simulated
         Whether to stamp the figure.
+    columns
+        Panels side by side in each row.
+    description
+        Kept in the file's metadata, where programs find it.
 
     Raises
     ------
@@ -102,16 +111,17 @@ def canvas(
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width_in, sum(heights)), layout="constrained")
         panels = figure.subplots(
-            len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights)
+            len(heights), columns, sharex=True, squeeze=False, height_ratios=list(heights)
         )
-        drawing = Canvas(figure, list(panels[:, 0]))
+        drawing = Canvas(figure, list(panels.flat))
         yield drawing
         figure.align_ylabels(drawing.axes)
         if simulated:
             _stamp(figure)
         text = io.StringIO()
-        nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-        figure.savefig(text, format="svg", metadata=nothing)
+        metadata: dict[str, Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        metadata["Description"] = description
+        figure.savefig(text, format="svg", metadata=metadata)
         drawing.svg = text.getvalue()
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rig.errors import SessionError
 from rig.files import sync_directory
 from rig.session.faults import not_a_session, translated
-from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION
+from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION, UPGRADES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -116,10 +116,19 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
                 # macOS: fsync alone leaves data in the drive's cache.
                 connection.execute("PRAGMA fullfsync = ON")
                 connection.execute("PRAGMA checkpoint_fullfsync = ON")
+                _upgrade(connection)
         except BaseException:
             connection.close()
             raise
     return connection
+
+
+def _upgrade(connection: sqlite3.Connection) -> None:
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    for old in range(version, SCHEMA_VERSION):
+        connection.executescript(
+            f"BEGIN; {UPGRADES[old]}; PRAGMA user_version = {old + 1}; COMMIT;"
+        )
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:

@@ -148,7 +148,8 @@ class Reader:
             edges=tuple(Edge(tick, channel, bool(blocked)) for tick, channel, blocked in edges),
             fire_tick=fire_tick,
             initial_state=initial_state,
-            certificate=None if events is None else Certificate(events, *counts),
+            # A file of the first format, opened read-only, has no release sense.
+            certificate=None if events is None else Certificate(events, *counts, *row[14:]),
             faults=tuple(json.loads(row[11])),
         )
 

@@ -7,8 +7,11 @@ from enum import StrEnum
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """In SQLite's ``user_version``; a program refuses files with a higher one."""
+
+UPGRADES = {1: 'ALTER TABLE "drop" ADD COLUMN release_sense INTEGER'}
+"""What makes a file of one version one of the next."""
 
 
 class RunState(StrEnum):
@@ -74,6 +77,7 @@ CREATE TABLE "drop" (
     faults TEXT NOT NULL CHECK (json_valid(faults)),
     host_ns INTEGER,
     provenance TEXT NOT NULL,
+    release_sense INTEGER,
     UNIQUE (run, attempt)
 ) STRICT;
 

@@ -225,10 +225,11 @@ class Session(Reader):
             )
         )
         head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
-        tail = (json.dumps(drop.faults, ensure_ascii=False), host_ns, provenance)
+        sense = None if certificate is None else certificate.release_sense
+        tail = (json.dumps(drop.faults, ensure_ascii=False), host_ns, provenance, sense)
         journal.add(
             Statement(
-                'INSERT INTO "drop" VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)',
+                'INSERT INTO "drop" VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)',
                 [(*head, *fields, *tail)],
             ),
             Statement(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pytest
 
 from rig.cli import main
-from tests.cli.lab import rig, short
+from tests.cli.lab import PROTOCOLS, rig, short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,6 +59,17 @@ def protocol(tmp_path: Path) -> Path:
     """Write a protocol of two runs: at 40° and at 60°."""
     path = tmp_path / "short.yaml"
     path.write_text(short(repeats=1), "utf-8")
+    return path
+
+
+@pytest.fixture
+def fence(tmp_path: Path) -> Path:
+    """Write a protocol of two drops that are quickly analysed."""
+    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
+    path = tmp_path / "fence.yaml"
+    path.write_text(
+        text.replace("{repeats: 10, settle: 5 s}", "{repeats: 2, settle: 1 s}"), "utf-8"
+    )
     return path
 
 

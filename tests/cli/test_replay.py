@@ -8,6 +8,9 @@ from contextlib import closing
 
 import pytest
 
+from rig.daemon.station import Station
+from rig.session.store import Session
+
 GUARDED = ("bytes", "ping", "drop", "edge", "identity", "run_state")
 
 
@@ -18,6 +21,22 @@ def tamper(session, sql, *values):
             for guard in ("update", "delete", "replace"):
                 connection.execute(f"DROP TRIGGER IF EXISTS {table}_no_{guard}")
         assert connection.execute(sql, values).rowcount == 1
+
+
+def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
+    connect = Station.connect
+
+    def wired(station):
+        connect(station)
+        station._port.board.sense(0.0125)
+
+    monkeypatch.setattr(Station, "connect", wired)
+    assert call("run", fence, "--port", "sim://", "--session", tmp_path / "s").code == 0
+    with Session.open(tmp_path / "s", readonly=True) as session:
+        senses = [drop.certificate.release_sense for drop in session.drops()]
+    assert senses == [pytest.approx(200_000, rel=0.005)] * 2
+    done = call("replay", tmp_path / "s")
+    assert done.out.splitlines()[0] == "drops: 2 identical"
 
 
 def test_a_session_is_identical_to_its_own_bytes(call, finished):
@@ -37,6 +56,7 @@ def test_a_session_is_identical_to_its_own_bytes(call, finished):
     ("sql", "found"),
     [
         ('UPDATE edge SET tick = tick + 1 WHERE "drop" = 2 AND idx = 100', {"drops"}),
+        ('UPDATE "drop" SET release_sense = 3 WHERE id = 2', {"drops"}),
         ('UPDATE edge SET channel = 15 - channel WHERE "drop" = 1 AND idx = 0', {"drops"}),
         ('UPDATE "drop" SET fire_tick = fire_tick + 1 WHERE run = 3', {"drops"}),
         ('UPDATE "drop" SET faults = \'["late"]\' WHERE run = 4', {"drops", "results"}),

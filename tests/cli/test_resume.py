@@ -393,21 +393,24 @@ def test_a_port_where_nobody_answers_is_closed_again(new, monkeypatch):
             station.device  # noqa: B018
 
 
-@pytest.fixture
-def board_stays(monkeypatch):
-    """Have one board behind the port that opening does not restart, as some do not."""
+@pytest.fixture(params=["board goes on", "board restarts"])
+def one_board(request, monkeypatch):
+    """Have one board behind the port, which opening restarts or not, as boards differ.
+
+    Give the function that makes time pass for it.
+    """
     made = []
 
     def reopen(url):
         if not made:
             made.append(open_port(url))
-            made[0].reset_on_open = False
+            made[0].reset_on_open = request.param == "board restarts"
         else:
             made[0].open()
         return made[0]
 
     monkeypatch.setattr("rig.daemon.station.open_port", reopen)
-    return made
+    return lambda seconds: made[0].clock.sleep(seconds)  # noqa: PLW0108 - none is made yet
 
 
 def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
@@ -425,11 +428,10 @@ def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
 
 
 @pytest.mark.parametrize("state", [RunState.FIRED, RunState.RECORDED])
-def test_a_drop_that_the_board_still_holds_is_fetched(
-    run, tmp_path, monkeypatch, board_stays, state
-):
+def test_a_drop_that_the_board_still_holds_is_fetched(run, tmp_path, monkeypatch, one_board, state):
     cut_off_in_the_fall(run, monkeypatch, state)
     assert log_of(tmp_path / "s")[1][-1] == (1, state)
+    one_board(2.0)  # the recording ends
     done = run()
     assert done.code == 0
     assert "fetching run 1, attempt 1, from the device" in done.err
@@ -438,19 +440,33 @@ def test_a_drop_that_the_board_still_holds_is_fetched(
     assert_whole(tmp_path / "s", 2)
 
 
+@pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
+def test_a_drop_that_a_restart_cut_short_is_made_again(run, tmp_path, monkeypatch, one_board):
+    cut_off_in_the_fall(run, monkeypatch)
+    done = run()
+    assert done.code == 0
+    assert "fetching" not in done.err
+    assert log_of(tmp_path / "s")[1][2:4] == [(1, RunState.INTERRUPTED), (2, RunState.ARMED)]
+    assert drops_of(tmp_path / "s") == [(1, 2), (2, 1)]
+    assert_whole(tmp_path / "s", 2)
+
+
+@pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
 def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
-    call, run, tmp_path, protocol, monkeypatch, board_stays
+    call, run, tmp_path, protocol, monkeypatch, one_board
 ):
     def other(name):
         return call("run", protocol, "--port", "sim://", "--session", tmp_path / name, "--seed", 1)
 
     assert other("older").code == 0
     cut_off_in_the_fall(run, monkeypatch)
+    one_board(2.0)
     for name in ("newer", "older"):
         before = drops_of(tmp_path / name) if name == "older" else []
         done = other(name)
         assert done.code == 4
         assert "session" in done.err
+        assert "taking the power from the board discards the drop" in done.err
         assert drops_of(tmp_path / name) == before
     done = run()
     assert done.code == 0

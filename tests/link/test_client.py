@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 import serial
@@ -17,6 +18,7 @@ from rig.link.client import Device
 from rig.link.clock import SystemClock
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
+from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received, Transcript
 from rig.records import Drop, Ping
 from tests.link.strategies import MESSAGES
@@ -70,11 +72,17 @@ def clock() -> FakeClock:
     return FakeClock()
 
 
+def device_at(port: FakePort, **options) -> Device:
+    return Device(port, port.clock, **options)
+
+
 def device(clock: FakeClock, answers: dict, **options) -> Device:
-    return Device(FakePort(clock, answers), clock, **options)
+    return device_at(FakePort(clock, answers), **options)
 
 
-IDENTITY = wire.Identity(1, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, "")
+IDENTITY = wire.Identity(
+    1, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, 0, 256, ""
+)
 
 
 def test_the_first_byte_is_a_delimiter(clock):
@@ -102,7 +110,7 @@ def test_seq_wraps_around_zero(clock):
 
 
 def test_an_older_identity_is_refused(clock):
-    old = wire.Identity(0, "mega2560", "0.9", bytes(8), 16_000_000, 16, 2, 1, 1024, "")
+    old = replace(IDENTITY, protocol_version=0)
     with pytest.raises(DeviceError, match="protocol version 0, this program version 1"):
         device(clock, {wire.Identify: [old]}).connect()
 
@@ -140,7 +148,7 @@ def test_the_tap_comes_before_everything(clock):
 
 
 def certificate(label: int, events: int, crc32: int = 0) -> wire.DropCertificate:
-    return wire.DropCertificate(label, 100, 0xFFFF, 0, events, crc32, 0, 0, 0)
+    return wire.DropCertificate(label, 100, 0xFFFF, 0, events, crc32, 0, 0, 0, 0, 0)
 
 
 def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
@@ -170,6 +178,110 @@ def test_a_device_that_never_gives_the_events_is_faulty(clock):
 
     with pytest.raises(DeviceError, match="did not send the events"):
         Device(Liar(clock, {}), clock).fetch(1)
+
+
+class Forgetful(FakePort):
+    """Holds `total` events and keeps those from `kept` on; says so when asked for an older one."""
+
+    total, kept = 5, 3
+
+    def write(self, data):
+        for frame in Decoder().feed(data):
+            if isinstance(read := wire.unpack(frame.type, frame.payload), wire.Read):
+                event = wire.EventsFrame(1, read.first, (wire.Event(100 + read.first, 1),))
+                kept = event if read.first >= self.kept else self.refusal()
+                self.answers[wire.Read] = [kept if read.count else certificate(1, self.total)]
+        return super().write(data)
+
+    def refusal(self):
+        return wire.Refused(wire.Reason.NOT_KEPT, self.kept)
+
+
+def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
+    port = Forgetful(clock, {wire.Identify: [IDENTITY]})
+    one = Device(port, clock)
+    one.connect(boot_wait_s=0)
+    faults = one.fetch(1).faults
+    assert faults == ("3 of 5 events no longer kept by the device, from number 0",)
+    assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
+
+
+def test_the_replay_knows_what_was_no_longer_kept(clock):
+    chunks = []
+    port = Forgetful(clock, {wire.Identify: [IDENTITY]})
+    one = Device(port, clock, lambda *chunk: chunks.append(chunk))
+    one.connect(boot_wait_s=0)
+    drop = one.fetch(1)
+    offline = Transcript()
+    for chunk in chunks:
+        offline.feed(*chunk)
+    assert offline.unfinished() == [drop]
+
+
+def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
+    class Liar(Forgetful):
+        def refusal(self):
+            return wire.Refused(wire.Reason.NOT_KEPT, 0)
+
+    with pytest.raises(DeviceRefusedError) as caught:
+        device_at(Liar(clock, {})).fetch(1)
+    assert caught.value.reason is wire.Reason.NOT_KEPT
+
+
+def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(clock):
+    """Events that do not match the CRC are read again, as far as they are kept."""
+    port = Forgetful(clock, {wire.Identify: [replace(IDENTITY, streams=1, capacity=2)]})
+    one = Device(port, clock)
+    one.connect(boot_wait_s=0)
+    for n in range(5):
+        code, payload = wire.pack(wire.EventsFrame(1, n, (wire.Event(100 + n, n % 2),)))
+        port.out += encode(Frame(code, 1, 0, payload))
+    while port.out:
+        one.poll()
+    drop = one.fetch(1)
+    assert drop.faults == ("the events do not match the certificate's CRC-32",)
+    assert [edge.tick for edge in drop.edges] == [1, 2, 3]  # event 4 as it was read: no change
+
+
+@pytest.mark.parametrize("reason", wire.DisarmReason)
+def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
+    port = FakePort(
+        clock,
+        {
+            wire.Arm: [wire.Armed(9), wire.Disarmed(1, reason)],
+            wire.Fire: [wire.Refused(wire.Reason.NOT_ARMED, 0)],
+        },
+    )
+    one = device_at(port)
+    token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
+    with pytest.raises(DeviceRefusedError, match="disarmed itself") as caught:
+        one.fire(token)
+    assert caught.value.disarmed is reason
+    assert "arm again" in caught.value.hint
+    port.answers[wire.Arm] = [wire.Armed(10)]
+    token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
+    with pytest.raises(DeviceRefusedError, match="is not armed"):
+        one.fire(token)
+
+
+def test_three_fires_reach_an_armed_device_before_it_takes_the_host_for_gone(clock):
+    sent = []
+
+    class Deaf(FakePort):
+        def write(self, data):
+            sent.append(self.clock.ns)
+            return super().write(data)
+
+    port = Deaf(clock, {})
+    with pytest.raises(DeviceTimeoutError):
+        device_at(port).fire(1)
+    assert sent[2] * 1e-6 < 0.8 * wire.HOST_SILENCE_MS
+    assert len(set(port.written)) == 1
+
+
+def test_the_reference_is_told(clock):
+    pulse = wire.ReferencePulse(3, 70)
+    assert device(clock, {wire.Reference: [pulse]}).reference() == pulse
 
 
 def test_a_recording_without_end_is_a_time_out(clock):
@@ -242,6 +354,23 @@ def test_half_a_frame_before_a_reconnect_swallows_nothing():
     transcript.feed("rx", 0, encode(Frame(code, 1, 0, payload))[:9])
     transcript.feed("tx", 1, b"\0")
     assert say(transcript, "rx", IDENTITY, ack=1) == [Received(0, 1, IDENTITY)]
+
+
+def test_a_glitch_is_no_edge():
+    transcript = Transcript()
+    events = (wire.Event(110, 0), wire.Event(120, 1), wire.Event(130, 1), wire.Event(140, 0))
+    say(transcript, "rx", wire.EventsFrame(1, 0, events))
+    say(transcript, "rx", certificate(1, 4))
+    assert transcript.pending(1).edges == ((20, 0, True), (40, 0, False))
+
+
+@pytest.mark.parametrize(("tick", "sense"), [(350, 250), (20, -80), (2**31 + 99, 2**31 - 1)])
+def test_the_release_sense_counts_from_the_fire_stamp(tick, sense):
+    transcript = Transcript()
+    say(transcript, "rx", replace(certificate(1, 0), sensed=1, sense_tick=tick))
+    assert transcript.pending(1).certificate.release_sense == sense
+    say(transcript, "rx", replace(certificate(1, 0), sensed=0, sense_tick=tick))
+    assert transcript.pending(1).certificate.release_sense is None
 
 
 def test_edges_before_the_fire_stamp_are_negative():

@@ -62,8 +62,8 @@ def test_every_message_is_in_the_table_once():
         wire.Pong(-1),
         wire.Read(1, 2, 256),
         wire.EventsFrame(1, 2, (Event(0, 2**16),)),
-        wire.Identity(1, "b" * 25, "f", bytes(8), 1, 1, 1, 1, 1, ""),
-        wire.Identity(1, "b", "f", bytes(7), 1, 1, 1, 1, 1, ""),
+        wire.Identity(1, "b" * 25, "f", bytes(8), 1, 1, 1, 1, 1, 0, 1, ""),
+        wire.Identity(1, "b", "f", bytes(7), 1, 1, 1, 1, 1, 0, 1, ""),
     ],
 )
 def test_what_does_not_fit_is_refused(message):
@@ -89,6 +89,17 @@ def test_labels(run, attempt):
 def test_impossible_labels(pair):
     with pytest.raises(ValueError, match="65535"):
         wire.pack_label(*pair)
+
+
+def test_a_flicker_of_some_gate_is_told_without_a_number():
+    assert DeviceRefusedError(wire.Reason.GATE_UNSTEADY, 0).message == "a gate changed after arming"
+
+
+@pytest.mark.parametrize("reason", wire.DisarmReason)
+def test_every_reason_to_disarm_has_advice(reason):
+    error = DeviceRefusedError(wire.Reason.NOT_ARMED, 0, reason)
+    assert error.hint
+    assert "disarmed itself" in error.message
 
 
 @pytest.mark.parametrize("reason", wire.Reason)

@@ -335,3 +335,42 @@ def test_drag_of_the_order_met_with_light_rods():
     assert 0.99 < air.separation_m / none.separation_m < 1.0
     twin = 0.18 + chain.length - fallen(air.time_s, 9.81, kappa)
     assert close(twin, air.separation_m, 1e-14)
+
+
+@settings(deadline=None, max_examples=80)
+@given(DISTANCES, SPEEDS, GRAVITIES, AIR, st.floats(0.01, 0.99))
+def test_a_leg_in_air_can_be_cut_anywhere(distance, speed, gravity, kappa, share):
+    upper = share * distance
+    lower = distance - upper
+    whole = drag_leg(distance, speed, gravity, kappa)
+    passing, first = drag_leg(upper, speed, gravity, kappa)
+    arrival, second = drag_leg(lower, passing, gravity, kappa)
+    many = TIGHT * (1.0 + kappa * distance)
+    assert close(arrival, whole[0], many)
+    assert close(first + second, whole[1], many)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, AIR, st.integers(-15, 15))
+def test_a_larger_scene_in_air_as_much_thinner(chain, alpha, gamma, drop, gravity, speed, kappa, n):
+    """Lengths by 4^n, κ by 4^−n, speeds by 2^n: not a bit is rounded."""
+    gains = kicks(chain, [alpha] * chain.rods, gamma)
+    one = drag_fall(chain, gains, [kappa] * chain.rods, drop, gravity, speed)
+    larger = replace(chain, heights=tuple(z * 4.0**n for z in chain.heights))
+    thin = [kappa / 4.0**n] * chain.rods
+    other = drag_fall(larger, gains, thin, drop * 4.0**n, gravity, speed * 2.0**n)
+    assert other.separation_m == one.separation_m * 4.0**n
+    assert other.speed_m_s == one.speed_m_s * 2.0**n
+    assert other.time_s == one.time_s * 2.0**n
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(), st.data(), decades(-9, 9), st.integers(-60, 60))
+def test_only_ratios_of_drag_to_mass_matter(chain, data, scale, power):
+    drags = [m * data.draw(decades(-4, 0)) for m in chain.masses]
+    one = leg_drags(chain, drags)
+    doubled = replace(chain, masses=tuple(m * 2.0**power for m in chain.masses))
+    assert leg_drags(doubled, [c * 2.0**power for c in drags]) == one
+    scaled = replace(chain, masses=tuple(m * scale for m in chain.masses))
+    for found, wanted in zip(leg_drags(scaled, [c * scale for c in drags]), one, strict=True):
+        assert close(found, wanted, 5e-16)

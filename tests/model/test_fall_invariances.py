@@ -9,7 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rig.model.chain import Chain
-from rig.model.fall import fall
+from rig.model.fall import fall, kicks
+from rig.model.motion import Motion
 from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, decades
 
 TIGHT = 1e-13
@@ -111,3 +112,27 @@ def test_a_larger_gamma_weakens_the_pull(chain, alpha, gamma, more, drop, gravit
     assert loose.separation_m <= firm.separation_m * (1.0 + TIGHT)
     assert loose.speed_m_s <= firm.speed_m_s * (1.0 + TIGHT)
     assert firm.time_s <= loose.time_s * (1.0 + TIGHT)
+
+
+@settings(deadline=None, max_examples=80)
+@given(chains(mass_decades=2), ALPHAS, GAMMAS, decades(-3, 1), GRAVITIES, SPEEDS, st.floats(0, 1))
+def test_the_fall_can_be_cut_anywhere(chain, alpha, gamma, drop, gravity, speed, share):
+    """What has not struck yet, let go again where it is and as fast as it is, ends the fall."""
+    whole = fall(chain, alpha, gamma, drop, gravity, speed)
+    motion = Motion(chain, kicks(chain, [alpha] * chain.rods, gamma), drop, gravity, speed)
+    here = motion.at(share * motion.end_s)
+    struck = sum(hit.time_s <= here.time_s for hit in motion.hits[:-1])
+    lowest = chain.heights[struck]
+    rest = Chain(chain.masses[struck:], tuple(z - lowest for z in chain.heights[struck:]))
+    left = max(0.0, here.height_m + lowest)  # at the cut itself rounding may put it below 0
+    end = fall(rest, alpha, gamma, left, gravity, here.speed_m_s)
+    assert close(end.speed_m_s, whole.speed_m_s, TIGHT)
+    # Heights are differences here: what they lose counts against the whole way, and in time as
+    # that way takes at the speed of the next impact.
+    way = drop + chain.length
+    lost = TIGHT * (whole.time_s + way / motion.hits[struck].speed_before)
+    assert abs(here.time_s + end.time_s - whole.time_s) <= lost
+    # The twin is slower by what was gained so far, and goes on falling behind at that rate.
+    twin = speed + gravity * here.time_s
+    separation = here.separation_m + (here.speed_m_s - twin) * end.time_s + end.separation_m
+    assert abs(separation - whole.separation_m) <= TIGHT * way + (here.speed_m_s + twin) * lost

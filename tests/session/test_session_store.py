@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,9 @@ DEVICE_DROP = Drop(
     edges=(Edge(10, 0, True), Edge(10, 1, True), Edge(900, 0, False)),
     fire_tick=4_000_000_000,
     initial_state=0x0100,
-    certificate=Certificate(events=3, crc32=0xFFFF_FFFF, overflows=1, glitches=2, late=3),
+    certificate=Certificate(
+        events=3, crc32=0xFFFF_FFFF, overflows=1, glitches=2, late=3, release_sense=-4
+    ),
     faults=("1 snapshot lost",),
 )
 IMPORTED = Drop(run=1, attempt=1, tick_hz=10**12, edges=(Edge(5, 15, False),))
@@ -94,6 +97,24 @@ def test_everything_comes_back_as_it_went_in(path: Path) -> None:
     assert sorted(entry.name for entry in path.parent.iterdir()) == [path.name]
 
 
+def test_a_file_of_the_first_format_is_read_and_continued(path: Path) -> None:
+    with make(path) as session:
+        fill(session)
+    connection = sqlite3.connect(path)
+    connection.execute('ALTER TABLE "drop" DROP COLUMN release_sense')
+    connection.execute("PRAGMA user_version = 1")
+    connection.close()
+    assert DEVICE_DROP.certificate is not None
+    without = replace(DEVICE_DROP, certificate=replace(DEVICE_DROP.certificate, release_sense=None))
+    with Session.open(path, readonly=True) as session:
+        assert list(session.drops()) == [without, IMPORTED]
+    third = replace(DEVICE_DROP, run=3)
+    with Session.open(path) as session:
+        session.add_drop(third)
+    with Session.open(path) as session:
+        assert list(session.drops()) == [without, IMPORTED, third]
+
+
 def test_latest_drops_are_the_last_attempts(path: Path) -> None:
     second = Drop(run=1, attempt=2, tick_hz=1000, edges=())
     with make(path) as session:
@@ -142,8 +163,8 @@ def test_results_are_replaced_as_a_whole(path: Path) -> None:
         "UPDATE \"drop\" SET faults = '[]'",
         "UPDATE meta SET value = 'false' WHERE key = 'simulated'",
         'INSERT OR REPLACE INTO "drop" SELECT id + 100, run, attempt, tick_hz, fire_tick, '
-        "initial_state, events, crc32, overflows, glitches, late, '[]', host_ns, provenance "
-        'FROM "drop"',
+        "initial_state, events, crc32, overflows, glitches, late, '[]', host_ns, provenance, "
+        'release_sense FROM "drop"',
     ],
 )
 def test_raw_records_are_never_altered(path: Path, statement: str) -> None:

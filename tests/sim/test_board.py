@@ -10,66 +10,60 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.link.client import Device
+from rig.link.messages import Phase
 from rig.link.port import port_clock
 from rig.link.refusals import DeviceRefusedError
-from sim.board import VirtualBoard
+from sim.board import POWER_ON, VirtualBoard
 from sim.clock import VirtualClock
 from sim.serial_port import SimulatedSerial
 from sim.snapshots import take_snapshots
-from tests.link.conformance import (
-    LABEL,
-    Bench,
-    DeviceConformance,
-    ScriptedLab,
-    arm,
-    falling_rods,
-)
+from tests.link.bench import LABEL, ScriptedLab, falling_rods
+from tests.link.conformance import DeviceConformance
+from tests.link.talk import arm
+from tests.link.virtual import VirtualBench
 
 
-class VirtualBench(Bench):
-    can_preset_tick = True
-
-    def __init__(self, lab: ScriptedLab, **line) -> None:
-        super().__init__(lab)
-        self.board = VirtualBoard(lab, seed=1, ppm=2000)
-        self.serial = SimulatedSerial("test", board=self.board, timeout=0.02, **line)
-
-    def port(self):
-        return self.serial
-
-    def clock(self):
-        return self.serial.clock
-
-    def touch(self, gates):
-        self.board.advance(self.clock().now_ns())
-        self.board.touch(gates)
-
-    def reset(self):
-        self.board.reset(self.clock().now_ns())
-
-    def reopen(self):
-        self.serial.close()
-        self.serial = SimulatedSerial(
-            "test", board=self.board, clock=self.clock(), timeout=0.02, reset_on_open=False
-        )
-
-    def preset_tick(self, seconds_before_wrap):
-        now = self.board.counter.tick_at(self.clock().now_ns())
-        self.board.counter.start += 2**32 - round(seconds_before_wrap * 16e6) - now
+def bench_of(lab: ScriptedLab, *, line=None, **board) -> VirtualBench:
+    return VirtualBench(lab, VirtualBoard(lab, seed=1, ppm=2000, **board), **(line or {}))
 
 
 class TestVirtualBoard(DeviceConformance):
     def make(self, lab):
-        return VirtualBench(lab)
+        return bench_of(lab)
 
     def test_edges_are_exact(self, bench, device):
         drop = self.drop(device)
         hz = 16e6 * 1.002
         assert [e.tick for e in drop.edges] == [round(c[0] * hz) for c in bench.lab.changes]
 
+    def test_a_drop_does_not_outlive_the_power(self, bench, device):
+        self.drop(device)
+        bench.board.reset(bench.clock().now_ns(), POWER_ON)
+        device.connect()
+        assert device.status().phase is Phase.IDLE
+
+    def test_pulses_of_the_reference_during_a_restart_are_not_seen(self, bench, device):
+        bench.reference([0.1, 0.2, 0.4])
+        self.restart(bench, device)
+        assert device.reference().count == 0
+        bench.clock().sleep(0.15)
+        assert device.reference().count == 1
+
+
+class TestStreamingBoard(DeviceConformance):
+    def make(self, lab):
+        return bench_of(lab, streams=True, capacity=100)
+
+    def test_a_line_too_slow_for_the_events_loses_some(self, bench, device):
+        bench.lab.changes = [(0.01 + 20e-6 * n, 0, n % 2 == 0) for n in range(1000)]
+        drop = self.drop(device)
+        assert 0 < drop.certificate.overflows < 900
+        assert drop.certificate.events + drop.certificate.overflows == 1000
+        assert "memory was full" in drop.faults[0]
+
 
 def conversation(seed: int, **line) -> tuple[list, list]:
-    bench = VirtualBench(ScriptedLab(changes=falling_rods()), seed=seed, **line)
+    bench = bench_of(ScriptedLab(changes=falling_rods()), line={"seed": seed, **line})
     chunks: list = []
     device = Device(bench.port(), bench.clock(), lambda *c: chunks.append(c), tries=60)
     device.connect()
@@ -130,7 +124,12 @@ def test_a_paced_clock_takes_real_time(monkeypatch):
 
 def test_changes_within_a_tick_are_one_snapshot():
     changes = [(1e-3, 0, True), (1e-3 + 1e-9, 1, True), (2e-3, 0, False)]
-    assert take_snapshots(changes, 0, 3, 16e6) == ([(16000, 3), (32000, 2)], 0)
+    assert take_snapshots(changes, 0, 3, 16e6) == [(16000, 3), (32000, 2)]
+
+
+def test_a_pulse_too_short_to_be_seen_leaves_one_snapshot_of_nothing_new():
+    changes = [(1e-3, 0, True), (1e-3 + 1e-6, 0, False), (2e-3, 1, True)]
+    assert take_snapshots(changes, 0, 3, 16e6) == [(16000, 0), (32000, 2)]
 
 
 @settings(deadline=None)
@@ -138,15 +137,20 @@ def test_changes_within_a_tick_are_one_snapshot():
     st.lists(st.tuples(st.floats(0, 0.01), st.integers(0, 3)), max_size=60).map(sorted),
     st.integers(0, 15),
 )
-def test_snapshots_never_repeat_a_state_and_end_right(toggles, initial):
+def test_snapshots_account_for_every_change(toggles, initial):
+    """Each snapshot shows what its moment changed; a pulse that shows nothing has one too."""
     state, changes = initial, []
     for seconds, channel in toggles:
         state ^= 1 << channel
         changes.append((seconds, channel, bool(state >> channel & 1)))
-    snapshots, glitches = take_snapshots(changes, initial, 0xF, 16e6)
+    snapshots = take_snapshots(changes, initial, 0xF, 16e6)
     assert (snapshots[-1].state if snapshots else initial) == state
     assert all(a.ticks < b.ticks for a, b in pairwise(snapshots))
-    assert len(snapshots) + 2 * glitches <= len(changes)
+    states = [initial, *(snapshot.state for snapshot in snapshots)]
+    edges = sum((a ^ b).bit_count() for a, b in pairwise(states))
+    glitches = sum(a == b for a, b in pairwise(states))
+    assert edges + 2 * glitches <= len(changes)
+    assert bool(snapshots) == bool(changes)
 
 
 def test_a_url_handler_only_says_which_board():

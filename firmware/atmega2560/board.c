@@ -1,0 +1,23 @@
+#include "board.h"
+
+uint16_t reference_offset;
+
+void board_start(void)
+{
+    /* Outputs first: low, then driven. Inputs float or are pulled up until now. */
+    PORTE &= (uint8_t)~(RELEASE_0 | RELEASE_1 | SYNC);
+    DDRE |= RELEASE_0 | RELEASE_1 | SYNC;
+    DDRA = LED;
+    PORTA = STOP;
+    PORTL = REFERENCE | SENSE;
+    DDRB = DDRK = 0;
+    PORTB = PORTK = 0; /* the comparators drive the gate inputs */
+
+    TCCR4A = TCCR5A = 0;
+    TCCR4B = _BV(ICNC4) | _BV(ICES4) | _BV(CS40);
+    TCCR5B = _BV(ICNC5) | _BV(CS50);
+    {
+        uint16_t of4 = TCNT4, of5 = TCNT5;
+        reference_offset = (uint16_t)(of5 - of4);
+    }
+}

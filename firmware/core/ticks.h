@@ -1,0 +1,28 @@
+/* The 16-bit counter -> 32-bit time, without an overflow interrupt that could delay a stamp.
+ *
+ * The main loop counts halves of the counter's range. It may do so 0.5 ms too early and 1.5 ms too
+ * late (at 16 MHz): every conversion finds by how much the counter is ahead. */
+#ifndef TICKS_H
+#define TICKS_H
+
+#include <stdint.h>
+
+#define TICKS_PER_US (BOARD_HZ / 1000000u)
+#define TICKS_PER_MS (BOARD_HZ / 1000u)
+
+/* Begin; the counter's bits stand in for the lower 16 of `time`. */
+void ticks_start(uint32_t time);
+
+/* Count, at least every 1.5 ms; now, to some 20 us. */
+uint32_t ticks_pass(void);
+
+/* Now. */
+uint32_t ticks_now(void);
+
+/* The time of a count taken not longer than 4 ms ago. */
+uint32_t ticks_of(uint16_t count);
+
+/* The time of a count stamped together with the published half, not longer than 0.5 s ago. */
+uint32_t ticks_stamped(uint16_t count, uint8_t half);
+
+#endif

@@ -1,0 +1,146 @@
+/* Written by rig/link/cheader.py from rig/link/messages.py: change that file, not this one.
+ *
+ * MSG_X is a message's code, X_F where its field F begins in the payload (as long as nothing of
+ * variable length stands before it), X_SIZE the payload's size without such fields. */
+#ifndef WIRE_H
+#define WIRE_H
+
+#define PROTOCOL_VERSION 1
+#define FRAME_LIMIT 255
+#define HOST_SILENCE_MS 250
+
+#define PHASE_IDLE 0
+#define PHASE_ARMED 1
+#define PHASE_RECORDING 2
+#define PHASE_HOLDING 3
+
+#define REASON_NOT_ARMED 1
+#define REASON_WRONG_TOKEN 2
+#define REASON_GATE_BLOCKED 3
+#define REASON_GATE_UNSTEADY 4
+#define REASON_BAD_PARAMETER 5
+#define REASON_BUSY 6
+#define REASON_HOLDING_A_DROP 7
+#define REASON_NO_SUCH_DROP 8
+#define REASON_WRONG_CRC 9
+#define REASON_VERSION 10
+#define REASON_UNKNOWN_MESSAGE 11
+#define REASON_STOPPED 12
+#define REASON_COOLING 13
+#define REASON_NOT_KEPT 14
+
+#define DISARM_REASON_TIMEOUT 1
+#define DISARM_REASON_HOST_SILENT 2
+#define DISARM_REASON_STOPPED 3
+
+#define MSG_IDENTIFY 0x01
+#define IDENTIFY_PROTOCOL_VERSION 0
+#define IDENTIFY_SIZE 1
+
+#define MSG_PING 0x02
+#define PING_SIZE 0
+
+#define MSG_STATUS 0x03
+#define STATUS_SIZE 0
+
+#define MSG_ARM 0x04
+#define ARM_LABEL 0
+#define ARM_GATES 4
+#define ARM_RELEASE 6
+#define ARM_PULSE_US 7
+#define ARM_TIMEOUT_MS 11
+#define ARM_RECORD_MS 13
+#define ARM_SIZE 15
+
+#define MSG_FIRE 0x05
+#define FIRE_TOKEN 0
+#define FIRE_SIZE 4
+
+#define MSG_ABORT 0x06
+#define ABORT_SIZE 0
+
+#define MSG_READ 0x07
+#define READ_LABEL 0
+#define READ_FIRST 4
+#define READ_COUNT 6
+#define READ_SIZE 7
+
+#define MSG_ACKNOWLEDGE 0x08
+#define ACKNOWLEDGE_LABEL 0
+#define ACKNOWLEDGE_CRC32 4
+#define ACKNOWLEDGE_SIZE 8
+
+#define MSG_REFERENCE 0x09
+#define REFERENCE_SIZE 0
+
+#define MSG_IDENTITY 0x81
+#define IDENTITY_PROTOCOL_VERSION 0
+#define IDENTITY_BOARD 1
+#define IDENTITY_BOARD_LIMIT 24
+#define IDENTITY_FIRMWARE_LIMIT 24
+#define IDENTITY_CHANNELS_LIMIT 96
+#define IDENTITY_SIZE 24
+
+#define MSG_PONG 0x82
+#define PONG_TICK 0
+#define PONG_SIZE 4
+
+#define MSG_STATE 0x83
+#define STATE_PHASE 0
+#define STATE_GATES 1
+#define STATE_LABEL 3
+#define STATE_EVENTS 7
+#define STATE_SIZE 9
+
+#define MSG_ARMED 0x84
+#define ARMED_TOKEN 0
+#define ARMED_SIZE 4
+
+#define MSG_FIRED 0x85
+#define FIRED_TICK 0
+#define FIRED_SIZE 4
+
+#define MSG_REFUSED 0x86
+#define REFUSED_REASON 0
+#define REFUSED_DETAIL 1
+#define REFUSED_SIZE 3
+
+#define MSG_DONE 0x87
+#define DONE_SIZE 0
+
+#define MSG_EVENTS 0x88
+#define EVENTS_LABEL 0
+#define EVENTS_FIRST 4
+#define EVENTS_EVENTS 6
+#define EVENTS_RECORD 6
+#define EVENTS_SIZE 6
+
+#define MSG_DROP_CERTIFICATE 0x89
+#define DROP_CERTIFICATE_LABEL 0
+#define DROP_CERTIFICATE_FIRE_TICK 4
+#define DROP_CERTIFICATE_GATES 8
+#define DROP_CERTIFICATE_INITIAL_STATE 10
+#define DROP_CERTIFICATE_EVENTS 12
+#define DROP_CERTIFICATE_CRC32 14
+#define DROP_CERTIFICATE_OVERFLOWS 18
+#define DROP_CERTIFICATE_GLITCHES 20
+#define DROP_CERTIFICATE_LATE 22
+#define DROP_CERTIFICATE_SENSED 24
+#define DROP_CERTIFICATE_SENSE_TICK 25
+#define DROP_CERTIFICATE_SIZE 29
+
+#define MSG_DISARMED 0x8A
+#define DISARMED_LABEL 0
+#define DISARMED_REASON 4
+#define DISARMED_SIZE 5
+
+#define MSG_BOOT 0x8B
+#define BOOT_CAUSE 0
+#define BOOT_SIZE 1
+
+#define MSG_REFERENCE_PULSE 0x8C
+#define REFERENCE_PULSE_COUNT 0
+#define REFERENCE_PULSE_TICK 2
+#define REFERENCE_PULSE_SIZE 6
+
+#endif

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole board in virtual time: the firmware, and the lab around its pins."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections import deque
+from typing import TYPE_CHECKING
+
+from rig.link import messages as wire
+from rig.link.frames import Decoder
+from rig_emulator.avr import Avr, Change, Stop
+from rig_emulator.line import LineToHost
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from rig.link.frames import Frame
+    from rig_emulator.image import Image
+    from rig_emulator.wiring import Wiring
+    from sim.lab_interface import Lab
+
+CRYSTAL_HZ = 16_000_000
+_ARM = wire.CODES[wire.Arm]
+_ARMED = wire.CODES[wire.Armed]
+_POWERED_CYCLES = CRYSTAL_HZ // 10  # the board has been on for a while when the port is opened
+_PULSE_NS = 10**7  # width of the reference's pulses
+_HISTORY = 10_000
+
+
+class EmulatedBoard:
+    """Same interface as `sim.board.VirtualBoard`, but the real program inside.
+
+    The lab is hung while ARM is on its way to the board, and let go when the sync output rises.
+
+    Parameters
+    ----------
+    wiring
+        The board.
+    program
+        Its firmware.
+    lab
+        What the gates see; `None`: nothing ever happens.
+    seed
+        Chooses unique id and the phase of the counter.
+    ppm
+        How far the board's clock is off; virtual nanoseconds are true ones.
+    baudrate
+        Of the host.
+
+    Attributes
+    ----------
+    avr
+        The controller.
+    line
+        What it sends.
+    history
+        What its output pins did of late.
+    """
+
+    def __init__(
+        self,
+        wiring: Wiring,
+        program: Path | Image,
+        lab: Lab | None = None,
+        seed: int = 0,
+        *,
+        ppm: float = 0.0,
+        baudrate: int = 500_000,
+    ) -> None:
+        self.wiring = wiring
+        self.lab = lab
+        self.hz = CRYSTAL_HZ * (1.0 + ppm * 1e-6)
+        self.avr = Avr(program, wiring.mcu, CRYSTAL_HZ, baudrate)
+        self.line = LineToHost(baudrate)
+        self.history: deque[Change] = deque(maxlen=_HISTORY)
+        draw = hashlib.sha256(f"emulated board {seed}".encode()).digest()
+        self.avr.eeprom_write(0, draw[:8])
+        self.avr.watch(wiring.sync)
+        for pin in (*wiring.gates, wiring.stop, wiring.reference, wiring.sense):
+            if pin is not None:
+                self.avr.edge(0, pin, False)
+        self._sense_s: float | None = None
+        self._sniff()
+        self._origin = 0
+        self._run(_POWERED_CYCLES + int.from_bytes(draw[8:10]))
+        self._origin = self.avr.cycle
+        self.line = LineToHost(baudrate)  # nobody listened
+
+    # -- what a port needs
+
+    def receive(self, start_ns: int, data: bytes) -> None:
+        """Take bytes from the host.
+
+        Parameters
+        ----------
+        start_ns
+            When the first begins to arrive; they follow each other at line rate.
+        data
+            The bytes.
+        """
+        for frame in self._to_board.feed(data):
+            if frame.type == _ARM:
+                self._hang(frame)
+        self.avr.receive(data, self.cycle_at(start_ns))
+
+    def reset(self, at_ns: int) -> None:
+        """Pull the reset pin, as opening the port does."""
+        self.advance(at_ns)
+        self.line.cut(at_ns)
+        self.avr.reset()
+        self._sniff()
+        self.history.extend(self.avr.take_changes())
+
+    def advance(self, until_ns: int) -> None:
+        """Let the firmware work until a moment."""
+        self._run(self.cycle_at(until_ns))
+
+    def listen(self, until_ns: int) -> int | None:
+        """Let it work until a byte begins to be sent, at most until a moment.
+
+        Parameters
+        ----------
+        until_ns
+            The host is silent at least until then.
+
+        Returns
+        -------
+        int or None
+            When the host gets the next byte.
+        """
+        if self.line.next_arrival_ns() is None:
+            self._run(self.cycle_at(until_ns), stop_on_sent=True)
+        return self.line.next_arrival_ns()
+
+    def next_ns(self) -> int | None:
+        """Nobody knows what a program will do next, so: now."""
+        return self.ns_at(self.avr.cycle)
+
+    # -- hands around it
+
+    def touch(self, gates: int) -> None:
+        """Change the beams by hand, now: mask of the blocked ones."""
+        for channel, pin in enumerate(self.wiring.gates):
+            self.avr.edge(0, pin, bool(gates >> channel & 1))
+
+    def stop(self, opened: bool) -> None:
+        """Open or close the emergency stop, now."""
+        self.avr.edge(0, self.wiring.stop, opened)
+
+    def reference(self, times_ns: Iterable[int]) -> None:
+        """Have the 1 Hz reference give pulses.
+
+        Parameters
+        ----------
+        times_ns
+            When each rises.
+        """
+        for rise_ns in times_ns:
+            self.avr.edge(self.cycle_at(rise_ns), self.wiring.reference, True)
+            self.avr.edge(self.cycle_at(rise_ns + _PULSE_NS), self.wiring.reference, False)
+
+    def sense(self, seconds: float | None) -> None:
+        """Have the release-sense input change so long after each FIRE to come, or never."""
+        self._sense_s = seconds
+
+    def outputs(self) -> int:
+        """Mask of the release outputs that are on now."""
+        return sum(self.avr.output(pin) << n for n, pin in enumerate(self.wiring.releases))
+
+    def cycle_at(self, ns: int) -> int:
+        """Convert true time to the board's cycles."""
+        return self._origin + round(ns * 1e-9 * self.hz)
+
+    def ns_at(self, cycle: int) -> int:
+        """Convert the board's cycles to true time, at or after it."""
+        return math.ceil((cycle - self._origin) / self.hz * 1e9)
+
+    # -- inside
+
+    def _sniff(self) -> None:
+        self._to_board, self._to_host = Decoder(), Decoder()
+        self._asked: dict[int, int] = {}  # labels of ARM requests by seq
+        self._label: int | None = None  # of the last that was granted
+
+    def _hang(self, frame: Frame) -> None:
+        try:
+            order = wire.unpack(frame.type, frame.payload)
+        except wire.MessageError:
+            return
+        if not isinstance(order, wire.Arm) or self.avr.output(self.wiring.sync):
+            return  # while chains fall, nobody hangs others
+        self._asked[frame.seq] = order.label
+        if self.lab is not None:
+            for pin in self.wiring.gates:
+                self.avr.clear_edges(pin)
+            self.touch(self.lab.rest(order.label))
+
+    def _run(self, until: int, *, stop_on_sent: bool = False) -> None:
+        while True:
+            why = self.avr.run(until, stop_on_sent=stop_on_sent)
+            for cycle, value in self.avr.take_sent():
+                self.line.put(self.ns_at(cycle), value)
+                for frame in self._to_host.feed(bytes([value])):
+                    if frame.type == _ARMED and frame.ack in self._asked:
+                        self._label = self._asked[frame.ack]
+            for change in self.avr.take_changes():
+                self.history.append(change)
+                if change.pin == self.wiring.sync and change.high:
+                    self._let_go(change.cycle)
+            if why is not Stop.PIN:
+                return
+
+    def _let_go(self, cycle: int) -> None:
+        if self._sense_s is not None and self.wiring.sense is not None:
+            self.avr.edge(cycle + round(self._sense_s * self.hz), self.wiring.sense, True)
+        if self.lab is None or self._label is None:
+            return
+        for seconds, channel, blocked in self.lab.drop(self._label):
+            self.avr.edge(cycle + round(seconds * self.hz), self.wiring.gates[channel], blocked)

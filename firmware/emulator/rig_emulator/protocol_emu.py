@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``emu://``: falling chains before the pins of an emulated board, as a pyserial port.
+
+``emu://?protocol=FILE&seed=N&truth=FILE&board=mega&elf=FILE&<dial>=<value>…``: as ``sim://``, but
+the answers come from the real firmware. ``board`` is ``mega`` or ``uno``; ``elf`` is another
+firmware than the built one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig_emulator.board import EmulatedBoard
+from rig_emulator.wiring import board_named, firmware_for
+from sim.clock import VirtualClock
+from sim.scene import read_settings, set_scene
+from sim.serial_port import SimulatedSerial
+
+if TYPE_CHECKING:
+    from rig_emulator.wiring import Wiring
+    from sim.board_interface import Board
+    from sim.scene import Scene
+
+_PATIENCE_NS = 10**9  # how far a read without a time-out looks ahead at once
+
+
+class EmulatedSerial(SimulatedSerial):
+    """A port with an emulated board behind it."""
+
+    def upcoming(self, board: Board, end_ns: int | None) -> tuple[int | None, bool]:
+        """Let the board run ahead of a read: as long as it lasts, the host sends nothing."""
+        if not isinstance(board, EmulatedBoard):
+            return super().upcoming(board, end_ns)
+        until_ns = self.clock.now_ns() + _PATIENCE_NS if end_ns is None else end_ns
+        arrival_ns = board.listen(until_ns)
+        if arrival_ns is None:
+            return (until_ns, False) if end_ns is None else (None, False)
+        return arrival_ns, True
+
+
+class Serial(EmulatedSerial):
+    """The port that pyserial opens for an ``emu://`` URL."""
+
+    def make_board(self) -> EmulatedBoard:
+        """Hang the chains of the protocol that the URL names before the board it names."""
+        settings = read_settings(str(self.port))
+        wiring = board_named(settings.pop("board", "mega"))
+        program = settings.pop("elf", "")
+        scene = set_scene("emu", settings)
+        self.clock = VirtualClock(scene.pace)
+        self.disturb(scene.seed, **scene.line())
+        return board_before(
+            scene, wiring, Path(program) if program else firmware_for(wiring), self.baudrate
+        )
+
+
+def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> EmulatedBoard:
+    """Put a board before a scene.
+
+    Raises
+    ------
+    InputError
+        When the scene has more gates than the board.
+    """
+    for gate in scene.lab.gates:
+        if gate.channel >= len(wiring.gates):
+            raise InputError(
+                f"emu://: an {wiring.mcu} board has no gate {gate.channel}",
+                f"its gates are 0 to {len(wiring.gates) - 1}",
+            )
+    ppm = scene.dials.clock * 1e6
+    return EmulatedBoard(wiring, program, scene.lab, scene.seed, ppm=ppm, baudrate=baudrate)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A test stand: edges at exact cycles in, the firmware's own stamps out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.errors import DeviceError
+from rig.link import messages as wire
+from rig.link.frames import Decoder, Frame, encode
+from rig_emulator.avr import Avr
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+    from rig_emulator.avr import Change
+    from rig_emulator.wiring import Wiring
+
+_BOOT_CYCLES = 500_000
+_ANSWER_CYCLES = 800_000
+_TRIES = 5
+_LABEL = wire.pack_label(1, 1)
+
+
+class Flip(NamedTuple):
+    """A gate that changes, so many cycles after FIRE."""
+
+    cycle: int
+    gate: int
+    blocked: bool
+
+
+class Stamp(NamedTuple):
+    """What became of a flip.
+
+    Attributes
+    ----------
+    flip
+        The flip.
+    error
+        Its stamp less its cycle.
+    doubtful
+        Whether the host can see that the stamp may be off by more than usual: the event follows
+        close behind another, or tells of several gates at once.
+    """
+
+    flip: Flip
+    error: int
+    doubtful: bool
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A drop as the firmware recorded it; ticks count from FIRE.
+
+    Attributes
+    ----------
+    events
+        In order; `tick` may be negative.
+    certificate
+        The firmware's account.
+    late_ticks
+        The firmware's rule for late stamps.
+    """
+
+    events: list[wire.Event]
+    certificate: wire.DropCertificate
+    late_ticks: int
+
+    def stamps(self, flips: Iterable[Flip]) -> list[Stamp]:
+        """Set events beside what happened.
+
+        Parameters
+        ----------
+        flips
+            Everything that happened, in order of time.
+
+        Returns
+        -------
+        list of Stamp
+            One a flip, in the order in which the firmware saw them.
+
+        Raises
+        ------
+        DeviceError
+            When the events do not tell the same story.
+        """
+        waiting: dict[int, list[Flip]] = {}
+        for flip in flips:
+            waiting.setdefault(flip.gate, []).append(flip)
+        stamps = []
+        before, last = 0, -(1 << 31)
+        for tick, state in self.events:
+            changed = before ^ state
+            doubtful = tick - last < self.late_ticks or changed.bit_count() > 1
+            for gate in range(16):
+                if changed >> gate & 1:
+                    queue = waiting.get(gate, [])
+                    if not queue or queue[0].blocked != bool(state >> gate & 1):
+                        raise DeviceError(f"an edge of gate {gate} that nothing made")
+                    flip = queue.pop(0)
+                    stamps.append(Stamp(flip, tick - flip.cycle, doubtful))
+            before, last = state, tick
+        lost = sum(len(queue) for queue in waiting.values())
+        if lost:
+            raise DeviceError(f"{lost} edges left no event")
+        return stamps
+
+
+class Stand:
+    """A board on the stand, booted and connected.
+
+    Parameters
+    ----------
+    wiring
+        The board.
+    program
+        Its firmware.
+    baudrate
+        Of the line; the firmware must have been built for it.
+
+    Attributes
+    ----------
+    avr
+        The controller.
+    identity
+        What it said it is.
+    """
+
+    def __init__(self, wiring: Wiring, program: Path, baudrate: int = 500_000) -> None:
+        self.wiring = wiring
+        self.avr = Avr(program, wiring.mcu, baudrate=baudrate)
+        self._decoder = Decoder()
+        self._seq = 0
+        self._ahead = 0  # of the board's ticks before its cycles
+        for pin in (*wiring.gates, wiring.stop):
+            self.avr.edge(0, pin, False)
+        self.avr.eeprom_write(0, b"on stand")
+        self.hear(_BOOT_CYCLES)
+        identity = self.ask(wire.Identify())
+        if not isinstance(identity, wire.Identity):
+            raise DeviceError(f"the board answers IDENTIFY with {identity}")
+        self.identity = identity
+
+    def hear(self, cycles: int) -> list[wire.Message]:
+        """Let it work and take what it says."""
+        end = self.avr.cycle + cycles
+        while self.avr.run(end):
+            pass
+        data = bytes(sent.value for sent in self.avr.take_sent())
+        return [wire.unpack(frame.type, frame.payload) for frame in self._decoder.feed(data)]
+
+    def ask(self, request: wire.HostMessage, cycles: int = _ANSWER_CYCLES) -> wire.Message:
+        """Send a request, again if need be, and take the first answer."""
+        self._seq = self._seq % 255 + 1
+        code, payload = wire.pack(request)
+        for _ in range(_TRIES):
+            self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
+            if heard := self.hear(cycles):
+                return heard[0]
+        raise DeviceError(f"the board does not answer {request}")
+
+    def tick_at(self, cycle: int) -> int:
+        """Say what the board's time is at a cycle; right once there was a drop."""
+        return (cycle + self._ahead) % 2**32
+
+    def record(
+        self, flips: list[Flip] | Callable[[int], list[Flip]], record_ms: int, noise: bytes = b""
+    ) -> Recording:
+        """Arm, fire, and let gates change.
+
+        Parameters
+        ----------
+        flips
+            What happens, in order of time; every gate begins clear. Or what says so, given the
+            cycle of FIRE.
+        record_ms
+            For ARM.
+        noise
+            Bytes the host sends meanwhile, though it should keep silent.
+
+        Returns
+        -------
+        Recording
+            What the firmware sent by itself, its drop acknowledged.
+        """
+        gates = (1 << len(self.wiring.gates)) - 1
+        armed = self.ask(wire.Arm(_LABEL, gates, 0, 0, 200, record_ms), 100_000)
+        if not isinstance(armed, wire.Armed):
+            raise DeviceError(f"the board answers ARM with {armed}")
+        self.avr.watch(self.wiring.sync)
+        self.avr.take_changes()
+        self._seq = self._seq % 255 + 1
+        code, payload = wire.pack(wire.Fire(armed.token))
+        changes: list[Change] = []
+        while not changes:
+            self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
+            self.avr.run(self.avr.cycle + 100_000)
+            changes = [
+                change for change in self.avr.take_changes() if change.pin == self.wiring.sync
+            ]
+        fire = changes[0].cycle
+        for flip in flips if isinstance(flips, list) else flips(fire):
+            self.avr.edge(fire + flip.cycle, self.wiring.gates[flip.gate], flip.blocked)
+        self.avr.receive(noise)
+        heard = self.hear(record_ms * 16_000)
+        while not isinstance(heard[-1], wire.DropCertificate):
+            heard += self.hear(160_000)
+        certificate = heard[-1]
+        self._ahead = certificate.fire_tick - fire
+        raw = [event for m in heard if isinstance(m, wire.EventsFrame) for event in m.events]
+        events = [
+            wire.Event((e.tick - certificate.fire_tick + 2**31) % 2**32 - 2**31, e.state)
+            for e in raw
+        ]
+        for pin in self.wiring.gates:
+            self.avr.edge(0, pin, False)
+        self.ask(wire.Acknowledge(_LABEL, certificate.crc32), 100_000)
+        return Recording(events, certificate, self.identity.late_ticks)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a stamp is put through: real drops, dense trains, bursts, coincidences, short pulses."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rig.link.messages import pack_label
+from rig_emulator.stand import Flip
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig_emulator.stand import Stamp, Stand
+    from sim.lab_interface import Lab
+
+HZ = 16_000_000
+HALF = 1 << 15
+"""Cycles after which the firmware extends its counter."""
+_MS = HZ // 1000
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How stamps scatter, in cycles about their mean.
+
+    Attributes
+    ----------
+    count, mean, sd
+        Of all stamps.
+    p99, worst
+        Of the distance from the mean.
+    doubtful
+        How many the host can tell to be doubtful.
+    worst_trusted
+        The largest distance among all others.
+    """
+
+    count: int
+    mean: float
+    sd: float
+    p99: float
+    worst: float
+    doubtful: int
+    worst_trusted: float
+
+
+def spread(stamps: Sequence[Stamp]) -> Spread:
+    """Summarise stamps."""
+    errors = [stamp.error for stamp in stamps]
+    mean = sum(errors) / len(errors)
+    away = sorted(abs(error - mean) for error in errors)
+    return Spread(
+        count=len(errors),
+        mean=mean,
+        sd=(sum(a * a for a in away) / len(away)) ** 0.5,
+        p99=away[int(0.99 * (len(away) - 1))],
+        worst=away[-1],
+        doubtful=sum(stamp.doubtful for stamp in stamps),
+        worst_trusted=max((abs(s.error - mean) for s in stamps if not s.doubtful), default=0.0),
+    )
+
+
+def lab_drop(stand: Stand, lab: Lab, run: int) -> list[Stamp]:
+    """Let chains fall before the board, as far as it has gates."""
+    flips = [
+        Flip(round(seconds * HZ), channel, blocked)
+        for seconds, channel, blocked in lab.drop(pack_label(run, 1))
+        if channel < len(stand.wiring.gates)
+    ]
+    end_ms = (flips[-1].cycle + 10 * _MS) // _MS
+    return stand.record(flips, end_ms).stamps(flips)
+
+
+def train(gates: int, count: int, rate: float, seed: int = 1) -> list[Flip]:
+    """Flip gates by chance, so many times a second on the whole; all are clear at the end."""
+    chance = random.Random(seed)  # noqa: S311 - a trial, not secrets
+    blocked = [False] * gates
+    cycle, gap = 20_000.0, HZ / rate
+    flips = []
+    for _ in range(count):
+        gate = chance.randrange(gates)
+        blocked[gate] = not blocked[gate]
+        flips.append(Flip(round(cycle), gate, blocked[gate]))
+        cycle += gap * chance.uniform(0.5, 1.5)
+    return flips
+
+
+def sustained(stand: Stand, count: int, rate: float) -> tuple[int, int]:
+    """Count the events of a train that arrived, and those for which there was no memory."""
+    flips = train(len(stand.wiring.gates), count, rate)
+    recording = stand.record(flips, flips[-1].cycle // _MS + 5)
+    if not recording.certificate.overflows:
+        recording.stamps(flips)  # which would say what is missing
+    return recording.certificate.events, recording.certificate.overflows
+
+
+def burst(stand: Stand, count: int, rate: float) -> list[Stamp]:
+    """Flip one gate as fast as that."""
+    gap = round(HZ / rate)
+    flips = [Flip(20_000 + n * gap, 3, n % 2 == 0) for n in range(count)]
+    return stand.record(flips, flips[-1].cycle // _MS + 5).stamps(flips)
+
+
+def across_halves(stand: Stand, reach: int) -> list[Stamp]:
+    """Flip a gate once at every cycle of ± reach around a place where the time is extended."""
+    stand.record([], 5)  # to learn the board's time
+    made: list[Flip] = []
+
+    def flips(fire: int) -> list[Flip]:
+        first = HALF - stand.tick_at(fire) % HALF
+        for n, offset in enumerate(range(-reach, reach + 1)):
+            made.append(Flip(first + (n + 1) * HALF + offset, 0, n % 2 == 0))
+        return made
+
+    return stand.record(flips, (2 * reach + 4) * HALF // _MS + 1).stamps(made)
+
+
+def pulse(stand: Stand, gate: int, width: int, count: int = 16) -> tuple[int, int]:
+    """Give one gate short pulses, and count those seen as two edges and those as a glitch."""
+    flips = []
+    for n in range(count):
+        at = 20_000 + 4001 * n
+        flips += [Flip(at, gate, True), Flip(at + width, gate, False)]
+    recording = stand.record(flips, flips[-1].cycle // _MS + 5)
+    return len(recording.events) - recording.certificate.glitches, recording.certificate.glitches

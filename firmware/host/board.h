@@ -1,0 +1,79 @@
+/* A board of plain C: the core on the host, in a virtual time of 16 MHz ticks.
+ *
+ * It models what of an AVR board decides what the core sees: pin-change flags of two ports, an
+ * interrupt with entry and length, a line with a rate, and turns of the main loop that take time.
+ */
+#ifndef BOARD_H
+#define BOARD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define BOARD_HZ 16000000u
+#ifndef BOARD_STREAMS
+#define BOARD_STREAMS 0
+#endif
+#define BOARD_CAPACITY (BOARD_STREAMS ? 192 : 1024)
+#define BOARD_GATES 16
+#define BOARD_GATE_MASK 0xFFFFu
+#define BOARD_RELEASES 2
+#define BOARD_LATENCY HOST_LATENCY
+#define BOARD_BUSY (HOST_BUSY + HOST_LATENCY)
+#define BOARD_FLASH
+#define BOARD_KEPT
+
+#define HOST_LATENCY 12 /* from an edge to its stamp */
+#define HOST_BUSY 60    /* from its stamp to the interrupt's end */
+#define HOST_TURN 200   /* how long a turn of the main loop takes */
+#define HOST_BYTE 320   /* how long a byte on the line takes: 500 kbaud */
+
+static const char board_type[] = "host";
+static const char board_channels[] = "B0 B1 B2 B3 B4 B5 B6 B7 K0 K1 K2 K3 K4 K5 K6 K7";
+
+static inline uint8_t board_flash8(const void *at)
+{
+    return *(const uint8_t *)at;
+}
+
+static inline uint32_t board_flash32(const void *at)
+{
+    return *(const uint32_t *)at;
+}
+
+static inline uint16_t board_gates_of(uint8_t port_0, uint8_t port_1)
+{
+    return (uint16_t)(port_0 | port_1 << 8);
+}
+
+static inline uint16_t board_ports_of(uint16_t gates)
+{
+    return gates;
+}
+
+uint16_t board_count(void);
+uint16_t board_count_roughly(void);
+void board_publish_half(uint8_t half);
+uint16_t board_gates(void);
+void board_watch(uint16_t gates);
+uint8_t *board_entries_end(void);
+bool board_has_entry(const uint8_t *entry);
+void board_entries_start(uint8_t *memory, uint8_t *stop);
+bool board_entries_rewind(const uint8_t *from, uint8_t *to);
+void board_entries_stop(uint8_t *slot);
+uint16_t board_entries_lost(void);
+void board_outputs(uint8_t release, bool sync);
+uint16_t board_fire(uint8_t release);
+bool board_stopped(void);
+bool board_reference(uint16_t *count);
+void board_sense_begin(void);
+bool board_sensed(uint16_t *count);
+bool board_receive(uint8_t *byte);
+bool board_send_ready(void);
+void board_send(uint8_t byte);
+void board_led(bool on);
+void board_kick(void);
+void board_name(uint8_t name[8]);
+void board_rename(const uint8_t name[8]);
+
+#endif

@@ -1,0 +1,231 @@
+"""What each scene costs, from the simplest to the richest, and how little the simpler ones.
+
+Counts are the same on every run of one Python version. Times are not: every scene is timed in
+every round, ratios are taken within a round, and medians are given with their quartiles.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from rig.bench.scene_ladder import Scene, ladder
+from rig.errors import RigError
+from rig.predictions import predictions
+from rig.protocol.reader import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from rig.protocol.scene import Protocol
+
+PACKAGES = ("numpy", "yaml", "scipy", "matplotlib")
+"""Large packages that a scene may or may not load."""
+_PROBE = "from rig.bench.scene_probe import main; main()"
+_PROBES = 3
+_ROOT = Path(__file__).parents[2]
+_TURN_S = 0.002  # long for the clock, short between two interruptions
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Median and quartiles of all rounds."""
+
+    median: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What does not depend on the machine's mood.
+
+    Attributes
+    ----------
+    modules
+        Names of all modules that ``rig predict`` has loaded, Python's own included.
+    peak_bytes
+        Most memory resident.
+    operations
+        Bytecodes to ``read``, ``describe`` and ``predict``.
+    evaluations
+        How often the prediction evaluates what `rig.bench.scene_probe.COUNTED` names.
+    """
+
+    modules: tuple[str, ...]
+    peak_bytes: float
+    operations: dict[str, int]
+    evaluations: dict[str, int]
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """Those of `PACKAGES` that are loaded."""
+        return tuple(name for name in PACKAGES if name in self.modules)
+
+    @property
+    def rooms(self) -> tuple[str, ...]:
+        """Our own modules."""
+        return tuple(name for name in self.modules if name.partition(".")[0] == "rig")
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """One line of the table.
+
+    Attributes
+    ----------
+    seconds
+        Of the whole commands ``check`` and ``predict``, Python's start included, and of the
+        prediction alone (``compute``).
+    ratios
+        The same over those of the simplest scene.
+    """
+
+    scene: str
+    account: Account
+    seconds: dict[str, Spread]
+    ratios: dict[str, Spread]
+
+
+def scenes(
+    ready: Iterable[Path], rounds: int, say: Callable[[str], None] = lambda _: None
+) -> list[Cost]:
+    """Measure every scene of `rig.bench.scene_ladder.ladder`, then ready protocols.
+
+    Parameters
+    ----------
+    ready
+        Protocol files; they come in order of what a prediction takes.
+    rounds
+        Of timing.
+    say
+        Told what goes on.
+
+    Raises
+    ------
+    InputError
+        If a protocol file is bad.
+    RigError
+        If a scene's process fails.
+    """
+    extra = [Scene(path.stem, path.read_text("utf-8")) for path in ready]
+    with TemporaryDirectory() as folder:
+        wanted = [*ladder(), *extra]
+        files = [Path(folder) / f"{number}.yaml" for number in range(len(wanted))]
+        read = [parse(one.text, one.name) for one in wanted]
+        for one, file in zip(wanted, files, strict=True):
+            file.write_text(one.text, "utf-8")
+        say("counting …")
+        accounts = [account(file) for file in files]
+        say("timing …")
+        times = _timed(files, read, rounds)
+    costs = [
+        Cost(one.name, counted, _spreads(mine), _ratios(mine, times[0]))
+        for one, counted, mine in zip(wanted, accounts, times, strict=True)
+    ]
+    steps = len(costs) - len(extra)
+    by_work = sorted(costs[steps:], key=lambda cost: cost.account.operations["predict"])
+    return [*costs[:steps], *by_work]
+
+
+def account(file: Path) -> Account:
+    """Have a fresh process predict a protocol and tell what that took.
+
+    Raises
+    ------
+    RigError
+        If the process fails, or counts differently when asked again.
+    """
+    told = [json.loads(_child("-c", _PROBE, str(file))) for _ in range(_PROBES)]
+    peak = statistics.median(one.pop("peak_bytes") for one in told)
+    first, *others = told
+    if any(other != first for other in others):
+        raise RigError(f"{file.name}: two equal runs do not count the same")
+    return Account(tuple(first["modules"]), peak, first["operations"], first["evaluations"])
+
+
+def _child(*arguments: str) -> str:
+    """Run Python and return what it prints."""
+    search = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(  # noqa: S603 - this very Python
+        [sys.executable, *arguments],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+        env={**os.environ, "PYTHONPATH": search, "PYTHONHASHSEED": "0", "PYTHONUTF8": "1"},
+    )
+    if done.returncode:
+        raise RigError("a scene could not be measured", done.stderr.strip())
+    return done.stdout
+
+
+def _timed(
+    files: Sequence[Path], protocols: Sequence[Protocol], rounds: int
+) -> list[dict[str, list[float]]]:
+    """Seconds by scene and kind, one a round."""
+    times: list[dict[str, list[float]]] = [
+        {"check": [], "predict": [], "compute": []} for _ in files
+    ]
+    turns = []
+    for protocol in protocols:
+        _seconds(protocol, 3)  # a first call is slow
+        turns.append(max(1, round(_TURN_S / _seconds(protocol, 3))))
+    for _ in range(rounds):
+        for file, protocol, often, mine in zip(files, protocols, turns, times, strict=True):
+            for command in ("check", "predict"):
+                begin = time.perf_counter()
+                _child("-m", "rig", command, str(file))
+                mine[command].append(time.perf_counter() - begin)
+            mine["compute"].append(_seconds(protocol, often))
+    return times
+
+
+def _seconds(protocol: Protocol, turns: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(turns):
+        predictions(protocol)
+    return (time.perf_counter() - begin) / turns
+
+
+def _spreads(times: Mapping[str, Sequence[float]]) -> dict[str, Spread]:
+    return {kind: _spread(values) for kind, values in times.items()}
+
+
+def _ratios(
+    times: Mapping[str, Sequence[float]], simplest: Mapping[str, Sequence[float]]
+) -> dict[str, Spread]:
+    return {
+        kind: _spread([a / b for a, b in zip(values, simplest[kind], strict=True)])
+        for kind, values in times.items()
+    }
+
+
+def _spread(values: Sequence[float]) -> Spread:
+    if len(values) == 1:
+        return Spread(values[0], values[0], values[0])
+    low, median, high = statistics.quantiles(values, n=4, method="inclusive")
+    return Spread(median, low, high)
+
+
+def as_json(costs: Sequence[Cost]) -> dict[str, Any]:
+    """Everything as plain objects; ``added`` lists what a scene loads beyond the simplest."""
+    simplest = set(costs[0].account.modules)
+    return {
+        "python": sys.version.split()[0],
+        "scenes": [
+            {
+                **asdict(cost),
+                "packages": cost.account.packages,
+                "added": [name for name in cost.account.modules if name not in simplest],
+            }
+            for cost in costs
+        ],
+    }

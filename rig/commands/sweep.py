@@ -1,0 +1,132 @@
+"""``rig sweep``."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.output import say
+from rig.errors import InputError
+from rig.files import replacing, write_atomic
+from rig.protocol import reader
+from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
+from rig.sweep.executors import Inline, cores, processes
+from rig.sweep.layout import Layout, lay_out
+from rig.sweep.progress import Progress
+from rig.sweep.tables import provenance, write_csv, write_npz
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator
+    from concurrent.futures import Executor
+
+    from rig.protocol.scene import Protocol
+
+INTERRUPTED = 130
+_KINDS = (".csv", ".npz", ".svg")
+# Processes take longer to start than this process to compute so many pieces.
+_FEW_CHUNKS = 20
+
+
+def main(arguments: Namespace) -> int:
+    """Compute a sweep and write it to a file."""
+    output = Path(arguments.output)
+    _check_place(output)
+    protocol = reader.read(arguments.protocol)
+    layout = lay_out(protocol, arguments.vary)
+    if output.suffix == ".svg":
+        _check_drawable(layout)
+    try:
+        swept = _computed(layout, arguments.jobs, arguments.cluster)
+        _write(output, protocol, layout, swept)
+    except KeyboardInterrupt:
+        say("rig: interrupted; nothing was written")
+        return INTERRUPTED
+    say(f"{output}: {_summary(swept)}")
+    return 0
+
+
+def _computed(layout: Layout, jobs: int | None, address: str | None) -> Swept:
+    progress = Progress(layout.grid.size, sys.stderr)
+    length = chunk_length(layout.chain.rods)
+    chunks = -(-layout.grid.size // length)
+    try:
+        with _executor(jobs, address, chunks) as (executor, workers):
+            # Twice as many pieces as workers, so that none waits for its next one.
+            return compute(layout, executor, 2 * workers, length, progress.show)
+    finally:
+        progress.clear()
+
+
+def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
+    facts = provenance(protocol, layout)
+    if output.suffix == ".svg":
+        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
+
+        write_atomic(output, sweep_figure(facts, layout, swept))
+        return
+    with replacing(output) as stream:
+        if output.suffix == ".npz":
+            write_npz(stream, facts, protocol.text, layout, swept)
+        else:
+            write_csv(stream, facts, layout, swept)
+
+
+@contextmanager
+def _executor(jobs: int | None, address: str | None, chunks: int) -> Iterator[tuple[Executor, int]]:
+    """Choose who computes, and say how many they are."""
+    if address is not None:
+        from rig.sweep.cluster import cluster  # noqa: PLC0415 - it needs Dask
+
+        with cluster(address) as found:
+            yield found
+        return
+    workers = min(cores() if jobs is None else jobs, chunks)
+    if workers == 1 or (jobs is None and chunks < _FEW_CHUNKS):
+        yield Inline(), 1
+        return
+    with processes(workers) as pool:
+        yield pool, workers
+
+
+def _check_place(output: Path) -> None:
+    """Find out before a long computation what would go wrong after it."""
+    if output.suffix not in _KINDS:
+        raise InputError(
+            f"{output}: the ending {output.suffix or 'is missing and'} says no kind of file",
+            f"end the name in one of {', '.join(_KINDS)}",
+        )
+    if not output.parent.is_dir():
+        raise InputError(f"cannot write {output}: there is no folder {output.parent}")
+    if output.suffix == ".svg":
+        import_module("matplotlib")
+
+
+def _check_drawable(layout: Layout) -> None:
+    axes = layout.grid.axes
+    if layout.layered:
+        inclines = ", ".join(f"{value:g}" for value in axes[0].values)
+        raise InputError(
+            f"a picture shows one incline, and the plan has {inclines} degrees",
+            f"choose one, as in --vary incline={axes[0].values[-1]:g}deg, or write .csv or .npz",
+        )
+    if len(axes) > 2:
+        raise InputError(
+            f"a picture has one axis or two, not {len(axes)}", "hold some, or write .csv or .npz"
+        )
+
+
+def _summary(swept: Swept) -> str:
+    """Count the points, and those of which a reader of the file should know."""
+    parts = [f"{swept.notes.size} points"]
+    for number, words in (
+        (swept.notes.size - int(swept.in_domain.sum()), "beyond the model's domain"),
+        (int(((swept.notes & NO_ANSWER) > 0).sum()), "without an answer"),
+        (int(((swept.notes & PILE) > 0).sum()), "on the pile"),
+    ):
+        if number:
+            parts.append(f"{number} {words}")
+    return ", ".join(parts)

@@ -1,0 +1,1 @@
+"""Putting the firmware onto a board, and asking the board whether it is there."""

@@ -1,0 +1,116 @@
+"""Calling avrdude, showing what it says, and saying what went wrong."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rig.errors import DeviceError, InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rig.flash.boards import Target
+
+_RESET = "press the board's reset button and try again"
+_CAUSES = (
+    # What it says, in lower case, over the versions 6 and 7; the first that fits counts.
+    (
+        "expected signature for",
+        "the chip on this port is another one than --board says",
+        "look at what is printed on the board: --board mega or --board uno",
+    ),
+    (
+        "mismatch",
+        "what was read back is not what was written",
+        "try once more, with another cable; if it stays so, the board's flash is worn out",
+    ),
+    ("permission denied", "permission denied", "join the group that owns it (often dialout)"),
+    ("busy", "another program uses it", "close that program"),
+    ("no such file", "it is gone", "was the board unplugged?"),
+    ("programmer is not responding", "its boot loader does not answer", f"wrong --board? {_RESET}"),
+    ("timeout", "its boot loader does not answer", f"wrong --board? {_RESET}"),
+    ("not in sync", "its boot loader does not answer", f"wrong --board? {_RESET}"),
+)
+
+
+def find_avrdude(path: str | None) -> str:
+    """Find the program.
+
+    Parameters
+    ----------
+    path
+        Where the user says it is; `None`: wherever programs are.
+
+    Raises
+    ------
+    InputError
+        It is not there.
+    """
+    found = shutil.which(path or "avrdude")
+    if found:
+        return found
+    if path:
+        raise InputError(f"{path} is no program that can be run")
+    raise InputError("avrdude is not installed", "apt-get install avrdude, or say --avrdude PATH")
+
+
+def write_flash(avrdude: str, target: Target, port: str, image: Path) -> None:
+    """Write an image into a board's flash; avrdude reads it back and compares.
+
+    Parameters
+    ----------
+    avrdude
+        The program.
+    target
+        The kind of board.
+    port
+        Device path.
+    image
+        Intel HEX file.
+
+    Raises
+    ------
+    DeviceError
+        Avrdude failed.
+    """
+    command = [avrdude, "-p", target.part, "-c", target.programmer, "-b", str(target.baudrate)]
+    # -D: a boot loader erases each page as it comes, and knows no erasing of the whole chip.
+    command += ["-D", "-P", port, "-U", f"flash:w:{image}:i"]
+    try:
+        child = subprocess.Popen(  # noqa: S603 - no shell, and the user's own program
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            bufsize=0,
+        )
+    except OSError as error:
+        raise InputError(f"cannot run {avrdude}: {error.strerror}") from error
+    with child:
+        said = _shown(child)
+    if child.returncode:
+        raise DeviceError(*_cause(port, child.returncode, said))
+
+
+def _shown(child: subprocess.Popen[bytes]) -> str:
+    """Pass on what a program says as it says it: its progress is a line that grows."""
+    said = bytearray()
+    assert child.stdout is not None
+    while chunk := child.stdout.read(4096):
+        said += chunk
+        with suppress(OSError):
+            sys.stderr.write(chunk.decode(errors="replace"))
+            sys.stderr.flush()
+    return said.decode(errors="replace")
+
+
+def _cause(port: str, code: int, said: str) -> tuple[str, str]:
+    lower = said.lower()
+    for clue, cause, hint in _CAUSES:
+        if clue in lower:
+            return f"flashing {port} failed: {cause}", hint
+    return f"flashing {port} failed: avrdude ended with {code}", "see its last lines above"

@@ -1,0 +1,109 @@
+"""A firmware image (Intel HEX): whether it is whole, for which board, and of which version.
+
+Both names are read from the image itself, where the firmware keeps them for `Identity`: so what a
+board must answer after flashing is written down nowhere a second time.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError, Problem
+from rig.flash.boards import FIRMWARE, TARGETS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rig.flash.boards import Target
+
+_DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)
+_ERASED = b"\xff"
+_VERSION = re.compile(rb"(%s [0-9][\w.+-]*)\0" % FIRMWARE.encode())
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """A firmware image.
+
+    Attributes
+    ----------
+    path
+        The file.
+    firmware
+        Name and version, as `Identity.firmware` will have it.
+    size
+        Bytes of flash it needs.
+    """
+
+    path: Path
+    firmware: str
+    size: int
+
+
+def read_image(path: Path, target: Target) -> Image:
+    """Read an image and see whether it may be flashed.
+
+    Parameters
+    ----------
+    path
+        The file.
+    target
+        The board it is meant for.
+
+    Raises
+    ------
+    InputError
+        The file is damaged, is no firmware of this project, or is for another board.
+    """
+    try:
+        text = path.read_text("ascii")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is no Intel HEX file") from None
+    flash = _flash(text, path)
+    versions = set(_VERSION.findall(flash))
+    boards = [t.name for t in TARGETS.values() if t.name.encode() + b"\0" in flash]
+    if len(versions) != 1 or len(boards) != 1:
+        raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
+    if boards != [target.name]:
+        raise InputError(f"{path} is for an {boards[0]}, not for an {target.name}")
+    if len(flash) > target.flash_limit:
+        raise InputError(f"{path} would overwrite the boot loader of an {target.name}")
+    return Image(path, versions.pop().decode(), len(flash))
+
+
+def _flash(text: str, path: Path) -> bytes:
+    """Lay the records out from address 0; what no record fills stays erased."""
+    flash = bytearray()
+    base = 0
+    number = 0
+    for number, line in enumerate(text.splitlines(), 1):
+
+        def fault(what: str, at: int = number) -> InputError:
+            return InputError(problems=[Problem(str(path), at, 1, "", what)])
+
+        try:
+            record = bytes.fromhex(line.removeprefix(":"))
+        except ValueError:
+            record = b""
+        if not line.startswith(":") or len(record) < 5 or len(record) != record[0] + 5:
+            raise fault("no record of an Intel HEX file")
+        if sum(record) & 0xFF:
+            raise fault("the checksum is wrong: the file is damaged")
+        kind, data = record[3], record[4:-1]
+        if kind == _DATA:
+            at = base + int.from_bytes(record[1:3], "big")
+            if at + len(data) > 1 << 20:
+                raise fault("an address beyond any board's flash")
+            flash.extend(_ERASED * (at + len(data) - len(flash)))
+            flash[at : at + len(data)] = data
+        elif kind in {_SEGMENT, _LINEAR}:
+            base = int.from_bytes(data, "big") << (4 if kind == _SEGMENT else 16)
+        elif kind == _END:
+            return bytes(flash)
+        elif kind not in {_START_SEGMENT, _START}:
+            raise fault(f"an unknown kind of record: {kind}")
+    raise InputError(problems=[Problem(str(path), number, 1, "", "the end of the file is missing")])

@@ -1,0 +1,66 @@
+"""Flashing a board, from the file to the handshake."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig.flash.avrdude import find_avrdude, write_flash
+from rig.flash.boards import TARGETS
+from rig.flash.handshake import identify
+from rig.flash.image import read_image
+from rig.link.port import open_port
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.messages import Identity
+
+
+def flash(
+    board: str, port: str, image: str | None, avrdude: str | None, say: Callable[[str], None]
+) -> Identity:
+    """Flash a board and verify it.
+
+    Parameters
+    ----------
+    board
+        A key of `TARGETS`.
+    port
+        Device path.
+    image
+        Intel HEX file; `None`: the one that comes with this program.
+    avrdude
+        Path of avrdude; `None`: wherever programs are.
+    say
+        Told what happens.
+
+    Returns
+    -------
+    Identity
+        What the board answered.
+
+    Raises
+    ------
+    InputError
+        No real port, no such program, or a file that must not be flashed.
+    DeviceError
+        The port cannot be used, flashing failed, or the board does not say what it should.
+    """
+    if "://" in port:
+        raise InputError(
+            f"{port} is no board that can be flashed",
+            "give the device path of a real one, such as /dev/ttyACM0",
+        )
+    target = TARGETS[board]
+    program = find_avrdude(avrdude)
+    file = read_image(target.shipped if image is None else Path(image), target)
+    # Avrdude tries for ever to open a port that is not there, and does not ask who uses it.
+    with closing(open_port(port)):
+        pass
+    say(f"writing {file.firmware} ({file.size} bytes) to the {target.name} at {port}")
+    write_flash(program, target, port, file.path)
+    say("written; asking the board who it is")
+    return identify(port, target, file.firmware)

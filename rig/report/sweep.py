@@ -1,0 +1,145 @@
+"""A sweep as a picture: curves along one parameter, or maps over two."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, canvas
+from rig.sweep.compute import PILE
+from rig.sweep.variables import VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
+
+    from rig.model.batch import Flags, Floats
+    from rig.sweep.compute import Swept
+    from rig.sweep.grid import Axis
+    from rig.sweep.layout import Layout
+
+_LINE_HEIGHT = 0.17  # inches
+_WRAP = 110
+
+
+def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
+    """Draw a sweep.
+
+    Parameters
+    ----------
+    facts
+        Its provenance: named below the picture, and whole in the file's metadata.
+    layout, swept
+        With one axis or two; the first of two goes to the right.
+
+    Returns
+    -------
+    str
+        SVG. Where the model has no answer the picture is empty; where the point lies beyond its
+        domain, maps are hatched and curves dashed. Colours span what is found inside the domain.
+
+    Raises
+    ------
+    InputError
+        If matplotlib is not installed.
+    """
+    caption = _caption(facts)
+    foot = _LINE_HEIGHT * (caption.count("\n") + 2)
+    flat = len(layout.grid.axes) == 2
+    with canvas(
+        (3.4, foot) if flat else (2.9, 2.9, foot),
+        9.0 if flat else 7.0,
+        simulated=False,
+        columns=2 if flat else 1,
+        description=json.dumps(facts, ensure_ascii=False),
+    ) as drawing:
+        for panel, values, label in (
+            (drawing.axes[0], 100.0 * swept.separation_m, "separation Δz (cm)"),
+            (drawing.axes[1], swept.speed_m_s, "end speed V (m/s)"),
+        ):
+            if flat:
+                image = _map(panel, layout.grid.axes, values, swept.in_domain)
+                drawing.figure.colorbar(image, ax=panel, label=label)
+            else:
+                _curve(panel, layout.grid.axes[0], values, swept)
+                panel.set_ylabel(label)
+        drawing.axes[1].set_xlabel(VARIABLES[layout.grid.axes[0].name].label)
+        for below in drawing.axes[2:]:
+            below.axis("off")
+        below = drawing.axes[2]
+        said = below.text(0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes)
+        said.set_in_layout(False)  # it may pass under the other map
+        # The caption's panel must not take the labels of the axis all panels share.
+        for panel in drawing.axes[:2] if flat else drawing.axes[1:2]:
+            panel.tick_params(labelbottom=True)
+    return drawing.svg
+
+
+def _caption(facts: Mapping[str, Any]) -> str:
+    """Say in a few lines where the picture comes from."""
+    fixed = ", ".join(f"{name} = {value:g}" for name, value in facts["fixed"].items())
+    lines = [
+        f"{facts['title']}; chain {facts['chain']['name']}",
+        f"fixed: {fixed or 'nothing'}",
+        f"{facts['made_by']}; protocol SHA-256 {facts['protocol_sha256'][:16]}…",
+        "hatched or dashed: beyond the model's domain; empty: no answer",
+    ]
+    return "\n".join(textwrap.fill(line, _WRAP) for line in lines)
+
+
+def _curve(panel: Axes, axis: Axis, values: Floats, swept: Swept) -> None:
+    for piled in (False, True):
+        # The step from the pile to the surface is no part of either curve.
+        part = np.where(((swept.notes & PILE) > 0) == piled, values, np.nan)
+        panel.plot(axis.values, part, "--", color=MUTED, linewidth=1.2)
+        panel.plot(axis.values, np.where(swept.in_domain, part, np.nan), color=MODEL)
+    panel.margins(x=0.0)
+
+
+def _map(panel: Axes, axes: tuple[Axis, ...], values: Floats, inside: Flags) -> AxesImage:
+    from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415 - see canvas
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
+
+    across, up = axes
+    found = np.isfinite(values)
+    # Next to a singular Eq. 13 speeds have no bound, and nothing else would show a difference.
+    scale = values[inside] if inside.any() else values[found]
+    low, high = (float(scale.min()), float(scale.max())) if scale.size else (0.0, 1.0)
+    image = panel.imshow(
+        values.T,
+        origin="lower",
+        aspect="auto",
+        extent=(*_sides(across), *_sides(up)),
+        interpolation="none",
+        vmin=low,
+        vmax=high,
+        cmap=LinearSegmentedColormap.from_list("model", [MODEL_BAND, MODEL]),
+    )
+    outside = found & ~inside
+    if outside.any():
+        hatched = panel.contourf(
+            across.values, up.values, outside.T, levels=[0.5, 1.5], colors="none", hatches=["////"]
+        )
+        hatched.set_edgecolor(MUTED)
+        hatched.set_linewidth(0.0)
+    levels = [level for level in MaxNLocator(7).tick_values(low, high) if low < level < high]
+    if levels:
+        lines = panel.contour(
+            across.values, up.values, values.T, levels=levels, colors=INK, linewidths=0.5
+        )
+        panel.clabel(lines, fontsize=7.0)
+    panel.grid(visible=False)
+    panel.set_xlabel(VARIABLES[across.name].label)
+    panel.set_ylabel(VARIABLES[up.name].label)
+    return image
+
+
+def _sides(axis: Axis) -> tuple[float, float]:
+    """Return where an axis begins and ends so that each value is the middle of its cell."""
+    half = (axis.values[1] - axis.values[0]) / 2.0
+    return axis.values[0] - half, axis.values[-1] + half

@@ -1,0 +1,1 @@
+"""Maps of the model's predictions over a grid of parameters."""

@@ -1,0 +1,188 @@
+"""Every point of a grid, computed in pieces by any executor, always to the same bits.
+
+The coefficients of Eq. 9 are found here and the falls by the executor. Coefficients rest on sines,
+whose last digit differs between processors; a fall is made of sums, products, quotients and square
+roots, which are the same everywhere. Nor does a point depend on its neighbours, so neither how the
+grid is cut nor who computes a piece can be seen in the results.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import FIRST_COMPLETED, wait
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from rig.model.batch import Impacts, falls, given_impacts, surface_impacts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Executor, Future
+
+    from numpy.typing import NDArray
+
+    from rig.model.batch import Flags, Floats
+    from rig.sweep.layout import Layout
+
+    _Numbers: TypeAlias = float | Floats
+    _Ends: TypeAlias = tuple[Floats, Floats]
+
+NOT_SLIDING, ABOVE_HALF, NO_ANSWER, PILE = 1, 2, 4, 8
+NOTES = {
+    NOT_SLIDING: "the rod does not slide",
+    ABOVE_HALF: "α is above ½",
+    NO_ANSWER: "no answer: Eq. 13 is singular",
+    PILE: "rods gather on a pile: level, with the pile's own restitution",
+}
+"""Meaning of each bit of a point's notes; all but the last leave the model's domain."""
+
+_RODS_IN_CHUNK = 2_500_000  # 30 ms or so: nobody waits long for a running piece to end
+
+
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """Results at every point; all arrays have the shape of the grid.
+
+    Attributes
+    ----------
+    separation_m, speed_m_s
+        Δz and V as in `rig.model.fall.Fall`, the longer free chain counted; `NaN` where there is
+        no answer.
+    notes
+        Sum of the bits in `NOTES` that apply.
+    """
+
+    separation_m: Floats
+    speed_m_s: Floats
+    notes: NDArray[np.uint8]
+
+    @property
+    def in_domain(self) -> Flags:
+        """Where nothing leaves the model's domain."""
+        inside: Flags = (self.notes & ~np.uint8(PILE)) == 0
+        return inside
+
+
+def chunk_length(rods: int) -> int:
+    """Return how many falls make one piece of work."""
+    return max(1, _RODS_IN_CHUNK // rods)
+
+
+def compute(
+    layout: Layout,
+    executor: Executor,
+    slots: int,
+    length: int,
+    show: Callable[[int], None] = lambda _done: None,
+) -> Swept:
+    """Compute a sweep.
+
+    Parameters
+    ----------
+    layout
+        What to compute.
+    executor
+        Who computes the falls.
+    slots
+        How many pieces may be under way together; bounds the memory they take.
+    length
+        Points of a piece, as from `chunk_length`.
+    show
+        Called with the number of points done after each piece.
+    """
+    size = layout.grid.size
+    separation, speed, notes = np.empty(size), np.empty(size), np.empty(size, np.uint8)
+    under_way: dict[Future[_Ends], slice] = {}
+    done = 0
+
+    def collect() -> None:
+        nonlocal done
+        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+            place = under_way.pop(future)
+            separation[place], speed[place] = future.result()
+            done += place.stop - place.start
+            show(done)
+
+    try:
+        for chunk in layout.grid.chunks(length):
+            if len(under_way) >= slots:
+                collect()
+            values = _values(layout, chunk)
+            impacts = _impacts(layout, values)
+            place = slice(chunk.start, chunk.stop)
+            notes[place] = _notes(layout, values, impacts)
+            future = executor.submit(
+                ends,
+                layout.chain.masses,
+                layout.chain.heights,
+                impacts.alpha,
+                impacts.gamma,
+                values["drop"],
+                values["gravity"],
+                values.get("initial_speed", 0.0),
+            )
+            under_way[future] = place
+        while under_way:
+            collect()
+    finally:
+        for future in under_way:
+            future.cancel()
+    separation += layout.longer_m
+    notes[np.isnan(separation)] = NO_ANSWER
+    shape = layout.grid.shape
+    return Swept(separation.reshape(shape), speed.reshape(shape), notes.reshape(shape))
+
+
+def ends(
+    masses: Sequence[float],
+    heights: Sequence[float],
+    alpha: _Numbers,
+    gamma: _Numbers,
+    drop: _Numbers,
+    gravity: _Numbers,
+    initial_speed: _Numbers,
+) -> _Ends:
+    """Return Δz and V of falls; the work that is sent to others, so it takes and returns little.
+
+    Parameters
+    ----------
+    masses, heights
+        Shape ``(rods,)``, as in `rig.model.chain.Chain`.
+    alpha, gamma, drop, gravity, initial_speed
+        Shape ``(falls,)`` or one number for all; m, m/s² and m/s.
+    """
+    found = falls(masses, heights, given_impacts(alpha, gamma), drop, gravity, initial_speed)
+    return found.separation_m, found.speed_m_s
+
+
+def _values(layout: Layout, chunk: range) -> dict[str, _Numbers]:
+    """Every parameter at the points of a piece."""
+    places = np.unravel_index(np.arange(chunk.start, chunk.stop), layout.grid.shape)
+    varied = {
+        axis.name: np.array(axis.values)[place]
+        for axis, place in zip(layout.grid.axes, places, strict=True)
+    }
+    return {**layout.fixed, **varied}
+
+
+def _impacts(layout: Layout, values: dict[str, _Numbers]) -> Impacts:
+    if "alpha" in values:
+        return given_impacts(values["alpha"], values["gamma"])
+    return surface_impacts(
+        values["incline"],
+        values["restitution"],
+        values["friction"],
+        values["inertia"],
+        inertia_z=layout.chain.inertia_z,
+        gamma=values.get("gamma"),
+        pile=layout.pile,
+    )
+
+
+def _notes(layout: Layout, values: dict[str, _Numbers], impacts: Impacts) -> NDArray[np.uint8]:
+    found = NOT_SLIDING * ~impacts.sliding
+    found |= ABOVE_HALF * (impacts.alpha > 0.5)
+    if layout.pile is not None:
+        found = found | PILE * np.less(values["incline"], layout.pile.below_deg)
+    return found.astype(np.uint8)

@@ -1,0 +1,47 @@
+"""What a simulated port needs of whatever board is at its other end."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Line(Protocol):
+    """A board's bytes on their way to the host."""
+
+    @property
+    def byte_ns(self) -> int:
+        """How long a byte takes, either way."""
+        ...
+
+    def next_arrival_ns(self) -> int | None:
+        """Say when the host gets the next byte, as far as is known."""
+        ...
+
+    def arrived(self, now_ns: int) -> bytes:
+        """Take what has reached the host by now."""
+        ...
+
+
+class Board(Protocol):
+    """A board in virtual time."""
+
+    @property
+    def line(self) -> Line:
+        """What it sends."""
+        ...
+
+    def receive(self, start_ns: int, data: bytes) -> None:
+        """Take bytes from the host; the first begins to arrive at `start_ns`."""
+        ...
+
+    def reset(self, at_ns: int) -> None:
+        """Restart, as opening the port does to a Mega."""
+        ...
+
+    def advance(self, until_ns: int) -> None:
+        """Let happen what happens until a moment."""
+        ...
+
+    def next_ns(self) -> int | None:
+        """Say when something will happen next, or `None` when nothing will."""
+        ...

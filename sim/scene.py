@@ -1,0 +1,116 @@
+"""The scene behind a simulated port, as its URL describes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypedDict
+from urllib.parse import parse_qsl, urlsplit
+
+from rig.errors import InputError
+from rig.protocol import reader
+from sim.dials import read_dials
+from sim.lab import ChainLab
+from sim.truth import append_truth
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sim.dials import Dials
+    from sim.truth import Truth
+
+
+class LineDials(TypedDict):
+    """How bad the line is, see `SimulatedSerial.disturb`."""
+
+    jitter_s: float
+    corrupt: float
+    lose: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The chains, and how everything around them is disturbed.
+
+    Attributes
+    ----------
+    pace
+        Real seconds a virtual second takes.
+    """
+
+    lab: ChainLab
+    dials: Dials
+    seed: int
+    pace: int
+
+    def line(self) -> LineDials:
+        """Name the dials of the line."""
+        dials = self.dials
+        return {"jitter_s": dials.latency, "corrupt": dials.corrupt, "lose": dials.lose}
+
+
+def read_settings(url: str) -> dict[str, str]:
+    """Take a URL's query apart.
+
+    Raises
+    ------
+    InputError
+        A setting that is given twice.
+    """
+    parts = urlsplit(url)
+    settings: dict[str, str] = {}
+    for name, text in parse_qsl(parts.query, keep_blank_values=True):
+        if name in settings:
+            raise InputError(f"{parts.scheme}://: {name} is given twice")
+        settings[name] = text
+    return settings
+
+
+def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
+    """Hang the chains.
+
+    Parameters
+    ----------
+    scheme
+        Of the URL, for messages.
+    settings
+        ``protocol``, and perhaps ``seed``, ``truth``, ``pace`` and dials.
+
+    Raises
+    ------
+    InputError
+        No protocol, a bad one, or a setting that makes no sense.
+    """
+    rest = dict(settings)
+    source = rest.pop("protocol", "")
+    if not source:
+        raise InputError(
+            f"{scheme}:// needs a scene to simulate", f"name one: {scheme}://?protocol=FILE.yaml"
+        )
+    seed = _number(scheme, "seed", rest.pop("seed", "0"))
+    pace = _number(scheme, "pace", rest.pop("pace", "0"))
+    truth = rest.pop("truth", "")
+    dials = read_dials(rest, scheme)
+    if truth:
+        _check_writable(scheme, Path(truth))
+
+    def tell(what: Truth) -> None:
+        if truth:
+            append_truth(Path(truth), what)
+
+    return Scene(ChainLab(reader.read(source), dials, seed, tell), dials, seed, pace)
+
+
+def _check_writable(scheme: str, path: Path) -> None:
+    """Find out now: in the middle of a drop the fault would look like a broken cable."""
+    try:
+        path.open("a", encoding="utf-8").close()
+    except OSError as error:
+        raise InputError(f"{scheme}://: truth: cannot write {path}: {error.strerror}") from None
+
+
+def _number(scheme: str, name: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f"{scheme}://: {name}: {text!r} is not a whole number") from None

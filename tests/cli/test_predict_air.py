@@ -1,0 +1,215 @@
+"""Predictions with an initial speed and in air, against the model and against many digits."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from mpmath import mp
+
+from rig.errors import InputError
+from rig.model.chain import Chain
+from rig.model.drag import drag_fall
+from rig.model.fall import fall, kicks
+from rig.predictions import predictions
+from rig.protocol.reader import parse, read
+from sim.dials import Dials
+from sim.lab import ChainLab
+from tests.cli.lab import PROTOCOLS, short
+from tests.model.air_reference import reference_air_fall, reference_way
+from tests.model.reference import printed_alpha, reference_fall
+
+TIGHT = 1e-13
+MASSES = (0.0241, 0.0203, 0.0162, 0.0131, 0.0108, 0.0089, 0.0072, 0.0060)
+GAPS = (0.051, 0.049, 0.048, 0.047, 0.046, 0.045, 0.044)
+HEIGHTS = tuple(sum(GAPS[:k]) for k in range(8))
+SCENE = """\
+protocol: 1
+chains:
+  A: {rods: 6, length: 250 mm, mass: 10 g, diameter: 8 mm, rod_length: 90 mm, tilt: 15 deg}
+surface: {restitution: 0.5, friction: 0.2}
+drop: 150 mm
+gravity: 9.81 m/s^2
+plan: {incline: 50 deg}
+"""
+EVEN = tuple(0.05 * k for k in range(6))
+UNLIKE = "  B: {like: A, length: 300 mm, diameter: 12 mm}\nsurface"
+
+
+@pytest.fixture
+def predict(call, tmp_path):
+    def ask(text):
+        path = tmp_path / "p.yaml"
+        path.write_text(text, "utf-8")
+        done = call("predict", path, "--json")
+        assert (done.code, done.err) == (0, "")
+        (line,) = json.loads(done.out)["predictions"]
+        return line
+
+    return ask
+
+
+def close(line, wanted, relative=TIGHT):
+    found = line["separation_m"], line["speed_m_s"], line["fall_time_s"]
+    assert found == pytest.approx([float(x) for x in wanted], rel=relative, abs=0.0)
+
+
+def end_of(end):
+    return end.separation_m, end.speed_m_s, end.time_s
+
+
+def rod_drag(coefficient, density, diameter, length, tilt_deg):
+    """½ ρ C d L v² of the speed across the rod, and of that force the upright part."""
+    across = mp.cos(mp.radians(tilt_deg))
+    return coefficient * density * diameter * length * across**2 / 2 * across
+
+
+def test_the_ready_protocol_is_the_reference():
+    protocol = PROTOCOLS / "weighed-chain.yaml"
+    with mp.workdps(50):
+        drags = [rod_drag(1.1, 1.2, 0.0127, 0.102, 12)] * 8
+    for line, incline in zip(predictions(read(protocol)), (40, 60), strict=True):
+        alpha = printed_alpha(0.5, 0.2, incline, mp.mpf(1) / 3)
+        wanted = reference_air_fall(MASSES, HEIGHTS, alpha, mp.mpf(4) / 3, drags, 0.18, 9.81, 1.5)
+        close(line, wanted)
+        assert line["model"] == "discrete, drag"
+        assert line["separation_u_m"] > 0.0
+
+
+def test_initial_speed_is_used(predict):
+    line = predict(SCENE + "initial_speed: 2 m/s\n")
+    alpha = printed_alpha(0.5, 0.2, 50, mp.mpf(1) / 3)
+    close(line, reference_fall((1,) * 6, EVEN, alpha, mp.mpf(4) / 3, 0.15, 9.81, 2))
+    close(line, end_of(fall(Chain((1.0,) * 6, EVEN), line["alpha"], 4 / 3, 0.15, 9.81, 2.0)))
+    assert line["free_fall_speed_m_s"] == pytest.approx((4 + 2 * 9.81 * 0.4) ** 0.5, rel=1e-15)
+    assert line["model"] == "discrete"
+
+
+def test_a_chain_in_air_by_its_terminal_speed(predict):
+    line = predict(SCENE + "drag: {terminal_speed: 12 m/s}\n")
+    alpha = printed_alpha(0.5, 0.2, 50, mp.mpf(1) / 3)
+    kappa = 9.81 / 144
+    close(line, reference_air_fall((1,) * 6, EVEN, alpha, mp.mpf(4) / 3, (kappa,) * 6, 0.15, 9.81))
+    gains = kicks(Chain((1.0,) * 6, EVEN), [line["alpha"]] * 6, 4 / 3)
+    close(line, end_of(drag_fall(Chain((1.0,) * 6, EVEN), gains, [kappa] * 6, 0.15, 9.81)))
+    vacuum = predict(SCENE)
+    assert line["speed_m_s"] < vacuum["speed_m_s"]
+    assert line["free_fall_speed_m_s"] < vacuum["free_fall_speed_m_s"]
+
+
+def test_a_free_fall_in_air(predict):
+    text = SCENE.replace("surface: {restitution: 0.5, friction: 0.2}\n", "")
+    text = text.replace("plan: {incline: 50 deg}\n", "initial_speed: 1 m/s\n")
+    line = predict(text + "drag: {terminal_speed: 12 m/s}\n")
+    with mp.workdps(40):
+        # v falls short of the terminal speed by a factor that e^(−2κd) gives.
+        left = mp.exp(-2 * mp.mpf(9.81) / 144 * mp.mpf(0.4))
+        speed = mp.sqrt(144 - (144 - 1) * left)
+        time = mp.mpf(12) / mp.mpf(9.81) * (mp.atanh(speed / 12) - mp.atanh(mp.mpf(1) / 12))
+    assert line["speed_m_s"] == pytest.approx(float(speed), rel=1e-14)
+    assert line["fall_time_s"] == pytest.approx(float(time), rel=1e-14)
+    assert line["model"] == "free fall, drag"
+    fast = predict(text)
+    assert fast["speed_m_s"] == pytest.approx((1 + 2 * 9.81 * 0.4) ** 0.5, rel=1e-15)
+    assert fast["fall_time_s"] == pytest.approx((fast["speed_m_s"] - 1) / 9.81, rel=1e-14)
+
+
+def test_unlike_chains_differ_in_the_air_too(predict):
+    """The free chain is longer and thicker: longer by 5 cm, and held back more."""
+    line = predict(SCENE.replace("surface", UNLIKE) + "drag: {coefficient: 1.1}\n")
+    with mp.workdps(50):
+        mine, its = (rod_drag(mp.mpf(1.1), mp.mpf(1.204), d, 0.09, 15) for d in (0.008, 0.012))
+        alpha = printed_alpha(0.5, 0.2, 50, mp.mpf(1) / 3)
+        end = reference_air_fall((0.01,) * 6, EVEN, alpha, mp.mpf(4) / 3, (mine,) * 6, 0.15, 9.81)
+        way = reference_way((its,) * 6, (0.01,) * 6, mp.mpf(9.81), mp.mpf(0), end.time)
+        close(line, (mp.mpf(0.15) + mp.mpf(0.3) - way, end.speed, end.time))
+    assert line["notes"] == ["chains are unlike: A strikes"]
+    thicker = UNLIKE.replace("length: 300 mm, ", "")
+    line = predict(SCENE.replace("surface", thicker) + "drag: {coefficient: 1.1}\n")
+    assert line["notes"] == ["chains are unlike: A strikes"]
+    assert predict(SCENE.replace("surface", thicker))["notes"] == []
+
+
+def test_uncertain_speed_and_drag_widen_the_prediction(predict):
+    for key, sure, more in (
+        ("initial_speed: 2 m/s{}\n", 2.0, " ± 0.02 m/s"),
+        ("drag: {{coefficient: 1.1{}}}\n", 1.1, " ± 0.2"),
+        ("drag: {{terminal_speed: 12 m/s{}}}\n", 12.0, " ± 1 m/s"),
+    ):
+        exact = predict(SCENE + key.format(""))
+        unsure = predict(SCENE + key.format(more))
+        assert exact["speed_u_m_s"] == 0.0
+        u = float(more.split()[1])
+        low, high = (
+            predict(SCENE + key.format("").replace(f"{sure:g}", repr(sure + d)))["speed_m_s"]
+            for d in (-u, u)
+        )
+        # First order; c goes as the terminal speed to the power of −2.
+        assert unsure["speed_u_m_s"] == pytest.approx(abs(high - low) / 2, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("line", "start"),
+    [
+        ("initial_speed: 2", "f:8:16: initial_speed: found '2' without a unit"),
+        ("initial_speed: -2 m/s", "f:8:16: initial_speed: found -2 m/s; accepted: 0 m/s to 1000"),
+        ("inital_speed: 2 m/s", "f:8:1: inital_speed: unknown key; did you mean initial_speed?"),
+        ("drag: 1.1", "f:8:7: drag: found 1.1; a mapping"),
+        ("drag: {coeficient: 1}", "f:8:8: drag.coeficient: unknown key; did you mean coefficient?"),
+        ("drag: {}", "f:8:7: drag: one of coefficient: 1.1 ± 0.2 and terminal_speed"),
+        ("drag: {coefficient: 1, terminal_speed: 2 m/s}", "f:8:7: drag: one of coefficient"),
+        ("drag: {coefficient: 0}", "f:8:21: drag.coefficient: found 0; accepted: above 0"),
+        ("drag: {coefficient: 1, air_density: 1.2}",
+         "f:8:37: drag.air_density: found '1.2' without a unit"),
+        ("drag: {coefficient: 1, density: 1 kg/m3}", "f:8:24: drag.density: unknown key; did you "
+         "mean air_density?"),
+        ("drag: {terminal_speed: 2 m/s, air_density: 1 kg/m3}",
+         "f:8:31: drag.air_density: the terminal speed says it all"),
+    ],
+)  # fmt: skip
+def test_each_fault_is_found_at_its_place(line, start):
+    with pytest.raises(InputError) as caught:
+        parse(f"{SCENE}{line}\n", "f")
+    (problem,) = caught.value.problems
+    assert str(problem).startswith(start)
+
+
+def test_a_coefficient_needs_masses_and_sizes():
+    text = SCENE.replace(", mass: 10 g, diameter: 8 mm, rod_length: 90 mm", "")
+    with pytest.raises(InputError, match="chain A lacks mass, diameter, rod_length"):
+        parse(text + "drag: {coefficient: 1}\n")
+    assert parse(text + "drag: {terminal_speed: 20 m/s}\n").drag.terminal_speed.value == 20.0
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ("initial_speed: 1 m/s", "initial_speed: the rig lets its chains go from rest"),
+        ("drag: {terminal_speed: 20 m/s}", "drag: edges are read as those of falls without air"),
+    ],
+)
+def test_what_cannot_be_measured_is_said_and_refused(call, tmp_path, more, why):
+    path, session, events = (tmp_path / name for name in ("p.yaml", "s.session", "e.csv"))
+    path.write_text(f"{short()}{more}\n", "utf-8")
+    events.write_text("run,channel,time_s,state\n1,0,0.1,1\n", "utf-8")
+    done = call("check", path)
+    assert (done.code, done.err) == (0, "")
+    assert f"  note: only predicted, not run: {why}" in done.out.splitlines()
+    for arguments in (
+        ("run", path, "--port", "sim://", "--session", session),
+        ("import", events, "--protocol", path, "--session", session),
+    ):
+        done = call(*arguments)
+        assert done.code == 2
+        assert f"{path}: only predicted, never measured, because of {why}" in done.err
+        assert not session.exists()
+    with pytest.raises(InputError, match="never measured"):
+        ChainLab(parse(path.read_text("utf-8")), Dials(), 1)
+
+
+def test_a_start_from_rest_may_be_said_aloud(call, tmp_path):
+    path = tmp_path / "p.yaml"
+    path.write_text(f"{short()}initial_speed: 0 m/s\n", "utf-8")
+    out = call("check", path).out
+    assert "only predicted" not in out
+    assert "  no drag: the air is left out" in out.splitlines()

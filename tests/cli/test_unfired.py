@@ -1,0 +1,184 @@
+"""A device that will not arm or fire costs time, and never a run."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import pytest
+
+from rig.daemon.station import Station
+from rig.runner import Campaign, Operator, run_protocol
+from rig.session.schema import RunState
+from rig.session.store import Session
+from tests.cli.lab import assert_whole, drops_of, log_of, truth_of
+
+ARMED, FIRED, INTERRUPTED = RunState.ARMED, RunState.FIRED, RunState.INTERRUPTED
+
+
+@pytest.fixture
+def run(call, tmp_path, fence):
+    return lambda: call(
+        "run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes"
+    )
+
+
+@pytest.fixture
+def once_armed(monkeypatch):
+    """Have something happen to the board right behind each of the first so many armings."""
+
+    def have(happen, times):
+        arm, number = Station.arm, count(1)
+
+        def armed(station, *what):
+            token = arm(station, *what)
+            if next(number) <= times:
+                port = station._port
+                port.board.advance(port.clock.now_ns())
+                happen(port)
+            return token
+
+        monkeypatch.setattr(Station, "arm", armed)
+
+    return have
+
+
+def flicker(port):
+    port.board.touch(1 << 1)
+    port.board.touch(0)
+
+
+def block(port):
+    port.board.touch(1 << 1)
+
+
+def press_stop(port):
+    port.board.stop(True)
+    port.board.stop(False)
+
+
+def stay_away(port):
+    port.clock.sleep(0.3)
+
+
+HAPPENINGS = [
+    (flicker, "gate 1 changed after arming"),
+    (block, "gate 1 is blocked"),
+    (press_stop, "the device disarmed itself: the emergency stop was opened"),
+    (stay_away, "the device disarmed itself: this program was silent for too long"),
+]
+
+
+@pytest.mark.parametrize(("happen", "why"), HAPPENINGS)
+def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, happen, why):
+    once_armed(happen, times=2)
+    done = run()
+    assert done.code == 0, done.err
+    assert done.err.count(f"not fired: {why}") == 2
+    entries = log_of(tmp_path / "s")[1]
+    unfired = [(n, state) for n in (1, 2) for state in (ARMED, FIRED, INTERRUPTED)]
+    assert entries[:7] == [*unfired, (3, ARMED)]
+    assert drops_of(tmp_path / "s") == [(1, 3), (2, 1)]
+    assert len(truth_of(tmp_path / "s")) == 2
+    with Session.open(tmp_path / "s", readonly=True) as session:
+        assert session.states()[2].reasons == (why,)
+    assert_whole(tmp_path / "s", 2)
+
+
+@pytest.mark.parametrize(("happen", "why"), HAPPENINGS)
+def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_armed, happen, why):
+    once_armed(happen, times=5)
+    done = run()
+    assert done.code == 4
+    assert why in done.err
+    assert "hint" in done.err
+    assert [n for n, state in log_of(tmp_path / "s")[1] if state == INTERRUPTED] == [1, 2, 3, 4, 5]
+    assert log_of(tmp_path / "s")[1][-1] == (5, INTERRUPTED)
+    assert run().code == 0
+    assert_whole(tmp_path / "s", 2)
+
+
+def test_a_slow_disk_does_not_disarm(run, tmp_path, monkeypatch):
+    """Between arming and firing the disk is waited for twice."""
+    commit, stations = Session.commit, []
+    connect = Station.connect
+
+    def slow(session):
+        commit(session)
+        if stations and stations[0]._port is not None:
+            stations[0].clock.sleep(0.2)
+
+    monkeypatch.setattr(Station, "connect", lambda s: (connect(s), stations.append(s)))
+    monkeypatch.setattr(Session, "commit", slow)
+    done = run()
+    assert done.code == 0
+    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+
+
+def test_a_station_that_waits_while_armed_stays_armed(run, monkeypatch):
+    arm = Station.arm
+
+    def patient(station, *what):
+        token = arm(station, *what)
+        station.wait(3.0)
+        return token
+
+    monkeypatch.setattr(Station, "arm", patient)
+    done = run()
+    assert done.code == 0
+    assert "not fired" not in done.err
+
+
+def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
+    prepare, waited = Campaign._prepare, []
+
+    def warm(campaign, *what):
+        prepare(campaign, *what)
+        clock, board = campaign.station.clock, campaign.station._port.board
+        board._controller.release.pulse(1, clock.now_ns(), 500_000)
+        waited.append(clock.now_ns())
+
+    monkeypatch.setattr(Campaign, "_prepare", warm)
+    arm = Station.arm
+
+    def armed(station, *what):
+        token = arm(station, *what)
+        waited.append(station.clock.now_ns())
+        return token
+
+    monkeypatch.setattr(Station, "arm", armed)
+    assert run().code == 0
+    for warmed, at in zip(waited[::2], waited[1::2], strict=True):
+        assert 2.0e9 < at - warmed < 2.1e9
+    assert [state for _, state in log_of(tmp_path / "s")[1]].count(ARMED) == 1
+
+
+@pytest.mark.parametrize(("looks", "code"), [(3, 0), (9, 4)])
+def test_an_open_stop_is_waited_for_a_little(run, tmp_path, monkeypatch, looks, code):
+    wait, number = Station.wait, count(1)
+
+    def waited(station, seconds, *more):
+        wait(station, seconds, *more)
+        step = next(number)
+        if step in {1, looks}:
+            station._port.board.stop(step == 1)
+
+    monkeypatch.setattr(Station, "wait", waited)
+    done = run()
+    assert done.code == code
+    assert ("the emergency stop is open" in done.err) == (code == 4)
+    assert len(drops_of(tmp_path / "s")) == (2 if code == 0 else 0)
+
+
+def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fence):
+    asked = []
+
+    def ask(what):
+        asked.append(what)
+        stations[0]._port.board.stop(len(asked) == 1)
+
+    stations, connect = [], Station.connect
+    monkeypatch.setattr(Station, "connect", lambda s: (connect(s), stations.append(s)))
+    operator = Operator(say=lambda _: None, ask=ask)
+    run_protocol(str(fence), "sim://", str(tmp_path / "s"), operator, 1)
+    assert asked[1].startswith("not armed: the emergency stop is open; ")
+    assert_whole(tmp_path / "s", 2)

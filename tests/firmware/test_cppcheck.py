@@ -1,0 +1,64 @@
+"""cppcheck finds nothing in the firmware, as each board compiles it."""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+
+from tests.firmware.toolchain import FIRMWARE, need
+
+# The compiler's own headers stay out: what the tool knows of an 8-bit AVR and its library is in
+# its platform and library files.
+AVR = ["--platform=avr8", "--library=avr", "-D__GNUC__", "-DF_CPU=16000000UL", "-DBAUD=500000"]
+BOARDS = {
+    "atmega2560": [*AVR, "-D__AVR_ATmega2560__", "-Iavr", "avr", "atmega2560"],
+    "atmega328p": [*AVR, "-D__AVR_ATmega328P__", "-Iavr", "avr", "atmega328p"],
+    "host": ["--platform=unix64", "-DBOARD_STREAMS=1", "host"],
+}
+WRONG = """
+#include <stdint.h>
+#include <util/atomic.h>
+uint8_t wrong(void)
+{
+    uint8_t a[4] = {0};
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { a[4] = 1; }
+    return a[0];
+}
+"""
+
+
+def cppcheck(board: str, *more: object) -> subprocess.CompletedProcess[str]:
+    need("cppcheck")
+    return subprocess.run(
+        [
+            "cppcheck",
+            "--quiet",
+            "--std=c11",
+            "--enable=warning,performance,portability",
+            "--error-exitcode=1",
+            '-DFIRMWARE_VERSION="0"',
+            "-Icore",
+            f"-I{board}",
+            "core",
+            *BOARDS[board],
+            *map(str, more),
+        ],
+        cwd=FIRMWARE,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_nothing_is_found(board):
+    done = cppcheck(board)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_fault_would_be_found(tmp_path):
+    (tmp_path / "wrong.c").write_text(WRONG)
+    done = cppcheck("atmega328p", tmp_path / "wrong.c")
+    assert done.returncode == 1
+    assert "arrayIndexOutOfBounds" in done.stderr

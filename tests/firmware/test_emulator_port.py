@@ -1,0 +1,217 @@
+"""``emu://`` and the pty, with the real firmware behind them."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+
+import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.errors import DeviceError, InputError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.clock import tick_rate
+from rig.link.frames import Decoder
+from rig.link.messages import pack_label
+from rig.link.port import open_port, port_clock
+from rig_emulator import pty
+from rig_emulator.wiring import BOARDS, firmware_for
+from tests.firmware.toolchain import make
+
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+FENCE = PROTOCOLS / "picket-fence.yaml"
+HZ = 16_000_000
+ORDER = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _built():
+    make("all")
+
+
+def url(protocol: Path = FENCE, **settings: object) -> str:
+    said = {"protocol": str(protocol), **settings}
+    return "emu://?" + "&".join(f"{name}={quote(str(value))}" for name, value in said.items())
+
+
+def drop_from(device: Device, gates: int = 0b11, record_ms: int = 600):
+    label = pack_label(1, 1)
+    device.fire(device.arm(label=label, gates=gates, record_ms=record_ms, **ORDER))
+    drop = device.collect(label)
+    device.acknowledge(label, drop.certificate.crc32)
+    return drop
+
+
+def talk(where: str):
+    """Have one drop: all bytes with their times, the drop, the device's identity, its port."""
+    port = open_port(where)
+    chunks: list[tuple] = []
+    device = Device(port, port_clock(port), lambda *chunk: chunks.append(chunk))
+    identity = device.connect()
+    return chunks, drop_from(device), identity, port
+
+
+@pytest.mark.parametrize("board", sorted(BOARDS))
+def test_a_drop_is_the_truth_to_the_cycle(tmp_path, board):
+    file = tmp_path / "truth.jsonl"
+    _, drop, identity, port = talk(url(board=board, seed=3, truth=file, clock="2000 ppm"))
+    (line,) = (json.loads(text) for text in file.read_text("utf-8").splitlines())
+    assert drop.faults == ()
+    edges = [(channel, blocked) for _, channel, blocked, _ in line["edges"]]
+    assert [(edge.channel, edge.blocked) for edge in drop.edges] == edges
+    assert len(edges) > 20
+    for edge, (seconds, *_) in zip(drop.edges, line["edges"], strict=True):
+        assert abs(edge.tick - seconds * HZ * 1.002) <= 5  # edges come in mid-instruction
+    assert identity.gates == len(BOARDS[board].gates)
+    # What the outputs did: the release for as long as ordered, the sync for the whole recording.
+    history = [change for change in port.board.history if change.pin != BOARDS[board].led]
+    (on, off), (high, low) = (
+        [change.cycle for change in history if change.pin == pin]
+        for pin in (BOARDS[board].releases[0], BOARDS[board].sync)
+    )
+    assert on == high
+    assert abs(off - on - 80e-3 * HZ) < 1e-3 * HZ
+    assert abs(low - high - 600e-3 * HZ) < 10e-3 * HZ
+    assert (port.board.avr.overruns, port.board.avr.watchdog_resets) == (0, 0)
+
+
+def test_the_same_seed_gives_the_same_conversation_byte_for_byte():
+    one, two, other = (talk(url(seed=seed)) for seed in (3, 3, 4))
+    assert one[:3] == two[:3]
+    assert one[2].unique_id != other[2].unique_id
+    assert one[1].edges != other[1].edges
+
+
+def test_a_bad_line_still_gives_the_whole_drop_once(tmp_path):
+    file = tmp_path / "truth.jsonl"
+    bad, clean = (
+        talk(url(seed=2, truth=file, **faults))
+        for faults in ({"corrupt": "0.5 %", "lose": "0.5 %"}, {})
+    )
+    assert len(bad[1].edges) == len(clean[1].edges) > 20
+    for edge, other in zip(bad[1].edges, clean[1].edges, strict=True):
+        assert edge[1:] == other[1:]
+        assert abs(edge.tick - other.tick) <= 5  # another instruction was interrupted
+    assert len(bad[0]) > len(clean[0])  # something had to be said twice
+    assert len(file.read_text("utf-8").splitlines()) == 2  # a repeated FIRE does not let go twice
+
+
+def test_the_clock_dial_shows_in_the_pings():
+    port = open_port(url(clock="-1300 ppm"))
+    device = Device(port, port_clock(port))
+    device.connect()
+    pings = []
+    for n in range(20):
+        port_clock(port).sleep(0.1 + 0.037 * (n % 7))
+        ping = device.ping()
+        assert ping is not None
+        pings.append(ping)
+    rate = tick_rate(pings, HZ)
+    assert abs(rate.hz / HZ - 1 + 1300e-6) < 4 * rate.u_hz / HZ < 200e-6
+
+
+def test_a_read_waits_in_virtual_time_only():
+    port = open_port(url(latency="0 s"))
+    Device(port, port_clock(port)).connect()
+    start, real = port.clock.now_ns(), time.perf_counter()
+    port.timeout = 0.25
+    assert port.read(1) == b""
+    assert port.clock.now_ns() - start == pytest.approx(0.25e9, rel=1e-4)
+    assert time.perf_counter() - real < 10
+
+
+def test_opening_resets_the_board():
+    port = open_port(url(latency="0 s"))
+    for _ in range(2):
+        port.timeout = None
+        start = port.read(1)
+        port.timeout = 0.1
+        (frame,) = Decoder().feed(start + port.read(64))
+        boot = wire.unpack(frame.type, frame.payload)
+        assert isinstance(boot, wire.Boot)
+        assert boot.cause & 2
+        port.close()
+        port.open()
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"board": "due"}, "no board 'due'"),
+        ({"board": "uno", "protocol": PROTOCOLS / "inclined-uniform.yaml"}, "no gate 1[2-5]"),
+        ({"elf": "nowhere.elf"}, "cannot read nowhere.elf"),
+        ({"elf": __file__}, "is no AVR firmware"),
+        ({"seed": "one"}, "emu://: seed"),
+        ({"skew": "2 ms"}, "emu://: unknown dial 'skew'"),
+        ({"protocol": ""}, "emu:// needs a scene"),
+    ],
+)
+def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
+    with pytest.raises(InputError, match=complaint):
+        open_port(url(**settings))
+
+
+def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
+    package = tmp_path / "rig"
+    (package / "flash").mkdir(parents=True)
+    monkeypatch.setattr("rig_emulator.wiring.rig.__file__", str(package / "__init__.py"))
+    with pytest.raises(InputError, match="no firmware for atmega2560") as caught:
+        firmware_for(BOARDS["mega"])
+    assert "make -C firmware" in caught.value.hint
+    shipped = package / "flash" / "atmega2560.hex"
+    shipped.touch()
+    assert firmware_for(BOARDS["mega"]) == shipped
+
+
+class Terminal:
+    """The pty program, started as a user would."""
+
+    def __init__(self, link: Path, *arguments: str) -> None:
+        command = [sys.executable, "-m", "rig_emulator.pty", "--link", str(link), *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.path = self.process.stdout.readline().strip()
+
+    def end(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        code = self.process.wait(timeout=20)
+        self.process.stdout.close()
+        return code
+
+
+def test_the_pty_is_a_board_to_any_program(tmp_path):
+    link = tmp_path / "board"
+    terminal = Terminal(link, "--protocol", str(FENCE), "quiet=1")
+    try:
+        assert str(link.readlink()) == terminal.path
+        port = open_port(str(link))
+        device = Device(port, port_clock(port))
+        identity = device.connect(boot_wait_s=0)
+        assert len(drop_from(device).edges) > 20
+        port.close()
+        port = open_port(terminal.path)
+        device = Device(port, port_clock(port))
+        assert device.connect(boot_wait_s=0) == identity
+        terminal.process.send_signal(signal.SIGUSR1)
+        with pytest.raises(DeviceError, match="restarted"):
+            device.collect(pack_label(1, 1), timeout=10.0)
+        port.close()
+    finally:
+        code = terminal.end()
+    assert code == 0
+    assert not link.is_symlink()
+
+
+def test_the_pty_says_what_is_wrong(capsys, tmp_path):
+    assert pty.main(["--elf", str(tmp_path / "nothing.elf")]) == 2
+    assert "cannot read" in capsys.readouterr().err
+    assert pty.main(["--protocol", str(FENCE), "skew=1"]) == 2
+    assert "unknown dial 'skew'" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        pty.main(["quiet"])
+    assert "NAME=VALUE" in capsys.readouterr().err

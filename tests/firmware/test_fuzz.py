@@ -1,0 +1,79 @@
+"""The core under the address and undefined-behaviour sanitizers, fed with anything."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.link import messages as wire
+from tests.firmware.toolchain import FIRMWARE, make
+
+
+@pytest.fixture(scope="module")
+def survivor():
+    """A process that answers each input it survives: how often did the release go on?"""
+    make("build/host/fuzz")
+    with subprocess.Popen(
+        [FIRMWARE / "build/host/fuzz"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+
+        def run(script: bytes) -> int:
+            process.stdin.write(struct.pack("<I", len(script)) + script)
+            process.stdin.flush()
+            return int(process.stdout.readline() or -1)
+
+        yield run
+        process.stdin.close()
+
+
+def frame(message: wire.HostMessage, seq: int) -> bytes:
+    """The script's way to say: a frame with this content and the right CRC."""
+    code, payload = wire.pack(message)
+    body = bytes((code, seq, 0)) + payload
+    return bytes((1 | len(body) << 3, 0)) + body
+
+
+seqs = st.integers(1, 255)
+arms = st.builds(
+    wire.Arm,
+    label=st.integers(1, 2),
+    gates=st.sampled_from([1, 0x8001, 0xFFFF]),
+    release=st.sampled_from([0, 1, 3]),
+    pulse_us=st.sampled_from([0, 100, 80_000, 500_000]),
+    timeout_ms=st.sampled_from([1, 100, 5000]),
+    record_ms=st.sampled_from([1, 50, 1000]),
+)
+others = st.sampled_from(
+    [
+        *(wire.Identify(), wire.Ping(), wire.Status(), wire.Abort(), wire.Reference()),
+        *(wire.Read(1, 0, 5), wire.Read(1, 0, 0), wire.Acknowledge(1, 0)),
+    ]
+)
+steps = st.one_of(
+    st.builds(frame, st.one_of(arms, others), seqs),
+    st.builds(lambda seq: bytes((2, seq)), seqs),  # FIRE with the right token
+    st.builds(
+        lambda gate, gap: bytes((4 | gate << 3, gap)), st.integers(0, 31), st.integers(0, 255)
+    ),
+    st.builds(lambda shift, value: bytes((3 | shift << 3, value)), st.integers(0, 15), seqs),
+    st.builds(lambda opened: bytes((5, opened)), st.integers(0, 1)),
+    st.builds(lambda value: bytes((7, value)), st.integers(0, 255)),
+    st.binary(max_size=40),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(steps, max_size=60).map(b"".join))
+def test_no_input_breaks_the_core_or_holds_the_release(survivor, script):
+    assert survivor(script) >= 0
+
+
+def test_the_script_can_fire(survivor):
+    """Or else the test above would show nothing about the release."""
+    arm = wire.Arm(1, 1, 1, 500_000, 5000, 1000)
+    wait = bytes((3 | 15 << 3, 255))  # 8.4 million ticks
+    assert survivor(frame(arm, 1) + bytes((3 | 8 << 3, 255)) + bytes((2, 2)) + wait) == 1

@@ -1,0 +1,65 @@
+"""The images that the package ships are what the sources make, wherever they are built."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rig.flash.boards import TARGETS
+from rig.flash.image import read_image
+from tests.firmware.toolchain import FIRMWARE, need
+
+SOURCES = ("core", "avr", "atmega2560", "atmega328p", "Makefile", "size.py")
+BOTH = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
+
+
+def built_in(folder: Path) -> Path:
+    """Copy the sources there, build them, and say where the images are."""
+    need("make", "avr-gcc", "avr-objcopy")
+    wanted = re.search(r"^PREBUILT_WITH = (.+)$", (FIRMWARE / "Makefile").read_text(), re.MULTILINE)
+    found = subprocess.run(["avr-gcc", "-dumpversion"], capture_output=True, text=True, check=True)
+    if found.stdout.strip() != wanted[1]:
+        pytest.skip(f"the images are made with avr-gcc {wanted[1]}, here is {found.stdout}")
+    firmware, images = folder / "firmware", folder / "rig" / "flash"
+    images.mkdir(parents=True)
+    firmware.mkdir()
+    for name in SOURCES:
+        copy = shutil.copytree if (FIRMWARE / name).is_dir() else shutil.copy
+        copy(FIRMWARE / name, firmware / name)
+    done = subprocess.run(
+        ["make", "-C", firmware, "prebuilt"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return images
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return [
+        built_in(tmp_path_factory.mktemp("a")),
+        built_in(tmp_path_factory.mktemp("b") / "another name" / "much deeper"),
+    ]
+
+
+@BOTH
+def test_the_shipped_image_is_what_the_sources_make(target, images):
+    stale = "the sources have changed since: make -C firmware prebuilt"
+    assert (images[0] / target.image).read_bytes() == target.shipped.read_bytes(), stale
+
+
+@BOTH
+def test_the_folder_makes_no_difference(target, images):
+    one, other = ((folder / target.image).read_bytes() for folder in images)
+    assert one == other
+
+
+@BOTH
+def test_the_shipped_image_is_whole_and_for_its_board(target):
+    version = re.search(r"^VERSION = (.+)$", (FIRMWARE / "Makefile").read_text(), re.MULTILINE)
+    image = read_image(target.shipped, target)
+    assert image.firmware == f"chainrig {version[1]}"
+    assert 4096 < image.size < target.flash_limit

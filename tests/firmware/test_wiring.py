@@ -1,0 +1,98 @@
+"""What firmware/README.md and its pictures say about pins is what `board.h` says."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from firmware.pictures import BOARDS, draw
+from firmware.pins import read_pins
+from rig.flash.boards import TARGETS
+from tests.firmware.toolchain import FIRMWARE
+
+README = (FIRMWARE / "README.md").read_text(encoding="utf-8")
+WORDS = {
+    "RELEASE_0": "release 0",
+    "RELEASE_1": "release 1",
+    "SYNC": "sync out",
+    "STOP": "emergency stop",
+    "SENSE": "release sense",
+    "REFERENCE": "1 Hz reference",
+    "LED": "status LED",
+}
+# From the pin-out of each board, as its maker prints it: port by Arduino pin.
+MAPS = {
+    "atmega2560": {
+        **{f"D{53 - n}": f"PB{n}" for n in range(4)},
+        **{f"D{10 + n}": f"PB{4 + n}" for n in range(4)},
+        **{f"A{8 + n}": f"PK{n}" for n in range(8)},
+        "D5": "PE3",
+        "D3": "PE5",
+        "D2": "PE4",
+        "D22": "PA0",
+        "D24": "PA2",
+        "D49": "PL0",
+        "D48": "PL1",
+    },
+    "atmega328p": {
+        **{f"D{n}": f"PD{n}" for n in range(8)},
+        **{f"D{8 + n}": f"PB{n}" for n in range(6)},
+        **{f"A{n}": f"PC{n}" for n in range(6)},
+    },
+}
+EACH = pytest.mark.parametrize("board", BOARDS)
+
+
+def rows(board: str) -> list[tuple[str, ...]]:
+    """Return the rows of a board's table."""
+    _, _, section = README.partition(f"\n### {read_pins(board).board}\n")
+    section = section.partition("\n#")[0]
+    return [
+        tuple(cell.strip() for cell in line.strip("|").split("|"))
+        for line in section.splitlines()
+        if re.match(r"\| (?!what)[^-]", line)
+    ]
+
+
+@EACH
+def test_the_table_has_the_pins_of_the_board(board):
+    pins = read_pins(board)
+    gates = [(f"gate {n}", pin, MAPS[board][pin]) for n, pin in enumerate(pins.gates)]
+    others = [(WORDS[name], pin, port) for name, (pin, port) in pins.others.items()]
+    assert sorted(rows(board)) == sorted(gates + others)
+
+
+@EACH
+def test_pins_and_ports_belong_together(board):
+    for pin, port in read_pins(board).others.values():
+        assert MAPS[board][pin] == port
+    assert len(pins := read_pins(board).gates) == len(set(pins))
+
+
+@EACH
+def test_the_gates_are_as_many_as_the_firmware_says(board):
+    text = (FIRMWARE / board / "board.h").read_text()
+    said = int(re.search(r"#define BOARD_GATES (\d+)", text)[1])
+    assert len(read_pins(board).gates) == said
+    assert read_pins(board).board in {target.name for target in TARGETS.values()}
+
+
+@EACH
+def test_the_picture_is_up_to_date(board, tmp_path):
+    draw(read_pins(board), tmp_path / "it.svg")
+    now = (tmp_path / "it.svg").read_bytes()
+    assert now == (FIRMWARE / board / "wiring.svg").read_bytes(), "python firmware/pictures.py"
+
+
+@EACH
+def test_the_picture_names_every_pin(board):
+    text = (FIRMWARE / board / "wiring.svg").read_text(encoding="utf-8")
+    named = set(re.findall(r">\s*([AD]\d+)\s*<", text))
+    pins = read_pins(board)
+    assert named == {*pins.gates, *(pin for pin, _ in pins.others.values())}
+
+
+def test_links_lead_somewhere():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (FIRMWARE / target).exists(), target

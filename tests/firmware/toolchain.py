@@ -1,0 +1,32 @@
+"""Building the firmware, for the tests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+
+
+def need(*tools: str) -> None:
+    """Skip what needs a tool that is not here; on a build machine that is a failure."""
+    missing = [tool for tool in tools if shutil.which(tool) is None]
+    if missing and not os.environ.get("CI"):
+        pytest.skip(f"not installed: {', '.join(missing)}")
+    assert not missing, f"not installed: {', '.join(missing)}"
+
+
+def make(*targets: str) -> None:
+    """Bring targets of the firmware's Makefile up to date, one test process at a time."""
+    need("make", "gcc", *([] if all("host" in t for t in targets) else ["avr-gcc"]))
+    done = subprocess.run(
+        ["flock", str(FIRMWARE), "make", "-C", str(FIRMWARE), *targets],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,189 @@
+"""``rig flash``, with an avrdude that flashes nothing and a board that is there already."""
+
+from __future__ import annotations
+
+import os
+import pty
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import serial
+
+from rig.cli import main
+from rig.flash.boards import TARGETS
+from rig.flash.image import read_image
+from tests.flash.pty_board import PtyBoard
+
+VERSION = read_image(TARGETS["mega"].shipped, TARGETS["mega"]).firmware
+NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
+
+
+@pytest.fixture
+def flash(capsys):
+    def call(*arguments, board="mega"):
+        code = main(["flash", "--board", board, *map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return code, out, err
+
+    return call
+
+
+@contextmanager
+def silent_port():
+    """Open a port behind which nobody answers."""
+    ends = pty.openpty()
+    try:
+        yield os.ttyname(ends[1])
+    finally:
+        for end in ends:
+            os.close(end)
+
+
+def options(argv):
+    return dict(zip(argv[::2], argv[1::2], strict=True))
+
+
+@pytest.mark.parametrize("board", TARGETS)
+def test_a_board_is_flashed_and_asked(board, avrdude, flash):
+    target = TARGETS[board]
+    with PtyBoard(board=target.name, firmware=VERSION) as there:
+        code, out, err = flash("--port", there.path, board=board)
+    assert code == 0, err
+    assert out.startswith(f"{target.name}, {VERSION}, 16 gates, id ")
+    assert out.endswith(": flashed and verified\n")
+    assert out.count("\n") == 1
+    assert "Writing | ######## | 100%" in err
+    argv = list(avrdude.argv)
+    argv.remove("-D")
+    assert options(argv) == {
+        "-p": {"mega": "m2560", "uno": "m328p"}[board],
+        "-c": {"mega": "wiring", "uno": "arduino"}[board],
+        "-b": "115200",
+        "-P": there.path,
+        "-U": f"flash:w:{target.shipped}:i",
+    }
+
+
+def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch):
+    hex_file = tmp_path / "my own.hex"
+    hex_file.write_bytes(TARGETS["mega"].shipped.read_bytes())
+    monkeypatch.setenv("PATH", str(tmp_path / "empty"))
+    with PtyBoard(**NAMES) as there:
+        code, _, err = flash("--port", there.path, "--hex", hex_file, "--avrdude", avrdude.path)
+    assert code == 0, err
+    assert f"flash:w:{hex_file}:i" in avrdude.argv
+
+
+# What avrdude 6.3 and 7.1 say.
+@pytest.mark.parametrize(
+    ("says", "message"),
+    [
+        (
+            "avrdude: Device signature = 0x1e950f (probably m328p)\n"
+            "avrdude: Expected signature for ATmega2560 is 1E 98 01\n",
+            "the chip on this port is another one than --board says",
+        ),
+        (
+            "avrdude error: expected signature for ATmega2560 is 1E 98 01\n",
+            "the chip on this port is another one than --board says",
+        ),
+        ("avrdude: verification error, first mismatch at byte 0x0000\n", "what was read back"),
+        ("avrdude error: verification mismatch\n", "what was read back"),
+        ("avrdude: stk500_getsync() attempt 1 of 10: not in sync: resp=0x00\n", "boot loader"),
+        ("avrdude: stk500v2_ReceiveMessage(): timeout\n", "boot loader does not answer"),
+        ("avrdude OS error: cannot open port X: Device or resource busy\n", "another program"),
+        ("something else\n", "avrdude ended with 1"),
+    ],
+)
+def test_avrdude_fails(says, message, avrdude, flash):
+    avrdude.will(says, 1)
+    with silent_port() as path:
+        code, out, err = flash("--port", path)
+    assert (code, out) == (4, "")
+    assert says in err
+    assert f"flashing {path} failed: " in err
+    assert message in err
+    assert "hint: " in err
+
+
+def test_avrdude_is_missing(flash, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with silent_port() as path:
+        code, _, err = flash("--port", path)
+    assert code == 2
+    assert "apt-get install avrdude" in err
+
+
+def test_avrdude_is_not_where_it_should_be(flash, tmp_path):
+    code, _, err = flash("--port", "/dev/null", "--avrdude", tmp_path / "none")
+    assert code == 2
+    assert "is no program that can be run" in err
+
+
+def test_a_program_that_does_not_start(flash, tmp_path):
+    program = tmp_path / "avrdude"
+    program.write_bytes(b"#!/nowhere/at-all\n")
+    program.chmod(0o755)
+    with silent_port() as path:
+        code, _, err = flash("--port", path, "--avrdude", program)
+    assert code == 2
+    assert f"cannot run {program}" in err
+
+
+@pytest.mark.parametrize("port", ["sim://", "emu://", "replay://x", "socket://lab:7"])
+def test_a_simulation_is_not_flashed(port, avrdude, flash):
+    code, _, err = flash("--port", port)
+    assert code == 2
+    assert f"{port} is no board that can be flashed" in err
+    assert avrdude.argv is None
+
+
+def test_an_image_of_another_board_is_not_flashed(avrdude, flash):
+    code, _, err = flash("--port", "/dev/null", "--hex", TARGETS["uno"].shipped)
+    assert code == 2
+    assert "is for an Arduino Uno, not for an Arduino Mega 2560" in err
+    assert avrdude.argv is None
+
+
+def test_no_such_port(avrdude, flash, tmp_path):
+    code, _, err = flash("--port", tmp_path / "ttyACM0")
+    assert code == 4
+    assert "there is no such port" in err
+    assert avrdude.argv is None
+
+
+def test_a_port_somebody_uses(avrdude, flash):
+    with silent_port() as path, serial.Serial(path, exclusive=True):
+        code, _, err = flash("--port", path)
+    assert code == 4
+    assert "another program uses it" in err
+    assert avrdude.argv is None
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may open everything")
+def test_a_port_that_is_forbidden(avrdude, flash):
+    with silent_port() as path:
+        Path(path).chmod(0)
+        code, _, err = flash("--port", path)
+    assert code == 4
+    assert "dialout" in err
+    assert avrdude.argv is None
+
+
+@pytest.mark.parametrize(
+    "names", [{**NAMES, "board": "Arduino Uno"}, {**NAMES, "firmware": "chainrig 0.0.1"}]
+)
+def test_the_board_says_something_else(names, avrdude, flash):
+    with PtyBoard(**names) as there:
+        code, out, err = flash("--port", there.path)
+    assert (code, out) == (4, "")
+    assert f"answers as {names['board']}, {names['firmware']}" in err
+
+
+def test_the_board_says_nothing(avrdude, flash):
+    with silent_port() as path:
+        code, out, err = flash("--port", path)
+    assert (code, out) == (4, "")
+    assert f"{path} was flashed, but the firmware does not answer" in err

@@ -1,0 +1,93 @@
+"""A device under test with hands around it: gates, emergency stop, reference, release sense."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+from rig.link.messages import pack_label
+
+GATES = 0x0303
+LABEL = pack_label(7, 1)
+
+
+@dataclass
+class ScriptedLab:
+    """A lab whose drops are written down beforehand."""
+
+    hanging: int = 0
+    changes: list[tuple[float, int, bool]] = field(default_factory=list)
+    drops: list[int] = field(default_factory=list)
+
+    def rest(self, label: int) -> int:
+        return self.hanging
+
+    def drop(self, label: int) -> list[tuple[float, int, bool]]:
+        self.drops.append(label)
+        return self.changes
+
+
+def falling_rods(rods: int = 10, start_s: float = 0.01) -> list[tuple[float, int, bool]]:
+    """Write changes like those of two chains through two gates each; over after 0.11 s."""
+    changes = []
+    for channel, shift in ((0, 0.0), (1, 0.004), (8, 0.0007), (9, 0.0051)):
+        for rod in range(rods):
+            at = start_s + shift + 0.011 * rod - 0.0002 * rod**1.5
+            changes += [(at, channel, True), (at + 0.002, channel, False)]
+    return sorted(changes)
+
+
+class Bench(ABC):
+    """A device and its hands. `lab` is what its gates will see at the next ARM and FIRE.
+
+    What a bench has no hand for it leaves as it is here, and the tests that need it are skipped.
+    `tick_tolerance` is how far a stamp may be off besides the resonator's own error.
+    """
+
+    tick_tolerance = 1
+    can_preset_tick = False
+    can_stop = False
+    can_reference = False
+    can_sense = False
+    can_see_outputs = False
+
+    def __init__(self, lab: ScriptedLab) -> None:
+        self.lab = lab
+
+    @abstractmethod
+    def port(self): ...
+
+    @abstractmethod
+    def clock(self): ...
+
+    @abstractmethod
+    def touch(self, gates: int) -> None:
+        """Block exactly these gates now."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Press the reset button; the power stays on."""
+
+    @abstractmethod
+    def reopen(self) -> None:
+        """Close the port and open it again, without a reset."""
+
+    def preset_tick(self, seconds_before_wrap: float) -> None:
+        """Set the device's counter to so long before it wraps."""
+        raise NotImplementedError
+
+    def stop(self, opened: bool) -> None:
+        """Open or close the emergency stop now."""
+        raise NotImplementedError
+
+    def reference(self, times: list[float]) -> None:
+        """Give pulses of the 1 Hz reference, so many seconds from now."""
+        raise NotImplementedError
+
+    def sense(self, seconds: float) -> None:
+        """Change the release-sense input so long after the next FIRE."""
+        raise NotImplementedError
+
+    def outputs(self) -> int:
+        """Mask of the release outputs that are on now."""
+        raise NotImplementedError

@@ -1,0 +1,91 @@
+"""What the parts of the conformance suite share."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.errors import DeviceError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.messages import Reason
+from rig.link.refusals import DeviceRefusedError
+from rig.link.transcript import Received
+from rig.records import Drop
+from tests.link.bench import GATES, LABEL, Bench, ScriptedLab, falling_rods
+from tests.link.talk import arm
+
+
+class Suite:
+    """Tests of a device that `make` puts on a bench."""
+
+    def make(self, lab: ScriptedLab) -> Bench:
+        raise NotImplementedError
+
+    @pytest.fixture
+    def bench(self) -> Bench:
+        return self.make(ScriptedLab(changes=falling_rods()))
+
+    @pytest.fixture
+    def device(self, bench) -> Device:
+        device = Device(bench.port(), bench.clock())
+        device.connect()
+        return device
+
+    @pytest.fixture
+    def identity(self, device) -> wire.Identity:
+        return device.transcript.identity
+
+    @pytest.fixture
+    def watched(self, bench) -> Bench:
+        if not bench.can_see_outputs:
+            pytest.skip("the release outputs cannot be watched here")
+        return bench
+
+    @pytest.fixture
+    def stoppable(self, bench) -> Bench:
+        if not bench.can_stop:
+            pytest.skip("there is no hand at the emergency stop here")
+        return bench
+
+    def drop(self, device: Device, label: int = LABEL, **changes: int) -> Drop:
+        device.fire(arm(device, label, **changes))
+        return device.collect(label)
+
+    def release(self, device: Device, drop: Drop) -> None:
+        """Let the device forget a drop."""
+        label = wire.pack_label(drop.run, drop.attempt)
+        device.acknowledge(label, drop.certificate.crc32)
+
+    def check(self, bench: Bench, drop: Drop, identity: wire.Identity, faults=()) -> None:
+        """Compare a drop's edges with what the lab did."""
+        assert drop.faults == faults
+        done = [c for c in bench.lab.changes if GATES >> c[1] & 1]
+        assert [(e.channel, e.blocked) for e in drop.edges] == [(c[1], c[2]) for c in done]
+        for edge, (seconds, _, _) in zip(drop.edges, done, strict=True):
+            self.close(bench, identity, edge.tick, seconds)
+
+    def close(self, bench: Bench, identity: wire.Identity, ticks: int, seconds: float) -> None:
+        """Compare times; even a resonator 0.5 % off must fit."""
+        expected = seconds * identity.tick_hz
+        assert abs(ticks - expected) <= bench.tick_tolerance + 0.005 * expected
+
+    def refused(self, reason: Reason, call, *args, **kwargs) -> DeviceRefusedError:
+        with pytest.raises(DeviceRefusedError) as caught:
+            call(*args, **kwargs)
+        assert caught.value.reason is reason
+        assert caught.value.hint
+        return caught.value
+
+    def heard(self, bench: Bench, device: Device, seconds: float) -> list[wire.Message]:
+        """Listen in silence to what the device says of its own accord."""
+        end, messages = bench.clock().now_ns() + seconds * 1e9, []
+        while bench.clock().now_ns() < end:
+            messages += [r.message for r in device.poll() if isinstance(r, Received)]
+        return messages
+
+    def restart(self, bench: Bench, device: Device) -> None:
+        """Press reset, and see that the device says so."""
+        bench.reset()
+        with pytest.raises(DeviceError, match="restarted"):
+            self.heard(bench, device, 3.0)
+        device.connect(boot_wait_s=0)

@@ -1,0 +1,115 @@
+"""Holding a drop, reading it again, acknowledging it, and what a reset leaves."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.errors import DeviceError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.messages import Phase, Reason, pack_label
+from tests.link.bench import LABEL
+from tests.link.suite import Suite
+from tests.link.talk import Wire, arm
+
+
+class HoldSuite(Suite):
+    def test_a_drop_is_held_across_reconnects_and_silence(self, bench, device):
+        drop = self.drop(device)
+        bench.reopen()
+        bench.clock().sleep(0.4)
+        again = Device(bench.port(), bench.clock())
+        again.connect(boot_wait_s=0)
+        assert again.status().label == LABEL
+        assert again.fetch(LABEL) == drop
+        self.release(again, drop)
+
+    def test_any_part_can_be_read_again(self, bench):
+        line = Wire(bench)
+        events, certificate = line.drop()
+        for seq, (first, count) in enumerate([(0, 1), (5, 3), (len(events) - 2, 40)], start=3):
+            answer = line.ask(wire.Read(LABEL, first, count), seq)
+            assert (answer.label, answer.first) == (LABEL, first)
+            assert list(answer.events) == events[first : first + count]
+        many = line.ask(wire.Read(LABEL, 0, 255), 9)
+        assert many.first == 0
+        assert 0 < len(many.events) <= wire.EVENTS_PER_FRAME
+        assert list(many.events) == events[: len(many.events)]
+        assert line.ask(wire.Read(LABEL, 0, 0), 10) == certificate
+        answer = line.ask(wire.Read(LABEL, len(events), 1), 11)
+        assert answer == wire.Refused(Reason.BAD_PARAMETER, 0)
+        assert line.ask(wire.Read(LABEL + 1, 0, 1), 12) == wire.Refused(Reason.NO_SUCH_DROP, 0)
+
+    def test_only_the_right_crc_releases_a_drop(self, device):
+        self.refused(Reason.NO_SUCH_DROP, device.fetch, LABEL)
+        drop = self.drop(device)
+        self.refused(Reason.WRONG_CRC, device.acknowledge, LABEL, drop.certificate.crc32 ^ 1)
+        self.refused(Reason.NO_SUCH_DROP, device.acknowledge, LABEL ^ 1, drop.certificate.crc32)
+        assert device.status().phase is Phase.HOLDING
+        self.release(device, drop)
+        self.refused(Reason.NO_SUCH_DROP, self.release, device, drop)
+
+    def test_a_held_drop_forbids_arming(self, device):
+        self.drop(device)
+        error = self.refused(Reason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
+        assert "run 7" in error.message
+        self.refused(Reason.HOLDING_A_DROP, arm, device, LABEL)
+
+    def test_after_abort_the_same_label_may_be_armed_again(self, device):
+        self.drop(device)
+        device.abort()
+        assert device.status().phase is Phase.HOLDING
+        self.refused(Reason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
+        drop = self.drop(device)
+        assert drop.faults == ()
+
+    def test_abort_ends_a_recording_and_keeps_it(self, bench, device):
+        device.fire(arm(device, record_ms=20_000))
+        start = bench.clock().now_ns()
+        drop = device.collect(LABEL, stop=lambda: bench.clock().now_ns() > start + 60_000_000)
+        assert bench.clock().now_ns() < start + 1_000_000_000
+        assert drop.faults == ()
+        assert 0 < len(drop.edges) < len(bench.lab.changes)
+        assert device.status().phase is Phase.HOLDING
+
+    # -- resets
+
+    def test_a_reset_is_announced(self, bench, device, identity):
+        self.restart(bench, device)
+        assert device.transcript.identity == identity
+
+    def test_a_reset_disarms(self, bench, device):
+        token = arm(device)
+        self.restart(bench, device)
+        assert device.status().phase is Phase.IDLE
+        self.refused(Reason.NOT_ARMED, device.fire, token)
+
+    def test_a_held_drop_outlives_resets(self, bench, device):
+        drop = self.drop(device)
+        device.abort()
+        self.restart(bench, device)
+        self.restart(bench, device)
+        again = Device(bench.port(), bench.clock())
+        again.connect(boot_wait_s=0)
+        state = again.status()
+        assert (state.phase, state.label) == (Phase.HOLDING, LABEL)
+        assert state.events == drop.certificate.events
+        self.refused(Reason.HOLDING_A_DROP, arm, again)  # that ABORT came is forgotten
+        assert again.fetch(LABEL) == drop
+        self.release(again, drop)
+        self.restart(bench, device)
+        assert device.status().phase is Phase.IDLE
+
+    def test_a_reset_within_a_drop_is_seen_and_loses_it(self, bench, device):
+        device.fire(arm(device, record_ms=2000))
+        for _ in range(4):
+            device.poll()
+        bench.reset()
+        with pytest.raises(DeviceError, match="restarted"):
+            device.collect(LABEL)
+        (drop,) = device.transcript.unfinished()
+        assert drop == device.transcript.pending(LABEL)
+        assert any("restarted" in fault for fault in drop.faults)
+        device.connect(boot_wait_s=0)
+        self.refused(Reason.NO_SUCH_DROP, device.fetch, LABEL)
+        assert device.status().phase is Phase.IDLE

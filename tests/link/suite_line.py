@@ -1,0 +1,143 @@
+"""A bad line: repeats, losses, damage, junk, silence; and the replay of what was heard over it."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from rig.errors import DeviceTimeoutError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.messages import Phase, pack_label
+from rig.link.transcript import Transcript
+from rig.records import Drop, Edge, Ping
+from tests.link.bench import LABEL
+from tests.link.suite import Suite
+from tests.link.talk import LossyPort, NoisyPort, Wire, arm, order
+
+
+class LineSuite(Suite):
+    def test_a_repeated_request_is_answered_and_not_executed_again(self, bench):
+        line = Wire(bench)
+        armed = line.ask(order(), 1)
+        assert line.ask(order(), 1) == armed
+        line.say(wire.Fire(armed.token), 2)
+        heard = line.hear(0.01)
+        line.say(wire.Fire(armed.token), 2)
+        heard += line.hear_drop()
+        fired = [m for ack, m in heard if ack == 2]
+        assert len(fired) == 2
+        assert isinstance(fired[0], wire.Fired)
+        assert fired[0] == fired[1]
+        assert bench.lab.drops == [LABEL]
+        (end,) = [m for _, m in heard if isinstance(m, wire.DropCertificate)]
+        assert line.ask(wire.Acknowledge(LABEL, end.crc32), 3) == wire.Done()
+        assert line.ask(wire.Acknowledge(LABEL, end.crc32), 3) == wire.Done()
+
+    def test_a_repeated_refusal_is_the_same_refusal(self, bench):
+        line = Wire(bench)
+        bench.lab.hanging = 1
+        refused = line.ask(order(), 1)
+        bench.lab.hanging = 0
+        bench.touch(0)
+        assert line.ask(order(), 1) == refused
+        assert isinstance(line.ask(order(), 2), wire.Armed)
+
+    def test_the_same_seq_with_another_request_is_no_repeat(self, bench):
+        line = Wire(bench)
+        assert isinstance(line.ask(wire.Status(), 1), wire.State)
+        assert isinstance(line.ask(wire.Ping(), 1), wire.Pong)
+        armed = line.ask(order(), 1)
+        assert line.ask(wire.Status(), 2).phase is Phase.ARMED
+        assert line.ask(order(), 1) != armed
+
+    def test_frames_without_a_seq_are_passed_over(self, bench):
+        line = Wire(bench)
+        line.say(wire.Status(), 0)
+        assert line.hear() == []
+
+    def test_a_lost_request_is_sent_again(self, bench, device, identity):
+        port = LossyPort(bench)
+        device = Device(port, bench.clock())
+        device.connect(boot_wait_s=0)
+        port.lose_tx = 2
+        token = arm(device)
+        port.lose_tx = 2
+        device.fire(token)
+        self.check(bench, device.collect(LABEL), identity)
+        assert bench.lab.drops == [LABEL]
+
+    def test_a_lost_answer_to_fire_does_not_fire_again(self, bench):
+        port = LossyPort(bench)
+        device = Device(port, bench.clock())
+        device.connect()
+        token = arm(device)
+        port.lose_rx_until_ns = bench.clock().now_ns() + 80_000_000
+        device.fire(token)
+        assert bench.lab.drops == [LABEL]
+        self.check(bench, device.collect(LABEL), device.transcript.identity)
+
+    def test_lost_events_and_certificate_are_read_again(self, bench):
+        port = LossyPort(bench)
+        device = Device(port, bench.clock())
+        device.connect()
+        device.fire(arm(device))
+        port.lose_rx_until_ns = bench.clock().now_ns() + 200_000_000
+        self.check(bench, device.collect(LABEL), device.transcript.identity)
+
+    def test_repeated_pings_give_no_sample(self, bench):
+        port = LossyPort(bench)
+        device = Device(port, bench.clock())
+        device.connect()
+        port.lose_tx = 1
+        assert device.ping() is None
+        assert device.ping() is not None
+
+    def test_junk_on_the_line(self, bench, device):
+        noise = random.Random(3)
+        for _ in range(20):
+            bench.port().write(noise.randbytes(noise.randrange(1, 600)))
+            bench.port().write(b"\0")
+            assert device.status().phase is Phase.IDLE
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_one_percent_of_damaged_bytes_changes_nothing(self, bench, seed):
+        port = NoisyPort(bench.port(), 0.01, seed)
+        device = Device(port, bench.clock(), tries=40)
+        device.connect()
+        for run in range(3):
+            drop = self.drop(device, pack_label(run, 1))
+            self.check(bench, drop, device.transcript.identity)
+            self.release(device, drop)
+        assert device.transcript.bad_frames > 0
+        assert bench.lab.drops == [pack_label(run, 1) for run in range(3)]
+
+    def test_a_silent_device_is_a_time_out(self, bench):
+        port = LossyPort(bench)
+        port.lose_tx = 1000
+        with pytest.raises(DeviceTimeoutError) as caught:
+            Device(port, bench.clock()).connect()
+        assert "cable" in caught.value.hint
+
+    def test_the_recorded_bytes_give_the_same_records(self, bench):
+        chunks, live = [], []
+        port = NoisyPort(bench.port(), 0.003)
+        device = Device(
+            port,
+            bench.clock(),
+            lambda *chunk: chunks.append(chunk),
+            on_record=live.append,
+            tries=40,
+        )
+        device.connect()
+        device.ping()
+        pending = self.drop(device)
+        self.release(device, pending)
+        offline = Transcript()
+        records = [record for chunk in chunks for record in offline.feed(*chunk)]
+        assert records == live
+        assert [r for r in records if isinstance(r, Drop)] == [pending]
+        assert any(isinstance(r, Ping) for r in records)
+        assert isinstance(pending.edges[0], Edge)
+        assert offline.unfinished() == []

@@ -1,0 +1,108 @@
+"""What happens to many events, to events close together, and to pulses too short to be seen."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.messages import Reason
+from tests.link.bench import LABEL
+from tests.link.suite import Suite
+from tests.link.talk import LossyPort, Wire, arm
+
+_SPACING_S = 3e-4
+
+
+def blinking(count: int) -> list[tuple[float, int, bool]]:
+    return [(0.01 + _SPACING_S * n, 0, n % 2 == 0) for n in range(count)]
+
+
+def record_ms(count: int) -> int:
+    return round(1000 * _SPACING_S * count) + 40
+
+
+class MemorySuite(Suite):
+    def test_a_full_memory_is_counted(self, bench, device, identity):
+        if identity.streams:
+            pytest.skip("a device that streams does not keep a drop whole")
+        count = identity.capacity + 20
+        bench.lab.changes = blinking(count)
+        drop = self.drop(device, record_ms=record_ms(count))
+        assert len(drop.edges) == drop.certificate.events == identity.capacity
+        assert drop.certificate.overflows == 20
+        assert drop.faults == ("20 events lost: the device's memory was full",)
+
+    def test_a_streamed_drop_may_be_longer_than_the_memory(self, bench, device, identity):
+        if not identity.streams:
+            pytest.skip("a device that keeps a drop whole")
+        count = identity.capacity + 60
+        bench.lab.changes = blinking(count)
+        drop = self.drop(device, record_ms=record_ms(count))
+        self.check(bench, drop, identity)
+        late = self.reconnected(bench).fetch(LABEL)
+        assert late.edges == drop.edges[-len(late.edges) :]
+        assert any("no longer kept" in fault for fault in late.faults)
+
+    def test_a_streaming_device_reads_out_what_it_keeps(self, bench, identity):
+        if not identity.streams:
+            pytest.skip("a device that keeps a drop whole")
+        count = identity.capacity + 60
+        bench.lab.changes = blinking(count)
+        line = Wire(bench)
+        events, certificate = line.drop(record_ms=record_ms(count))
+        assert len(events) == certificate.events == count
+        for seq, first in enumerate([0, 59], start=1):
+            assert line.ask(wire.Read(LABEL, first, 1), seq) == wire.Refused(Reason.NOT_KEPT, 60)
+        for seq, first in enumerate([60, count - 1], start=3):
+            assert line.ask(wire.Read(LABEL, first, 1), seq).events == (events[first],)
+        assert line.ask(wire.Read(LABEL, 0, 0), 5) == certificate
+        assert line.ask(wire.Acknowledge(LABEL, certificate.crc32), 6) == wire.Done()
+
+    def test_events_that_nobody_has_any_more_are_a_fault(self, bench, identity):
+        if not identity.streams:
+            pytest.skip("a device that keeps a drop whole")
+        count = identity.capacity + 60
+        bench.lab.changes = blinking(count)
+        port = LossyPort(bench)
+        device = Device(port, bench.clock())
+        device.connect(boot_wait_s=0)
+        device.fire(arm(device, record_ms=record_ms(count)))
+        port.lose_rx_until_ns = bench.clock().now_ns() + (record_ms(count) + 20) * 1_000_000
+        drop = device.collect(LABEL)
+        assert drop.faults == (f"60 of {count} events no longer kept by the device, from number 0",)
+        assert len(drop.edges) == identity.capacity - 1  # behind the gap one change is in doubt
+        self.release(device, drop)
+
+    def test_a_short_pulse_is_an_event_and_no_edge(self, bench):
+        """Its second edge may find the interrupt free again, and give a second event."""
+        bench.lab.changes = [(0.01, 0, True), (0.01 + 0.2e-6, 0, False), (0.02, 1, True)]
+        line = Wire(bench)
+        events, certificate = line.drop()
+        states = [0, *(event.state for event in events)]
+        assert certificate.glitches == sum(a == b for a, b in pairwise(states))
+        assert certificate.glitches in {1, 2}
+        assert states[-1] == 0x0002
+        device = self.reconnected(bench)
+        drop = device.fetch(LABEL)
+        assert [(edge.channel, edge.blocked) for edge in drop.edges] == [(1, True)]
+        assert drop.faults == ()  # nothing that the drop needs is missing
+        assert drop.certificate.glitches == certificate.glitches
+
+    def test_stamps_close_behind_another_are_counted_as_late(self, bench, identity):
+        near = 0.75 * identity.late_ticks / identity.tick_hz
+        bench.lab.changes = [
+            *((0.01, 0, True), (0.01 + near, 8, True)),
+            *((0.02, 0, False), (0.02 + 3 * near, 8, False)),
+        ]
+        events, certificate = Wire(bench).drop()
+        gaps = [(b.tick - a.tick) % 2**32 for a, b in pairwise(events)]
+        assert len(gaps) == 3
+        assert certificate.late == sum(gap < identity.late_ticks for gap in gaps) == 1
+
+    def reconnected(self, bench) -> Device:
+        device = Device(bench.port(), bench.clock())
+        device.connect(boot_wait_s=0)
+        return device

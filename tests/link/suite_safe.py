@@ -1,0 +1,214 @@
+"""What keeps hands and coils whole: outputs, time-outs, silence, emergency stop, cooling."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.link import messages as wire
+from rig.link.frames import Frame, encode
+from rig.link.messages import DisarmReason, Phase, Reason
+from tests.link.bench import LABEL
+from tests.link.suite import Suite
+from tests.link.talk import Wire, arm
+
+LONG = {"pulse_us": 100_000, "record_ms": 150}
+
+
+class OutputSuite(Suite):
+    def test_outputs_are_on_for_the_pulse_and_no_longer(self, watched, device):
+        seen = [watched.outputs()]
+        token = arm(device, **LONG)
+        seen.append(watched.outputs())
+        self.refused(Reason.WRONG_TOKEN, device.fire, token ^ 1)
+        seen.append(watched.outputs())
+        device.fire(token)
+        seen.append(watched.outputs())
+        watched.clock().sleep(0.08)
+        seen.append(watched.outputs())
+        watched.clock().sleep(0.04)
+        seen.append(watched.outputs())
+        device.collect(LABEL)
+        seen.append(watched.outputs())
+        assert seen == [0, 0, 0, 1, 1, 0, 0]
+
+    def test_all_releases_of_a_drop_go_together(self, watched, device, identity):
+        if identity.releases < 2:
+            pytest.skip("this board has one release")
+        device.fire(arm(device, release=0b11, **LONG))
+        assert watched.outputs() == 0b11
+        watched.clock().sleep(0.12)
+        assert watched.outputs() == 0
+
+    def test_a_drop_without_release_switches_nothing(self, watched, device):
+        device.fire(arm(device, release=0, pulse_us=0))
+        assert watched.outputs() == 0
+
+    def test_nothing_is_on_outside_of_a_recording(self, watched, device):
+        device.fire(arm(device, pulse_us=80_000, record_ms=40))
+        watched.clock().sleep(0.03)
+        assert watched.outputs() == 1
+        watched.clock().sleep(0.02)
+        assert watched.outputs() == 0
+
+    def test_abort_switches_off(self, watched, device):
+        device.fire(arm(device, **LONG))
+        device.abort()
+        assert watched.outputs() == 0
+
+    def test_a_reset_switches_off(self, watched, device):
+        device.fire(arm(device, **LONG))
+        watched.clock().sleep(0.02)
+        assert watched.outputs() == 1
+        watched.reset()
+        assert watched.outputs() == 0
+        watched.clock().sleep(0.02)
+        assert watched.outputs() == 0
+
+    def test_what_disarms_itself_never_was_on(self, watched, device):
+        arm(device, timeout_ms=100)
+        for _ in range(4):
+            watched.clock().sleep(0.05)
+            assert watched.outputs() == 0
+        assert device.status().phase is Phase.IDLE
+
+
+class SilenceSuite(Suite):
+    def test_arming_times_out(self, bench, device):
+        token = arm(device, timeout_ms=400)
+        for _ in range(3):
+            bench.clock().sleep(0.1)
+            assert device.status().phase is Phase.ARMED
+        assert self.heard(bench, device, 0.2) == [wire.Disarmed(LABEL, DisarmReason.TIMEOUT)]
+        error = self.refused(Reason.NOT_ARMED, device.fire, token)
+        assert "waited too long" in error.message
+
+    def test_a_silent_host_disarms(self, bench, device):
+        token = arm(device)
+        assert self.heard(bench, device, 0.18) == []
+        assert device.status().phase is Phase.ARMED
+        assert self.heard(bench, device, 0.18) == []
+        assert self.heard(bench, device, 0.15) == [wire.Disarmed(LABEL, DisarmReason.HOST_SILENT)]
+        assert device.status().phase is Phase.IDLE
+        error = self.refused(Reason.NOT_ARMED, device.fire, token)
+        assert "silent" in error.message
+        device.fire(arm(device))
+
+    @pytest.mark.parametrize("request_", [wire.Status(), wire.Ping(), wire.Fire(0), wire.Done()])
+    def test_any_request_every_100_ms_keeps_it_armed(self, bench, request_):
+        line = Wire(bench)
+        token = line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1).token
+        for seq in range(2, 7):
+            bench.clock().sleep(0.07)
+            line.ask(request_, seq)
+        assert isinstance(line.ask(wire.Fire(token), 8), wire.Fired)
+
+    def test_a_repeated_request_keeps_it_armed_too(self, bench):
+        line = Wire(bench)
+        token = line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1).token
+        for _ in range(5):
+            bench.clock().sleep(0.07)
+            line.ask(wire.Status(), 2)
+        assert isinstance(line.ask(wire.Fire(token), 3), wire.Fired)
+
+    @pytest.mark.parametrize("frame", ["bad CRC", "seq 0"])
+    def test_what_is_no_request_is_silence(self, bench, frame):
+        line = Wire(bench)
+        line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1)
+        junk = encode(Frame(0x03, 0 if frame == "seq 0" else 5, 0, b""))
+        if frame == "bad CRC":
+            junk = junk[:1] + bytes([junk[1] ^ 4]) + junk[2:]
+        heard = []
+        for _ in range(5):
+            bench.port().write(junk)
+            heard += line.hear(0.08)
+        assert heard == [(0, wire.Disarmed(LABEL, DisarmReason.HOST_SILENT))]
+
+    def test_abort_disarms(self, device):
+        token = arm(device)
+        device.abort()
+        assert device.status().phase is Phase.IDLE
+        self.refused(Reason.NOT_ARMED, device.fire, token)
+
+
+class StopSuite(Suite):
+    def test_an_open_stop_forbids_arming(self, stoppable, device):
+        stoppable.stop(True)
+        assert "emergency stop" in self.refused(Reason.STOPPED, arm, device).message
+        self.refused(Reason.STOPPED, arm, device, release=0, pulse_us=0)
+        self.refused(Reason.BAD_PARAMETER, arm, device, gates=0)
+        stoppable.lab.hanging = 1
+        self.refused(Reason.STOPPED, arm, device)
+        stoppable.lab.hanging = 0
+        stoppable.stop(False)
+        device.fire(arm(device))
+
+    def test_opening_it_disarms(self, stoppable, device):
+        token = arm(device)
+        stoppable.stop(True)
+        heard = self.heard(stoppable, device, 0.05)
+        assert heard == [wire.Disarmed(LABEL, DisarmReason.STOPPED)]
+        error = self.refused(Reason.NOT_ARMED, device.fire, token)
+        assert "emergency stop was opened" in error.message
+        stoppable.stop(False)
+        self.refused(Reason.NOT_ARMED, device.fire, token)
+        assert stoppable.lab.drops == []
+
+    def test_opening_it_in_a_drop_switches_off_and_records_on(
+        self, stoppable, watched, device, identity
+    ):
+        device.fire(arm(device, **LONG))
+        watched.clock().sleep(0.02)
+        assert watched.outputs() == 1
+        stoppable.stop(True)
+        watched.clock().sleep(0.001)
+        assert watched.outputs() == 0
+        assert device.status().phase is Phase.RECORDING
+        stoppable.stop(False)
+        watched.clock().sleep(0.001)
+        assert watched.outputs() == 0
+        self.check(stoppable, device.collect(LABEL), identity)
+
+    def test_a_drop_is_read_while_it_is_open(self, stoppable, device):
+        drop = self.drop(device)
+        stoppable.stop(True)
+        assert device.status().phase is Phase.HOLDING
+        self.release(device, drop)
+
+    def test_a_reset_does_not_close_it(self, stoppable, device):
+        stoppable.stop(True)
+        self.restart(stoppable, device)
+        self.refused(Reason.STOPPED, arm, device)
+
+
+class CoolingSuite(Suite):
+    def test_a_release_rests_for_three_pulses(self, bench, device):
+        self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
+        bench.lab.hanging = 1
+        error = self.refused(Reason.COOLING, arm, device)
+        assert 80 < error.detail <= 141
+        assert f"{error.detail} ms" in error.message
+        bench.clock().sleep(0.03)
+        assert self.refused(Reason.COOLING, arm, device).detail <= error.detail - 29
+        bench.lab.hanging = 0
+        arm(device, release=0, pulse_us=0)  # what needs no release need not wait
+        device.abort()
+        bench.clock().sleep(1.01e-3 * error.detail)
+        device.fire(arm(device))
+
+    def test_a_pulse_cut_short_is_a_short_pulse(self, bench, device):
+        device.fire(arm(device, **LONG))
+        bench.clock().sleep(0.04)
+        device.abort()
+        self.release(device, device.collect(LABEL))
+        assert 10 < self.refused(Reason.COOLING, arm, device).detail < 180
+
+    def test_an_open_stop_comes_before_cooling(self, stoppable, device):
+        self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
+        stoppable.stop(True)
+        self.refused(Reason.STOPPED, arm, device)
+        stoppable.stop(False)
+        self.refused(Reason.COOLING, arm, device)
+
+
+class SafetySuite(OutputSuite, SilenceSuite, StopSuite, CoolingSuite):
+    """All of it."""

@@ -1,0 +1,82 @@
+"""The firmware's header is not stale, and says where `pack` really puts things."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from hypothesis import given
+
+from rig.link import frames
+from rig.link import messages as wire
+from rig.link.cheader import header
+from rig.link.wiretypes import Chars, Raw, Scalar, Tail
+from tests.link.strategies import MESSAGES
+
+COMMITTED = Path(__file__).parents[2] / "firmware/core/wire.h"
+
+
+def defines(text: str) -> dict[str, int]:
+    found = re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE)
+    names = [name for name, _ in found]
+    assert len(set(names)) == len(names)
+    return {name: int(value, 0) for name, value in found}
+
+
+C = defines(header())
+
+
+def in_c(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name.removesuffix("Frame")).upper()
+
+
+def test_the_committed_header_is_not_stale():
+    stale = "write it anew: python -m rig.link.cheader > firmware/core/wire.h"
+    assert COMMITTED.read_text("utf-8") == header(), stale
+
+
+def test_every_name_is_there_with_its_value():
+    limits = {
+        "PROTOCOL_VERSION": wire.PROTOCOL_VERSION,
+        "FRAME_LIMIT": frames.FRAME_LIMIT,
+        "HOST_SILENCE_MS": wire.HOST_SILENCE_MS,
+    }
+    enums = {
+        f"{in_c(kind.__name__)}_{value.name}": value
+        for kind in (wire.Phase, wire.Reason, wire.DisarmReason)
+        for value in kind
+    }
+    codes = {f"MSG_{in_c(kind.__name__)}": code for code, kind in wire.TABLE.items()}
+    expected = limits | enums | codes
+    assert {name: C[name] for name in expected} == expected
+    assert {name for name in C if name.startswith(("MSG_", "REASON_", "PHASE_"))} <= set(expected)
+
+
+@given(MESSAGES)
+def test_fields_are_where_the_header_says(message):
+    code, payload = wire.pack(message)
+    name = in_c(type(message).__name__)
+    assert C[f"MSG_{name}"] == code
+    fixed, varying = True, 0
+    for field in wire.FIELDS[type(message)]:
+        value, key = getattr(message, field.name), f"{name}_{field.name.upper()}"
+        assert (key in C) == fixed
+        at = C.get(key, 0)
+        match field.wire:
+            case Scalar(size=size) if fixed:
+                assert int.from_bytes(payload[at : at + size], "little") == value
+            case Raw(size=size) if fixed:
+                assert payload[at : at + size] == value
+            case Chars(limit=limit):
+                assert C[f"{key}_LIMIT"] == limit
+                text = value.encode()
+                if fixed:
+                    assert payload[at : at + 1 + len(text)] == bytes([len(text)]) + text
+                fixed, varying = False, varying + 1 + len(text)
+            case Tail():
+                record = C[f"{name}_RECORD"]
+                for n, (tick, state) in enumerate(value):
+                    there = payload[at + n * record :][:record]
+                    assert there == tick.to_bytes(4, "little") + state.to_bytes(2, "little")
+                fixed, varying = False, varying + len(value) * record
+    assert len(payload) == C[f"{name}_SIZE"] + varying

@@ -1,0 +1,203 @@
+"""firmware/PROTOCOL.md says what the code does: its tables, and its example to the last bit."""
+
+from __future__ import annotations
+
+import ast
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+from rig.link import frames
+from rig.link import messages as wire
+from rig.link.frames import Decoder, Frame, encode
+from rig.link.port import BAUDRATE
+from rig.link.transcript import Transcript
+from rig.link.wiretypes import Chars, Event, Raw, Scalar, Tail
+from rig.records import Drop
+
+PAGE = (Path(__file__).parents[2] / "firmware/PROTOCOL.md").read_text("utf-8")
+
+
+def page_name(kind: type) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__.removesuffix("Frame")).upper()
+
+
+KINDS = {page_name(kind): kind for kind in wire.TABLE.values()}
+
+
+def rows(text: str) -> list[list[str]]:
+    """Cells of the first table in a text, without its head."""
+    table = re.search(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    lines = table.group().splitlines()[2:] if table else []
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+
+
+def section(heading: str) -> str:
+    depth = heading.index(" ")
+    start = PAGE.index(f"\n{heading}\n") + len(heading) + 2
+    end = re.compile(rf"^#{{1,{depth}}} ", re.MULTILINE).search(PAGE, start)
+    return PAGE[start : end.start() if end else len(PAGE)]
+
+
+# -- tables
+
+
+def test_every_message_has_its_table():
+    headings = re.findall(r"^### (\w+) 0x([0-9A-F]{2})$", PAGE, re.MULTILINE)
+    assert [(name, int(code, 16)) for name, code in headings] == [
+        (page_name(kind), code) for code, kind in wire.TABLE.items()
+    ]
+    for code, kind in wire.TABLE.items():
+        text = section(f"### {page_name(kind)} 0x{code:02X}")
+        assert [row[:3] for row in rows(text)] == expected_rows(kind), kind
+        assert all(row[3] for row in rows(text)), kind
+
+
+def expected_rows(kind: type) -> list[list[str]]:
+    at: int | None = 0
+    found = []
+    for field in wire.FIELDS[kind]:
+        size = None
+        match field.wire:
+            case Scalar(size=size):
+                name = f"u{8 * size}"
+            case Raw(size=size):
+                name = f"{size} bytes"
+            case Chars(limit=limit):
+                name = f"text ≤ {limit}"
+            case Tail(size=record):
+                name = f"{record} bytes each"
+        found.append(["" if at is None else str(at), field.name, name])
+        at = None if at is None or size is None else at + size
+    return found
+
+
+def test_phases_and_reasons_have_their_numbers():
+    phases = rows(section("## Phases"))
+    assert [(int(row[0]), row[1]) for row in phases] == [(p, p.name) for p in wire.Phase]
+    reasons = re.findall(r"^\| (\d+) \| ([A-Z_]+) \|", section("## Refusals"), re.MULTILINE)
+    assert [(int(number), name) for number, name in reasons] == [(r, r.name) for r in wire.Reason]
+    disarmed = rows(section(f"### DISARMED 0x{wire.CODES[wire.Disarmed]:02X}"))[1][3]
+    assert disarmed == ", ".join(f"{int(r)} {r.name}" for r in wire.DisarmReason)
+
+
+def test_limits_are_those_of_the_code():
+    for said in (
+        f"{BAUDRATE:,} baud",
+        f"Version {wire.PROTOCOL_VERSION}.",
+        f"0 to {frames.PAYLOAD_LIMIT} |",
+        f"at most {frames.FRAME_LIMIT} bytes",
+        f"longer than {frames.FRAME_LIMIT - 2} ",
+        f"| {wire.HOST_SILENCE_MS} ms without a request |",
+        f"0x{frames.crc16(b'123456789'):04X} for the ASCII text `123456789`",
+    ):
+        assert said in PAGE
+    plain, stuffed = re.search(r"`([\d ]+)` becomes `([\d ]+)`", PAGE).groups()
+    assert frames.cobs_encode(bytes.fromhex(plain)) == bytes.fromhex(stuffed)
+
+
+def test_every_reason_is_in_the_order_of_some_request():
+    orders = rows(section("## Refusals"))
+    named = {reason for _, order in orders for reason in order.split(", ")}
+    assert named == {r.name for r in wire.Reason} - {"UNKNOWN_MESSAGE"}
+
+
+# -- the conversation
+
+
+class Said(NamedTuple):
+    direction: str
+    frame: Frame
+    message: wire.Message
+    data: bytes
+
+
+def conversation() -> list[Said]:
+    """Read what each frame of the example is said to be, and its bytes."""
+    found = []
+    for block in re.findall(r"(?sm)^```text\n(.*?)^```", section("## A conversation")):
+        for part in re.split(r"^(?=host|device)", block, flags=re.MULTILINE)[1:]:
+            head, *lines = part.splitlines()
+            who, seq, ack = re.fullmatch(r"(\w+) +seq (\d+)(?: ack (\d+))?", head).groups()
+            told = " ".join(line.strip() for line in lines if re.match(r" {4}\S", line))
+            data = bytes.fromhex(" ".join(line for line in lines if re.match(r" {6}\S", line)))
+            message = spoken(told)
+            code, payload = wire.pack(message)
+            frame = Frame(code, int(seq), int(ack or 0), payload)
+            found.append(Said("tx" if who == "host" else "rx", frame, message, data))
+    return found
+
+
+def spoken(told: str) -> wire.Message:
+    """Make the message that ``NAME(field=value, ...)`` tells of; every field must be told."""
+    call = ast.parse(told, mode="eval").body
+    kind = KINDS[call.func.id]
+    fields = {field.name: field for field in wire.FIELDS[kind]}
+    values = {}
+    for keyword in call.keywords:
+        field = fields[keyword.arg]
+        if isinstance(keyword.value, ast.Name):
+            value = field.python[keyword.value.id]
+        else:
+            value = ast.literal_eval(keyword.value)
+            if isinstance(field.wire, Raw):
+                value = bytes.fromhex(value)
+            elif isinstance(field.wire, Tail):
+                value = tuple(Event(*record) for record in value)
+        values[keyword.arg] = value
+    return kind(**values)
+
+
+TALK = conversation()
+
+
+def test_every_message_and_both_sides_speak():
+    assert {type(said.message) for said in TALK} == set(wire.TABLE.values())
+    for said in TALK:
+        assert (said.direction == "tx") == (said.frame.type < 0x80)
+
+
+def test_the_bytes_are_what_is_said_of_them():
+    for said in TALK:
+        (frame,) = Decoder().feed(said.data)
+        message = wire.unpack(frame.type, frame.payload)
+        for field in wire.FIELDS[type(said.message)]:
+            assert getattr(message, field.name) == getattr(said.message, field.name), said
+        assert frame == said.frame
+
+
+def test_what_is_said_gives_the_bytes():
+    for said in TALK:
+        assert encode(said.frame) == said.data
+
+
+def test_answers_belong_to_requests_and_numbers_count_up():
+    asked, seqs = 0, {"tx": 0, "rx": 0}
+    for said in TALK:
+        seqs[said.direction] += 1
+        assert said.frame.seq == seqs[said.direction]
+        if said.direction == "tx":
+            asked = said.frame.seq
+        elif said.frame.ack:
+            assert said.frame.ack == asked
+
+
+def test_the_example_is_a_sound_drop():
+    transcript = Transcript()
+    records = [r for n, s in enumerate(TALK) for r in transcript.feed(s.direction, n, s.data)]
+    (drop,) = [record for record in records if isinstance(record, Drop)]
+    assert (drop.run, drop.attempt) == (7, 1)
+    assert drop.faults == ()
+    assert drop.certificate.glitches == 1
+    assert [(edge.channel, edge.blocked) for edge in drop.edges] == [
+        (0, True),
+        (8, True),
+        (0, False),
+        (8, False),
+    ]
+    identity = transcript.identity
+    events = next(s.message.events for s in TALK if isinstance(s.message, wire.EventsFrame))
+    gaps = [b.tick - a.tick for a, b in pairwise(events)]
+    assert drop.certificate.late == sum(gap < identity.late_ticks for gap in gaps) == 1
+    assert drop.certificate.release_sense == 0.012 * identity.tick_hz

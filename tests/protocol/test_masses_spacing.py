@@ -1,0 +1,148 @@
+"""Chains whose rods differ: weighed one by one, along a profile, hung at listed distances."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+
+import pytest
+
+from rig.errors import InputError
+from rig.protocol.describe import describe
+from rig.protocol.reader import parse
+
+SCENE = """\
+protocol: 1
+chains:
+  A: {rods: 5, length: 200 mm}
+  B: {like: A}
+surface: {restitution: 0.5}
+drop: 0 mm
+gravity: 9.81 m/s^2
+"""
+
+
+def scene(a, b="like: A"):
+    return SCENE.replace("rods: 5, length: 200 mm", a).replace("like: A", b)
+
+
+def chains(a, b="like: A"):
+    return parse(scene(a, b)).chains
+
+
+def problems(a, b="like: A"):
+    with pytest.raises(InputError) as caught:
+        parse(scene(a, b), "f")
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_masses_rod_by_rod():
+    a, b = chains(
+        "rods: 5, length: 200 mm, masses: [12 g, 11.5 g, 0.011 kg, 9000 mg, 8 g]"
+    ).values()
+    assert a.chain.masses == (0.012, 0.0115, 0.011, 0.009, 0.008)
+    assert a.weighed
+    assert b.chain == a.chain
+
+
+def test_one_mass_for_all_rods_and_single_rods():
+    a = chains("rods: 5, length: 200 mm, mass: 12 g")["A"]
+    assert (a.chain.masses, a.weighed) == ((0.012,) * 5, True)
+    a = chains("rods: [{mass: 12 g}, {mass: 11 g}, {count: 2}], mass: 3 g, length: 200 mm")["A"]
+    assert (a.chain.masses, a.weighed) == ((0.012, 0.011, 0.003, 0.003), True)
+    assert not chains("rods: 5, length: 200 mm, diameter: 5 mm")["A"].weighed
+
+
+def test_an_exponential_profile_has_an_even_ratio_and_the_given_ends():
+    a = chains("rods: 5, length: 200 mm, masses: {exponential: {bottom: 16 g, top: 1 g}}")["A"]
+    assert a.chain.masses == pytest.approx([0.016, 0.008, 0.004, 0.002, 0.001], rel=1e-15)
+    assert (a.chain.masses[0], a.chain.masses[-1]) == (0.016, 0.001)
+    a = chains("rods: 2, length: 200 mm, masses: {exponential: {bottom: 1 g, top: 3 g}}")["A"]
+    assert a.chain.masses == (0.001, 0.003)
+
+
+def test_a_table_runs_straight_between_its_points():
+    table = (
+        "[{height: 0 mm, mass: 10 g}, {height: 125 mm, mass: 5 g}, {height: 300 mm, mass: 12 g}]"
+    )
+    a = chains(f"rods: 5, length: 200 mm, masses: {{table: {table}}}")["A"]
+    # At 0, 50, 100, 150 and 200 mm.
+    assert a.chain.masses == pytest.approx([0.010, 0.008, 0.006, 0.006, 0.008], rel=1e-14)
+    # Points beside the places of the rods are met exactly.
+    table = "[{height: 0 mm, mass: 10 g}, {height: 200 mm, mass: 3 g}]"
+    masses = chains(f"rods: 5, length: 200 mm, masses: {{table: {table}}}")["A"].chain.masses
+    assert (masses[0], masses[-1]) == (0.010, 0.003)
+
+
+def test_listed_spacing_places_the_rods():
+    a = chains("rods: 5, spacing: [40 mm, 5 cm, 60 mm, 0.07 m]")["A"]
+    exact = [sum(map(Fraction, ("0.04", "0.05", "0.06", "0.07")[:k])) for k in range(5)]
+    assert a.chain.heights == pytest.approx([float(z) for z in exact], rel=1e-15)
+
+
+def test_what_a_chain_says_itself_displaces_what_it_inherits():
+    _, b = chains(
+        "rods: 5, length: 200 mm, mass: 12 g", "like: A, masses: [1 g, 2 g, 3 g, 4 g, 5 g]"
+    ).values()
+    assert b.chain.masses == (0.001, 0.002, 0.003, 0.004, 0.005)
+    _, b = chains("rods: 3, length: 200 mm, masses: [1 g, 2 g, 3 g]", "like: A, mass: 5 g").values()
+    assert b.chain.masses == (0.005,) * 3
+    _, b = chains("rods: 3, length: 200 mm", "like: A, spacing: [40 mm, 50 mm]").values()
+    assert b.chain.heights == (0.0, 0.04, 0.09)
+    _, b = chains("rods: 3, spacing: [40 mm, 50 mm]", "like: A, length: 200 mm").values()
+    assert b.chain.heights == (0.0, 0.1, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("a", "start"),
+    [
+        ("rods: 3, length: 1 m, masses: [1 g, 2 g]",
+         "f:3:37: chains.A.masses: found 2 masses for 3 rods"),
+        ("rods: 2, length: 1 m, masses: [1 g, 2 mm]",
+         "f:3:43: chains.A.masses[1]: 2 mm is a length; a mass"),
+        ("rods: 2, length: 1 m, masses: [1 g, 0 g]", "f:3:43: chains.A.masses[1]: found 0 g"),
+        ("rods: 2, length: 1 m, masses: 3 g", "f:3:37: chains.A.masses: found '3 g'; a mapping"),
+        ("rods: 2, length: 1 m, masses: {}", "f:3:37: chains.A.masses: one profile is wanted"),
+        ("rods: 2, length: 1 m, masses: {exponentail: 1}",
+         "f:3:38: chains.A.masses.exponentail: unknown key; did you mean exponential?"),
+        ("rods: 2, length: 1 m, masses: {exponential: {bottom: 1 g}}",
+         "f:3:51: chains.A.masses.exponential.top: missing"),
+        ("rods: 2, length: 1 m, masses: {table: [{height: 0 mm}]}",
+         "f:3:46: chains.A.masses.table[0].mass: missing"),
+        ("rods: 2, length: 1 m, "
+         "masses: {table: [{height: 0 m, mass: 1 g}, {height: 0 m, mass: 1 g}]}",
+         "f:3:72: chains.A.masses.table[1]: heights must rise"),
+        ("rods: 2, length: 1 m, masses: {table: [{height: 0 m, mass: 1 g}]}",
+         "f:3:45: chains.A.masses.table: runs from 0 m to 0 m; the rods are from 0 m to 1 m"),
+        ("rods: 2, length: 1 m, mass: 1 g, masses: [1 g, 2 g]",
+         "f:3:40: chains.A.masses: mass is given too"),
+        ("rods: [{mass: 1 g}, {count: 2}], length: 1 m", "f:3:13: chains.A.rods: mass is given"),
+        ("rods: 3, spacing: [4 mm]", "f:3:25: chains.A.spacing: found 1 distances; 2 are between"),
+        ("rods: 2, spacing: [4]", "f:3:26: chains.A.spacing[0]: found '4' without a unit"),
+        ("rods: 2, spacing: [4 mm], length: 4 mm", "f:3:33: chains.A.length: the listed spacing"),
+        ("rods: 2, spacing: [4 mm], diameter: 5 mm", "f:3:25: chains.A.spacing: rods 1 and 2 over"),
+        ("rods: 2, spacing: equal-gap, length: 1 m", "f:3:25: chains.A.spacing: found 'equal-gap'"),
+        ("rods: 2", "f:3:6: chains.A.length: missing"),
+    ],
+)  # fmt: skip
+def test_each_fault_is_found_at_its_place(a, start):
+    found = problems(a)
+    assert len(found) == 1, found
+    assert found[0].startswith(start)
+
+
+def test_check_describes_it():
+    text = describe(parse(scene("rods: 3, spacing: [40 mm, 50 mm], masses: [12 g, 11 g, 10 g]")))
+    (line,) = [line for line in text.splitlines() if line.startswith("  A: ")]
+    assert line == (
+        "  A: 3 rods, 90 mm long, rods 40.0 to 50.0 mm apart, 33 g, "
+        "graded: heaviest rod 1.2 times the lightest"
+    )
+
+
+def test_an_even_spacing_is_not_remarked_on():
+    gaps = ", ".join(["48.5 mm"] * 24)
+    text = describe(parse(scene(f"rods: 25, spacing: [{gaps}]")))
+    assert "apart" not in text
+    heights = chains(f"rods: 25, spacing: [{gaps}]")["A"].chain.heights
+    assert all(high > low for low, high in pairwise(heights))

@@ -1,0 +1,56 @@
+"""``rig sweep`` called inside this process, and a scene whose grid shows every kind of note."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import pytest
+
+from rig.cli import main
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+SCENE = """\
+protocol: 1
+title: Few rods on a surface
+chains:
+  A: {rods: 4, length: 600 mm}
+  B: {rods: 4, length: 650 mm}
+surface: {restitution: 0.5, friction: 0.2, pile: {below: 5 deg, restitution: -0.37}}
+drop: 180 mm
+gravity: 9.81 m/s^2
+plan: {incline: [0 deg, 10 deg, 40 deg]}
+"""
+VARY = ("restitution=-1..1:5", "inertia=0.001..0.2:6", "friction=0..1:6")
+"""With the scene's inclines: points on the pile, not sliding, with α above ½ and without one."""
+
+
+class Done(NamedTuple):
+    """How a call ended."""
+
+    code: int
+    err: str
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.yaml"
+    path.write_text(SCENE, "utf-8")
+    return path
+
+
+@pytest.fixture
+def sweep(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
+    """Sweep the scene (or another) into a file of the temporary folder."""
+
+    def call(output: str, *vary: str, protocol: Path = scene, more: tuple[str, ...] = ()) -> Done:
+        arguments = [str(protocol), "-o", str(tmp_path / output), *more]
+        arguments += [part for text in vary for part in ("--vary", text)]
+        code = main(["sweep", *arguments])
+        out, err = capsys.readouterr()
+        assert out == ""
+        return Done(code, err)
+
+    return call

@@ -1,0 +1,130 @@
+"""Every point of a sweep is the single fall there."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.errors import DomainError, InputError
+from rig.model.fall import fall
+from rig.model.impact import impact_on
+from rig.model.surface import Surface
+from rig.predictions import predictions
+from rig.protocol import reader
+from rig.sweep.compute import ABOVE_HALF, NO_ANSWER, NOT_SLIDING, PILE, compute
+from rig.sweep.executors import Inline
+from rig.sweep.layout import MOST_POINTS, lay_out
+from rig.units import Quantity
+from tests.cli.lab import PROTOCOLS
+from tests.sweep.conftest import SCENE, VARY
+
+
+def points(protocol, vary, length=7):
+    """Lay a sweep out and give every point: its parameters and results."""
+    layout = lay_out(protocol, vary)
+    swept = compute(layout, Inline(), 1, length)
+    assert swept.notes.shape == layout.grid.shape
+    names = [axis.name for axis in layout.grid.axes]
+    rows = zip(
+        itertools.product(*(axis.values for axis in layout.grid.axes)),
+        swept.separation_m.ravel().tolist(),
+        swept.speed_m_s.ravel().tolist(),
+        swept.in_domain.ravel().tolist(),
+        swept.notes.ravel().tolist(),
+        strict=True,
+    )
+    for values, *found in rows:
+        yield {**layout.fixed, **dict(zip(names, values, strict=True))}, *found
+
+
+def test_points_are_single_falls_with_the_notes_of_single_impacts():
+    protocol = reader.parse(SCENE)
+    chain = protocol.chains["A"].chain
+    seen = 0
+    for at, separation, speed, in_domain, notes in points(protocol, VARY):
+        seen |= notes
+        one = replace(chain, inertia=at["inertia"])
+        surface = Surface(
+            Quantity(at["restitution"]), Quantity(at["friction"]), protocol.surface.pile
+        )
+        try:
+            impact = impact_on(surface, one, at["incline"])
+        except DomainError:
+            assert notes == NO_ANSWER
+            assert np.isnan([separation, speed]).all()
+            assert not in_domain
+            continue
+        told = "; ".join(impact.notes)
+        assert bool(notes & NOT_SLIDING) == ("slide" in told)
+        assert bool(notes & ABOVE_HALF) == ("above ½" in told)
+        assert bool(notes & PILE) == (impact.basis == "pile")
+        assert in_domain == (not told)
+        alone = fall(one, impact.alpha, impact.gamma, at["drop"], at["gravity"])
+        # α rests on sines, whose last digit is numpy's here and the C library's there.
+        wanted = alone.separation_m + (0.65 - 0.6), alone.speed_m_s
+        assert (separation, speed) == pytest.approx(wanted, rel=1e-12, abs=1e-15)
+        if impact.basis in {"pile", "level"}:
+            assert (separation, speed) == wanted
+    assert seen == NOT_SLIDING | ABOVE_HALF | NO_ANSWER | PILE
+
+
+def test_a_stated_alpha_gives_the_single_falls_to_the_bit():
+    protocol = reader.read(PROTOCOLS / "bead-chain.yaml")
+    chain = protocol.chains["beads"].chain
+    vary = ("alpha=0..0.6:4", "gamma=0..2:3", "drop=0mm..200mm:3", "gravity=1m/s^2..10m/s^2:2")
+    found = list(points(protocol, vary))
+    assert len(found) == 72
+    for at, *ends, in_domain, notes in found:
+        alone = fall(chain, at["alpha"], at["gamma"], at["drop"], at["gravity"])
+        assert ends == [alone.separation_m, alone.speed_m_s]
+        assert in_domain == (at["alpha"] <= 0.5) == (notes == 0)
+
+
+def test_the_scene_itself_is_what_predict_says():
+    text = SCENE.replace("drop: 180 mm", "drop: 180 mm\ninitial_speed: 0.3 m/s")
+    protocol = reader.parse(text)
+    found = list(points(protocol, ["initial_speed=0.3m/s..0.6m/s:2"]))[::2]
+    for line, (at, separation, speed, _, _) in zip(predictions(protocol), found, strict=True):
+        assert at["incline"] == line["incline_deg"]
+        assert separation == pytest.approx(line["separation_m"], rel=1e-14)
+        assert speed == pytest.approx(line["speed_m_s"], rel=1e-14)
+
+
+def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
+    protocol = reader.parse(SCENE)
+    layout = lay_out(protocol, ["friction=0..1:3", "drop=90mm"])
+    assert [(axis.name, len(axis.values)) for axis in layout.grid.axes] == [
+        ("incline", 3),
+        ("friction", 3),
+    ]
+    assert layout.layered
+    assert layout.fixed["drop"] == 0.09
+    layout = lay_out(protocol, ["friction=0..1:3", "incline=40deg"])
+    assert not layout.layered
+    assert layout.grid.shape == (3,)
+    assert layout.fixed["incline"] == 40.0
+
+
+@pytest.mark.parametrize(("scene", "vary", "said"), [
+    ("picket-fence.yaml", "drop=1m..2m:3", "no surface"),
+    ("bead-chain.yaml", "friction=0..1:3", "it can vary: alpha, gamma, drop, gravity"),
+    ("single-chain.yaml", "alpha=0..1:3", "it can vary: incline, restitution, friction, inertia"),
+])  # fmt: skip
+def test_only_what_the_scene_has_can_be_varied(scene, vary, said):
+    with pytest.raises(InputError, match=said):
+        lay_out(reader.read(PROTOCOLS / scene), [vary])
+
+
+def test_air_is_refused_rather_than_left_out():
+    protocol = reader.parse(SCENE + "drag: {terminal_speed: 20 m/s}\n")
+    with pytest.raises(InputError, match="drag"):
+        lay_out(protocol, ["friction=0..1:3"])
+
+
+def test_too_many_points_are_refused_before_they_are_computed():
+    vary = ["friction=0..1:3000", f"drop=0m..1m:{MOST_POINTS // 9000 + 1}"]
+    with pytest.raises(InputError, match=f"at most {MOST_POINTS}"):
+        lay_out(reader.parse(SCENE), vary)

@@ -1,0 +1,161 @@
+"""What stands in the files."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+
+from rig import __version__
+from rig.sweep.progress import Progress
+from tests.sweep.conftest import SCENE, VARY
+from tests.test_imports import packages_loaded_by
+
+ONE_INCLINE = "incline=40deg"
+
+
+def assert_provenance(facts):
+    assert facts["made_by"] == f"rig {__version__} sweep"
+    assert facts["protocol_sha256"] == hashlib.sha256(SCENE.encode()).hexdigest()
+    assert facts["fixed"] == {"drop_m": 0.18, "gravity_m_s2": 9.81}
+    assert facts["pile"] == {"below_deg": 5.0, "restitution": -0.37}
+    assert facts["free_chain_longer_m"] == pytest.approx(0.05)
+
+
+def test_csv_and_npz_say_the_same(sweep, tmp_path):
+    assert sweep("s.csv", *VARY).code == 0
+    assert sweep("s.npz", *VARY).code == 0
+    lines = (tmp_path / "s.csv").read_text("utf-8").splitlines()
+    comments = [line[2:].split(": ", 1) for line in lines if line.startswith("# ")]
+    facts = {name: json.loads(text) for name, text in comments}
+    assert_provenance(facts)
+    rows = list(csv.DictReader(lines[len(comments) :]))
+    with np.load(tmp_path / "s.npz") as found:
+        assert json.loads(found["metadata"].item()) == facts
+        assert found["protocol"].item() == SCENE
+        axes = found["axes"].tolist()
+        assert axes == ["incline_deg", "restitution", "inertia", "friction"]
+        assert list(rows[0]) == [*axes, "separation_m", "speed_m_s", "in_domain", "notes"]
+        grids = np.meshgrid(*(found[name] for name in axes), indexing="ij")
+        for name, grid in zip(axes, grids, strict=True):
+            assert [float(row[name]) for row in rows] == grid.ravel().tolist()
+        for name in ("separation_m", "speed_m_s"):
+            column = [float(row[name] or "nan") for row in rows]
+            assert np.array_equal(column, found[name].ravel(), equal_nan=True)
+            assert np.isnan(column).any()
+        assert [int(row["notes"]) for row in rows] == found["notes"].ravel().tolist()
+        assert [row["in_domain"] == "1" for row in rows] == found["in_domain"].ravel().tolist()
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz", "svg"])
+def test_the_same_sweep_gives_the_same_bytes(sweep, tmp_path, kind):
+    for name in ("one", "two"):
+        assert sweep(f"{name}.{kind}", "restitution=-1..1:9", "friction=0..1:9", ONE_INCLINE) == (
+            0,
+            f"{tmp_path / name}.{kind}: 81 points, 18 beyond the model's domain\n",
+        )
+    assert (tmp_path / f"one.{kind}").read_bytes() == (tmp_path / f"two.{kind}").read_bytes()
+
+
+@pytest.mark.parametrize(("vary", "images"), [
+    (("restitution=-1..1:9", "friction=0..1:9", ONE_INCLINE), 4),  # two maps, two scales
+    (("incline=0deg..80deg:9",), 0),
+    (("incline=20deg..21deg:3", "inertia=0.001..0.002:3", "friction=1"), 4),  # no answer anywhere
+])  # fmt: skip
+def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, images):
+    assert sweep("s.svg", *vary).code == 0
+    svg = (tmp_path / "s.svg").read_text("utf-8")
+    assert len(re.findall("<image", svg)) == images
+    assert hashlib.sha256(SCENE.encode()).hexdigest() in svg
+
+
+@pytest.mark.parametrize(("output", "vary", "said"), [
+    ("s.txt", ("friction=0..1:3",), "end the name in one of .csv, .npz, .svg"),
+    ("s", ("friction=0..1:3",), "end the name in one of .csv, .npz, .svg"),
+    ("no/s.csv", ("friction=0..1:3",), "there is no folder"),
+    ("s.svg", ("friction=0..1:3",), "the plan has 0, 10, 40 degrees"),
+    ("s.svg", ("friction=0..1:3", "drop=0m..1m:3", "inertia=0.1..1:3", ONE_INCLINE), "not 3"),
+    ("s.csv", ("friktion=0..1:3",), "did you mean friction?"),
+])  # fmt: skip
+def test_bad_input_is_told_before_anything_is_computed(
+    sweep, tmp_path, monkeypatch, output, vary, said
+):
+    monkeypatch.setattr("rig.commands.sweep.compute", lambda *_: pytest.fail("computed"))
+    done = sweep(output, *vary)
+    assert done.code == 2
+    assert said in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.yaml"]
+
+
+def test_an_interrupt_while_writing_leaves_the_old_file(sweep, tmp_path, monkeypatch):
+    def write(stream, *_):
+        stream.write(b"half")
+        raise KeyboardInterrupt
+
+    (tmp_path / "s.csv").write_text("old")
+    monkeypatch.setattr("rig.commands.sweep.write_csv", write)
+    assert sweep("s.csv", "friction=0..1:3") == (130, "rig: interrupted; nothing was written\n")
+    assert (tmp_path / "s.csv").read_text() == "old"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_table_needs_neither_dask_nor_matplotlib(scene, tmp_path):
+    program = "import sys, rig.cli; assert rig.cli.main(sys.argv[1:]) == 0"
+    arguments = ("sweep", str(scene), "--vary", "friction=0..1:3", "-o")
+    loaded = packages_loaded_by(program, *arguments, str(tmp_path / "s.npz"))
+    assert "numpy" in loaded
+    assert loaded.isdisjoint({"dask", "distributed", "matplotlib"})
+
+
+@pytest.mark.parametrize(("package", "extra", "output", "more"), [
+    ("distributed", "cluster", "s.csv", ("--cluster", "127.0.0.1:1")),
+    ("matplotlib", "report", "s.svg", ()),
+])  # fmt: skip
+def test_a_missing_extra_is_named(sweep, monkeypatch, package, extra, output, more):
+    monkeypatch.delitem(sys.modules, "rig.sweep.cluster", raising=False)
+    monkeypatch.setitem(sys.modules, package, None)
+    done = sweep(output, "friction=0..1:3", ONE_INCLINE, more=more)
+    assert done == (2, f"rig: this needs {package}: pip install 'chainrig[{extra}]'\n")
+
+
+class Stream(io.StringIO):
+    """A terminal, or none."""
+
+    def __init__(self, terminal):
+        super().__init__()
+        self.isatty = lambda: terminal
+
+
+def shown(terminal, seconds, steps=1000):
+    """What is shown of a sweep of so many seconds."""
+    now = 0.0
+    stream = Stream(terminal)
+    progress = Progress(10 * steps, stream, lambda: now)
+    for step in range(1, steps + 1):
+        now = seconds * step / steps
+        progress.show(10 * step)
+    progress.clear()
+    return stream.getvalue()
+
+
+def test_a_terminal_has_one_line_that_is_rewritten():
+    text = shown(terminal=True, seconds=10.0)
+    assert "\n" not in text
+    assert text.endswith("\r\x1b[K")
+    assert 50 <= text.count("\r") <= 102
+    assert "\r 50% of 10000 points, 1e+03/s, 5 s left" in text
+
+
+def test_a_log_has_three_lines_at_most():
+    assert [line.split("%")[0].strip() for line in shown(False, 3600.0).splitlines()] == [
+        "25",
+        "50",
+        "75",
+    ]
+    assert shown(False, 1.9) == ""

@@ -1,0 +1,83 @@
+"""What stands behind ``--vary``."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.errors import InputError
+from rig.sweep.grid import spaced
+from rig.sweep.variables import VARIABLES
+from rig.sweep.vary import MOST_VALUES, read_vary
+
+NAMES = tuple(VARIABLES)
+SPACES = st.sampled_from(["", " ", "  "])
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.integers(2, 40), st.lists(SPACES, min_size=5))
+def test_a_range_is_read_as_written(one, other, count, spaces):
+    low, high = sorted((one, other))
+    if low == high:
+        low, high = -1.0, 1.0
+    parts = ["restitution", "=", repr(low), "..", repr(high), ":", str(count)]
+    for place, space in enumerate(spaces[:4]):
+        parts[2 * place] = f"{space}{parts[2 * place]}{spaces[-1]}"
+    assert read_vary(["".join(parts)], NAMES) == {"restitution": spaced(low, high, count)}
+
+
+@given(st.text(alphabet="restiuon=.:0123456789-e mdg±", max_size=30))
+def test_any_text_is_read_or_refused_in_one_line(text):
+    try:
+        found = read_vary([text], NAMES)
+    except InputError as error:
+        problem = error.message
+    else:
+        assert all(len(values) > 1 for values in found.values())
+        return
+    assert len(problem.splitlines()) == 1
+
+
+def test_units_lead_to_si_and_degrees():
+    found = read_vary(["drop=100mm..300 mm:3", "incline=0deg..80deg:3", "friction=0.1"], NAMES)
+    assert found == {"drop": (0.1, 0.2, 0.3), "incline": (0.0, 40.0, 80.0), "friction": (0.1,)}
+    assert list(found) == ["drop", "incline", "friction"]
+
+
+@pytest.mark.parametrize(("text", "column", "said"), [
+    ("friktion=0..1:5", 1, "did you mean friction"),
+    ("tilt=0deg..5deg:5", 1, "it can vary: incline, restitution"),
+    ("friction", 1, "restitution=-0.4..0.9:200"),
+    ("drop=100..300mm:5", 6, "without a unit"),
+    ("drop=100mm..300deg:5", 13, "is an angle"),
+    ("restitution=-2..0.9:3", 13, "accepted: -1 to 1"),
+    ("restitution=0..1.5:3", 16, "accepted: -1 to 1"),
+    ("restitution=0..0.5 ± 0.1:3", 16, "no uncertainty"),
+    ("friction=0...5:3", 11, "two dots"),
+    ("friction=0.5..0.5:3", 15, "more than 0.5"),
+    ("friction=0..0.5", 16, "how many"),
+    ("friction=0..0.5:1", 17, "'1'"),
+    ("friction=0..0.5:²", 17, "'²'"),
+    (f"friction=0..0.5:{MOST_VALUES + 1}", 17, "a whole number from 2"),
+    ("friction=0.5:3", 10, "LOW..HIGH:COUNT"),
+])  # fmt: skip
+def test_a_fault_is_told_at_its_column(text, column, said):
+    with pytest.raises(InputError) as caught:
+        read_vary([text], NAMES)
+    assert caught.value.exit_code == 2
+    assert f", column {column}: " in caught.value.message
+    assert said in caught.value.message
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(InputError) as caught:
+        read_vary(["drop=1", "friction=0..0.5:3", "friction=0.1", "mu=1"], NAMES)
+    first, second, third = caught.value.message.splitlines()
+    assert "'drop=1'" in first
+    assert "given twice" in second
+    assert "'mu=1'" in third
+
+
+def test_something_must_vary():
+    with pytest.raises(InputError, match="nothing is varied"):
+        read_vary(["friction=0.1"], NAMES)
