@@ -12,12 +12,12 @@
 #include "ticks.h"
 #include "wire.h"
 
-#define BATCH 16                        /* events in a frame */
+#define BATCH 16                          /* events in a frame */
 #define COMPANY_TICKS (10 * TICKS_PER_MS) /* an event waits no longer than this for others */
+#define SELDOM 16                         /* turns between two looks at what has time */
+
 /* What is rare must not put its registers' saving into every turn of the main loop. */
 #define RARE __attribute__((noinline))
-
-#define SELDOM 16                       /* turns between two looks at what has time */
 
 static const char firmware[] BOARD_FLASH = "chainrig " FIRMWARE_VERSION;
 
@@ -35,9 +35,9 @@ static struct {
     bool flicker;            /* or some gate did, too short to say which */
 } order;
 
-static bool aborted; /* ABORT came for the drop that is recorded or held */
-static bool closing; /* the recording is over, but not everything is sent */
-static uint8_t room;  /* events that still belong into the frame being written */
+static bool aborted;    /* ABORT came for the drop that is recorded or held */
+static bool closing;    /* the recording is over, but not everything is sent */
+static uint8_t room;    /* events that still belong into the frame being written */
 static uint32_t lately; /* the time, at most SELDOM turns ago */
 static uint32_t chance;
 
