@@ -7,7 +7,7 @@
 #define BOARD_GATES 12
 #define BOARD_GATE_MASK 0x0FFFu
 #define BOARD_RELEASES 2
-#define BOARD_BUSY 54 /* an edge that waited for the interrupt's end is stamped not later after it */
+#define BOARD_BUSY 47 /* from one stamp to the next, of an edge that waited for the interrupt's end */
 #define BOARD_LATENCY 7
 
 #define BOARD_COUNTER TCNT1

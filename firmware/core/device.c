@@ -468,8 +468,11 @@ void device_pass(void)
         stream();
     }
     send_pass();
+    ticks_pass();
+    if (release_on())
+        release_pass(ticks_roughly());
     if (++turn % SELDOM == 0) {
-        lately = ticks_pass();
+        lately = ticks_roughly();
         seldom(lately);
     }
 }

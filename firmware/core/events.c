@@ -4,6 +4,9 @@
 #include "checks.h"
 #include "ticks.h"
 
+/* A wake-up that follows within this many ticks may be owed to what the one before it saw. */
+#define AT_ONCE (BOARD_BUSY + 16)
+
 uint8_t events_memory[EVENTS_BYTES] BOARD_KEPT;
 struct events events;
 
@@ -102,22 +105,22 @@ void events_pass(void)
 {
     uint8_t *entry = at.entry;
     uint8_t port;
-    uint16_t ports, waited;
-    uint32_t stamp;
+    uint16_t ports;
+    uint32_t stamp, since;
     if (!board_has_entry(entry)) {
         /* What left no event has its memory back as soon as the gates are quiet. */
         rewind_entries();
         return;
     }
     stamp = ticks_stamped(get16(entry), entry[2]);
-    waited = (uint16_t)(stamp - at.stamp <= BOARD_BUSY ? stamp - at.stamp : 0);
+    since = stamp - at.stamp;
     port = entry[3];
     ports = (uint16_t)(get16(entry + 4) & board_ports_of(at.gates));
     at.entry = after(entry);
     /* An edge that came while the interrupt was busy waited for its end, nobody knows how long:
      * half of the longest is the best guess, and off by no more than half. */
-    if (is_news(port, ports, waited != 0))
-        keep(ports, stamp - waited / 2);
+    if (is_news(port, ports, since <= AT_ONCE))
+        keep(ports, since <= BOARD_BUSY ? stamp - since / 2 : stamp);
     else if (++at.lead > at.most)
         at.most = at.lead;
     at.ports = ports;

@@ -1,7 +1,5 @@
 #include "release.h"
 
-#include <stdbool.h>
-
 #include "board.h"
 #include "ticks.h"
 
@@ -42,6 +40,11 @@ void release_done(void)
     release_off();
     pulse.sync = false;
     board_outputs(0, false);
+}
+
+bool release_on(void)
+{
+    return pulse.on;
 }
 
 void release_pass(uint32_t now)

@@ -2,6 +2,7 @@
 #ifndef RELEASE_H
 #define RELEASE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #define RELEASE_MAX_US 500000u
@@ -18,6 +19,9 @@ void release_off(void);
 
 /* The recording is over: sync output off. */
 void release_done(void);
+
+/* Whether the pulse is on: then its end has to be looked for at every turn. */
+bool release_on(void);
 
 /* End the pulse when it is time. */
 void release_pass(uint32_t now);

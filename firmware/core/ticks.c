@@ -3,13 +3,12 @@
 #include "board.h"
 
 #define HALF_BITS 15
-#define EARLY (1u << 13) /* how much too early a half may be counted */
 
 static uint32_t halves; /* of the counter's range, since the device started */
 
 static uint32_t extended(uint32_t half, uint16_t count)
 {
-    uint32_t base = (half << HALF_BITS) - EARLY;
+    uint32_t base = half << HALF_BITS;
     return base + (uint16_t)(count - (uint16_t)base);
 }
 
@@ -19,14 +18,20 @@ void ticks_start(uint32_t time)
     board_publish_half((uint8_t)halves);
 }
 
-uint32_t ticks_pass(void)
+void ticks_pass(void)
 {
-    uint32_t now = extended(halves, board_count_roughly());
-    if ((int32_t)(now - ((halves + 1) << HALF_BITS)) >= 0) {
+    /* A half counts as begun when half of it is over: a rough count, which may be a little ahead,
+     * then never counts one twice. */
+    uint8_t quarter = (uint8_t)(board_count_roughly() >> (HALF_BITS - 1));
+    if (quarter == ((halves & 1) ? 1 : 3)) {
         halves++;
         board_publish_half((uint8_t)halves);
     }
-    return now;
+}
+
+uint32_t ticks_roughly(void)
+{
+    return extended(halves, board_count_roughly());
 }
 
 uint32_t ticks_now(void)

@@ -1,7 +1,7 @@
 /* The 16-bit counter -> 32-bit time, without an overflow interrupt that could delay a stamp.
  *
- * The main loop counts halves of the counter's range. It may do so 0.5 ms too early and 1.5 ms too
- * late (at 16 MHz): every conversion finds by how much the counter is ahead. */
+ * The main loop counts halves of the counter's range, a quarter of the range late. It may do so
+ * another 1.5 ms late (at 16 MHz): every conversion finds by how much the counter is ahead. */
 #ifndef TICKS_H
 #define TICKS_H
 
@@ -13,8 +13,11 @@
 /* Begin; the counter's bits stand in for the lower 16 of `time`. */
 void ticks_start(uint32_t time);
 
-/* Count, at least every 1.5 ms; now, to some 20 us. */
-uint32_t ticks_pass(void);
+/* Count, at least every 1.5 ms. */
+void ticks_pass(void);
+
+/* Now, or up to 16 us later, without holding interrupts off. */
+uint32_t ticks_roughly(void);
 
 /* Now. */
 uint32_t ticks_now(void);

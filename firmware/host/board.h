@@ -23,8 +23,8 @@
 #define BOARD_FLASH
 #define BOARD_KEPT
 
-#define HOST_LATENCY 12 /* from an edge to its stamp */
-#define HOST_BUSY 60    /* from its stamp to the interrupt's end */
+#define HOST_LATENCY 10 /* from an edge to its stamp */
+#define HOST_BUSY 36    /* from its stamp to the interrupt's end */
 #define HOST_TURN 200   /* how long a turn of the main loop takes */
 #define HOST_BYTE 320   /* how long a byte on the line takes: 500 kbaud */
 

@@ -80,6 +80,22 @@ def test_a_burst_at_100000_edges_a_second(mega):
     assert max(abs(stamp.error) for stamp in stamps) <= 8
 
 
+@pytest.mark.parametrize("spacing", [4001, 24_001])
+def test_edges_that_meet_are_doubtful_and_not_far_off(mega, spacing):
+    """The short spacing leaves the main loop no rest: its time must go on all the same."""
+    seen = trials.spread(trials.twins(mega, 250, spacing))
+    assert seen.count == 1000
+    assert seen.worst <= 56
+    assert seen.worst_trusted <= 8
+
+
+def test_edges_that_meet_on_a_board_that_streams():
+    seen = trials.spread(trials.twins(stand_of("uno"), 250, 24_001))
+    assert seen.count == 1000
+    assert seen.worst <= 56
+    assert seen.worst_trusted <= 8
+
+
 def test_all_gates_in_the_same_cycle_are_one_event(stand):
     gates = range(len(stand.wiring.gates))
     flips = [Flip(30_000, gate, True) for gate in gates]

@@ -16,11 +16,16 @@ static void spend(avr_t *avr, uint32_t cycles)
 static void entered_or_left(struct avr_irq_t *irq, uint32_t entered, void *param)
 {
     entry_t *e = param;
+    avr_t *avr = e->board->avr;
     (void)irq;
-    if (entered)
-        spend(e->board->avr, e->board->entry_cycles); /* defect: entry takes no time */
-    else if (e->vector->raise_sticky && avr_regbit_get(e->board->avr, e->vector->raised))
-        avr_raise_interrupt(e->board->avr, e->vector); /* its condition still holds */
+    if (entered) {
+        spend(avr, e->board->entry_cycles); /* defect: entry takes no time */
+        return;
+    }
+    if (avr->interrupt_state == -2)
+        avr->interrupt_state = -1; /* defect: two instructions run before the next one, not one */
+    if (e->vector->raise_sticky && avr_regbit_get(avr, e->vector->raised))
+        avr_raise_interrupt(avr, e->vector); /* its condition still holds */
 }
 
 /* Defect: a write to TIFRn clears all flags of that timer, one to PCIFR or EIFR none. */

@@ -104,6 +104,19 @@ def burst(stand: Stand, count: int, rate: float) -> list[Stamp]:
     return stand.record(flips, flips[-1].cycle // _MS + 5).stamps(flips)
 
 
+def twins(stand: Stand, count: int, spacing: int) -> list[Stamp]:
+    """Flip two gates, on the two ports, one 1 to 64 cycles after the other, time and again."""
+    last = len(stand.wiring.gates) - 1
+    flips = []
+    for n in range(count):
+        at, lag = 20_000 + n * spacing, 1 + n % 64
+        first, second = (0, last) if n // 64 % 2 else (last, 0)
+        for after, blocked in ((0, True), (spacing // 2, False)):
+            flips.append(Flip(at + after, first, blocked))
+            flips.append(Flip(at + after + lag, second, blocked))
+    return stand.record(flips, flips[-1].cycle // _MS + 5).stamps(flips)
+
+
 def across_halves(stand: Stand, reach: int) -> list[Stamp]:
     """Flip a gate once at every cycle of ± reach around a place where the time is extended."""
     stand.record([], 5)  # to learn the board's time
