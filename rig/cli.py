@@ -18,7 +18,14 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-EXTRAS = {"distributed": "cluster", "matplotlib": "report", "mpmath": "bench", "scipy": "bench"}
+EXTRAS = {
+    "distributed": "cluster",
+    "matplotlib": "report",
+    "mpmath": "bench",
+    "scipy": "bench",
+    "textual": "tui",
+    "textual_plot": "tui",
+}
 """Packages that only some commands need, and the extra that brings each."""
 
 
@@ -107,6 +114,16 @@ def _parser() -> argparse.ArgumentParser:
         "--yes", action="store_true", help="answer every prompt; implied when nobody can answer"
     )
     _json(run)
+    run.add_argument("--socket", metavar="PATH", help="of the daemon to ask, if not the usual one")
+
+    daemon = command("daemon", "own a port and its session, and serve clients, until stopped")
+    daemon.add_argument("--port", required=True, help="device path or URL")
+    daemon.add_argument("--socket", metavar="PATH", help="where clients come, if elsewhere")
+    daemon.add_argument(
+        "--tcp", action="store_true", help="listen on a port of 127.0.0.1, as on Windows"
+    )
+
+    _tui(command("tui", "the lab session in the terminal: protocol, gates, runs, results"))
 
     _protocol(command("check", "say what a protocol's scene has and what follows from it"))
 
@@ -138,6 +155,12 @@ def _parser() -> argparse.ArgumentParser:
 
     analyze = command("analyze", "compute the results of a session")
     _session(analyze)
+    analyze.add_argument(
+        "--budget", type=_count, metavar="RUN", help="what one run's uncertainty is made of"
+    )
+    analyze.add_argument(
+        "--trials", type=_count, default=200, metavar="M", help="Monte Carlo trials beside it"
+    )
     _json(analyze)
 
     report = command("report", "write the results of a session as one HTML page")
@@ -148,6 +171,13 @@ def _parser() -> argparse.ArgumentParser:
     export = command("export", "write a session's results and edges as CSV files")
     _session(export)
     export.add_argument("--csv", required=True, metavar="DIR", help="folder for the files")
+
+    recover = command("recover", "say what is whole in a session file, which stays as it is")
+    _session(recover)
+    recover.add_argument("-o", "--output", metavar="NEW", help="save all that can be read there")
+    recover.add_argument(
+        "--protocol", metavar="FILE", help="the protocol file, where the session has lost it"
+    )
 
     _session(command("replay", "feed the recorded bytes through the whole stack and compare"))
 
@@ -161,6 +191,38 @@ def _parser() -> argparse.ArgumentParser:
     )
     flash.add_argument("--avrdude", metavar="PATH", help="where avrdude is, if not found by itself")
 
+    ports = command("ports", "list the ports where a board may be; opens none by itself")
+    ports.add_argument(
+        "--identify",
+        nargs="*",
+        metavar="PORT",
+        help="ask who is there: at these ports, or else at every candidate; opening a port "
+        "restarts the board behind it",
+    )
+    _json(ports)
+
+    doctor = command("doctor", "look for what is wrong with this computer, a board or a session")
+    doctor.add_argument("--port", help="also this board: device path or URL")
+    doctor.add_argument("--session", metavar="FILE", help="also this session, and its disk")
+
+    selftest = command("selftest", "have a board prove that it does what it must")
+    selftest.add_argument("--port", required=True, help="device path or URL")
+    selftest.add_argument(
+        "--loopback",
+        type=int,
+        choices=range(16),
+        metavar="GATE",
+        help="a wire joins the sync output to this gate: measure how exactly FIRE is stamped",
+    )
+    selftest.add_argument(
+        "--drops", type=_count, default=20, metavar="N", help="for that measurement (default 20)"
+    )
+    selftest.add_argument(
+        "--release",
+        action="store_true",
+        help="allow release 0 to be driven, once for 50 ms; without it no release ever is",
+    )
+
     bench = command("bench", "measure accuracy against hidden truth, and speed as ratios")
     benches = bench.add_subparsers(required=True, metavar="BENCH")
     accuracy = benches.add_parser("accuracy", help="errors of Δz, V and skew, coverage, matches")
@@ -171,6 +233,12 @@ def _parser() -> argparse.ArgumentParser:
     accuracy.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
     accuracy.add_argument(
         "--seeds", type=_count, default=5, metavar="N", help="sessions to simulate"
+    )
+    accuracy.add_argument(
+        "--repeats", type=_count, metavar="N", help="drops at each incline, not the protocol's"
+    )
+    accuracy.add_argument(
+        "--doubled", action="store_true", help="also with each dial of the simulation doubled"
     )
     _json(accuracy)
     stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
@@ -192,12 +260,49 @@ def _parser() -> argparse.ArgumentParser:
     scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
     scenes.add_argument("-o", "--output", metavar="DIR", help="folder for CSV, JSON and a picture")
     _json(scenes)
+    clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
+    clock.set_defaults(module="bench_clock")
+    clock.add_argument(
+        "--protocol", default="protocols/picket-fence.yaml", metavar="FILE", help="any scene"
+    )
+    clock.add_argument("--seeds", type=_count, default=20, metavar="N", help="lines to simulate")
+    _json(clock)
+    faults = benches.add_parser("faults", help="kill, pull and garble sessions; count what is lost")
+    faults.set_defaults(module="bench_faults")
+    faults.add_argument(
+        "--share", type=_count, default=100, metavar="PERCENT", help="of the full counts"
+    )
+    faults.add_argument("--jobs", type=_count, default=4, metavar="N", help="rigs side by side")
+    _json(faults)
+    links = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
+    links.set_defaults(module="bench_link")
+    _json(links)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")
     bulk.add_argument("--rounds", type=_count, default=15, metavar="N", help="of measurement")
     _json(bulk)
     return parser
+
+
+def _tui(tui: argparse.ArgumentParser) -> None:
+    tui.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="else to be picked there")
+    tui.add_argument(
+        "--port",
+        help="device path or URL, such as sim://?pace=1; its daemon is started if none runs. "
+        "Without it, the daemon that runs is watched",
+    )
+    tui.add_argument(
+        "--session",
+        metavar="FILE",
+        help="a new file, or one to be continued; alone: to be looked at, without a daemon",
+    )
+    tui.add_argument("--seed", type=int, metavar="N", help="of a simulation (default 0)")
+    tui.add_argument("--socket", metavar="PATH", help="of the daemon, if not the usual one")
+    tui.add_argument("--keys", metavar="FILE", help="your own keys (TOML)")
+    tui.add_argument(
+        "--pictures", metavar="DIR", help="write the main screens of --session as SVG files"
+    )
 
 
 def _sweep(sweep: argparse.ArgumentParser) -> None:

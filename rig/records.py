@@ -29,6 +29,29 @@ class Ping(NamedTuple):
     tick: int
 
 
+class Pulse(NamedTuple):
+    """What the device said of its 1 Hz reference, and the host time before and after it was asked.
+
+    `number` is how many pulses there were (u16), `tick` that of the latest (u32).
+    """
+
+    host_send_ns: int
+    host_recv_ns: int
+    number: int
+    tick: int
+
+
+class HostBreak(NamedTuple):
+    """The host's clocks did not go on as one: by how much, and when that was noticed.
+
+    `slept_ns` passed without the monotonic clock; the wall clock was set by `stepped_ns`.
+    """
+
+    host_ns: int
+    slept_ns: int
+    stepped_ns: int
+
+
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """The device's own account of a drop.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rig.link.transcript import Transcript
-from rig.records import Drop, Ping
+from rig.records import Drop, Ping, Pulse
 from rig.results import results
 
 if TYPE_CHECKING:
@@ -36,11 +36,13 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
         if not same:
             differences.append(what)
 
-    chunks, drops, pings = _from_bytes(session)
+    chunks, drops, pings, pulses = _from_bytes(session)
     if chunks:
         held = sorted(session.drops(), key=_key)
         compare("drops", sorted(drops, key=_key), held, len(held))
         compare("clock samples", pings, session.pings(), len(pings))
+        if pulses or session.pulses():
+            compare("reference pulses", pulses, session.pulses(), len(pulses))
     else:
         lines.append("no bytes were recorded: the edges come from a file")
     stored = session.results()
@@ -54,11 +56,12 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     return Outcome(tuple(lines), tuple(differences))
 
 
-def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping]]:
+def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping], list[Pulse]]:
     """Parse the whole byte log."""
     transcript = Transcript()
     drops: list[Drop] = []
     pings: list[Ping] = []
+    pulses: list[Pulse] = []
     chunks = 0
     for host_ns, direction, data in session.byte_log():
         chunks += 1
@@ -67,11 +70,13 @@ def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping]]:
                 drops.append(record)
             elif isinstance(record, Ping):
                 pings.append(record)
+            elif isinstance(record, Pulse):
+                pulses.append(record)
     # What was stored and not acknowledged any more still is in the bytes.
     have = {_key(drop) for drop in drops}
     stored = {_key(drop) for drop in session.drops()}
     drops += [d for d in transcript.unfinished() if _key(d) in stored - have]
-    return chunks, drops, pings
+    return chunks, drops, pings, pulses
 
 
 def _key(drop: Drop) -> tuple[int, int]:

@@ -2,109 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.drop import TimeScale
+from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
-from rig.link.clock import RESONATOR_TOLERANCE, tick_rate
+from rig.calibration import Calibration, calibration
 from rig.protocol import reader
 from rig.session.schema import RunState
 
+__all__ = [
+    "Calibration",
+    "calibration",
+    "detailed",
+    "protocol_of",
+    "rejected",
+    "results",
+    "tick_rates",
+]
+
 if TYPE_CHECKING:
+    from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
     from rig.protocol.scene import Protocol
-    from rig.records import Drop, Ping
+    from rig.records import Drop
     from rig.session.reading import Reader
-
-_APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
-_UNKNOWN = RESONATOR_TOLERANCE / 3**0.5
-
-
-@dataclass(frozen=True, slots=True)
-class Calibration:
-    """The time scale of a session.
-
-    Attributes
-    ----------
-    device
-        Of drops from the device; `None` where there was none.
-    source
-        In words.
-    details
-        For reports: numbers by name.
-    timer_u
-        Relative standard uncertainty of the time scale of imported edges.
-    """
-
-    device: TimeScale | None
-    source: str
-    details: dict[str, Any]
-    timer_u: float = _UNKNOWN
-
-    def scale(self, drop: Drop) -> TimeScale:
-        """Time scale of one drop; edges from another timer keep that timer's."""
-        if drop.certificate is None or self.device is None:
-            return TimeScale(drop.tick_hz, self.timer_u)
-        return self.device
-
-
-def calibration(session: Reader) -> Calibration:
-    """Calibrate a session's clock from everything it recorded."""
-    identities = session.identities()
-    nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
-    u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
-    if nominal is None:
-        return Calibration(
-            None,
-            "times as the file gives them",
-            {"source": "times as the file gives them", "relative_u": u},
-            u,
-        )
-    pings, boots_ns = _one_after_another(session.pings(), [ns for ns, _ in identities])
-    rate = tick_rate(pings, nominal, boots_ns)
-    source = (
-        f"device against host clock, {rate.n} samples"
-        if rate.n
-        else "nominal tick rate: too few clock samples"
-    )
-    return Calibration(
-        TimeScale(rate.hz, rate.u_hz / rate.hz),
-        source,
-        {
-            "source": source,
-            "tick_hz": rate.hz,
-            "nominal_tick_hz": nominal,
-            "error_ppm": (rate.hz / nominal - 1.0) * 1e6,
-            "u_ppm": rate.u_hz / rate.hz * 1e6,
-            "samples": rate.n,
-            "span_s": rate.span_s,
-        },
-        u,
-    )
-
-
-def _one_after_another(pings: list[Ping], identities_ns: list[int]) -> tuple[list[Ping], list[int]]:
-    """Put samples into one order of time where the host's clock began again in between.
-
-    Also return when the device may have restarted: at each of those breaks, and wherever it said
-    who it is. By which clock it said so is not known, so it is said by each.
-    """
-    found: list[Ping] = []
-    boots_ns = list(identities_ns)
-    shift = 0
-    for ping in pings:
-        if found and ping.host_send_ns + shift < found[-1].host_recv_ns:
-            last_ns = found[-1].host_recv_ns
-            shift = last_ns + _APART_NS - ping.host_send_ns
-            # How far apart the two really are nobody knows: no line may go through both.
-            boots_ns += [last_ns, *(ns + shift for ns in identities_ns)]
-        found.append(
-            ping._replace(
-                host_send_ns=ping.host_send_ns + shift, host_recv_ns=ping.host_recv_ns + shift
-            )
-        )
-    return found, boots_ns
 
 
 def protocol_of(session: Reader) -> Protocol:
@@ -122,17 +43,43 @@ def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]
     progress
         Called with the number of drops done and the number of all.
     """
-    found, clock = detailed(session, progress)
-    return {"simulated": session.simulated, "clock": clock.details} | found.json()
+    protocol = protocol_of(session)
+    found, clock, drops = _analysed(session, protocol, progress)
+    by_key = {(drop.run, drop.attempt): drop for drop in drops}
+    said = found.json()
+    for run in (*said["runs"], *said.get("superseded", [])):
+        run["calibration"] = clock.used(by_key[run["run"], run["attempt"]])
+    cases = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
+    check = check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in cases])
+    head = {"simulated": session.simulated, "clock": clock.details}
+    return head | {"calibration": clock.said | _checked(clock.said["notes"], check)} | said
+
+
+def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
+    """Add to a calibration what the free chain says of it."""
+    if check is None:
+        return {}
+    if not check.agrees:
+        notes = [
+            *notes,
+            f"the free chain falls with {check.measured.value:.4f} ± {check.measured.expanded:.4f} "
+            f"m/s², the protocol says {check.stated.value:.4f} (Eₙ {check.normalized_error:.1f}): "
+            "the clock, the beams' heights, the air or the protocol's gravity is not as stated",
+        ]
+    return {"gravity": check.json(), "notes": notes}
 
 
 def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
     """Analyse a session and keep everything, each edge's rod too."""
-    clock = calibration(session)
-    found = analyze(
-        protocol_of(session), list(session.drops()), clock.scale, rejected(session), progress
-    )
-    return found, clock
+    return _analysed(session, protocol_of(session), progress)[:2]
+
+
+def _analysed(
+    session: Reader, protocol: Protocol, progress: Progress | None
+) -> tuple[Analysis, Calibration, list[Drop]]:
+    clock, drops = calibration(session), list(session.drops())
+    found = analyze(protocol, drops, clock.scale, rejected(session), progress)
+    return found, clock, drops
 
 
 def rejected(session: Reader) -> dict[tuple[int, int], tuple[str, ...]]:

@@ -44,8 +44,8 @@ class VirtualBoard:
         What the gates see.
     seed
         Chooses unique id, tokens and the counter's start.
-    tick_hz, ppm
-        Nominal rate, and how far the true rate is off.
+    tick_hz, ppm, drift_ppm, wander_ppm
+        Nominal rate, and how the true rate is off: see `sim.counter.Counter`.
     baudrate
         Of the line.
     capacity
@@ -65,6 +65,8 @@ class VirtualBoard:
         *,
         tick_hz: int = 16_000_000,
         ppm: float = 0.0,
+        drift_ppm: float = 0.0,
+        wander_ppm: float = 0.0,
         baudrate: int = 500_000,
         capacity: int = CAPACITY,
         streams: bool = False,
@@ -89,7 +91,9 @@ class VirtualBoard:
         )
         self._random = random.Random(f"board {seed}")  # noqa: S311 - a simulation, not secrets
         start = self._random.getrandbits(32) if start_tick is None else start_tick
-        self.counter = Counter(tick_hz, ppm, start)
+        self.counter = Counter(
+            tick_hz, ppm, start, drift_ppm=drift_ppm, wander_ppm=wander_ppm, seed=seed
+        )
         self._now_ns = 0
         self._boot_ns: int | None = None
         self._boot_cause = EXTERNAL_RESET
@@ -129,7 +133,7 @@ class VirtualBoard:
         self.line.clear(at_ns)
         before = self._controller
         self._forget()
-        if before.drop and before.phase is Phase.HOLDING and not cause & POWER_ON:
+        if before.drop is not None and before.phase is Phase.HOLDING and not cause & POWER_ON:
             self._controller.drop = before.drop
             before.drop.aborted = False  # so it must be acknowledged
         self.counter.start = self._random.getrandbits(32)
@@ -152,15 +156,18 @@ class VirtualBoard:
         if opened:
             self._tell(self._controller.stop(self._now_ns))
 
-    def reference(self, times_ns: Iterable[int]) -> None:
+    def reference(self, times_ns: Iterable[int], period_ns: int = 0) -> None:
         """Have the 1 Hz reference give pulses.
 
         Parameters
         ----------
         times_ns
             When, in order of time.
+        period_ns
+            How it goes on after these; 0 for not at all.
         """
         self._inputs.pulses_ns.extend(times_ns)
+        self._inputs.period_ns = period_ns
 
     def sense(self, seconds: float | None) -> None:
         """Have the release-sense input change so long after each FIRE to come, or never."""
@@ -221,7 +228,7 @@ class VirtualBoard:
         self._boot_ns = None
         self._inbox.clear()  # nobody listened
         while self._inputs.pulses_ns and self._inputs.pulses_ns[0] <= self._now_ns:
-            self._inputs.pulses_ns.popleft()
+            self._inputs.pulse()
         self.line.send(self._now_ns, DELIMITER)  # the reset may have cut a frame short
         self._send(wire.Boot(self._boot_cause))
 
@@ -235,7 +242,7 @@ class VirtualBoard:
             state.drop.store(change.tick, change.state)
 
     def _reference_pulse(self) -> None:
-        self._controller.reference_pulse(self.counter.tick_at(self._inputs.pulses_ns.popleft()))
+        self._controller.reference_pulse(self.counter.tick_at(self._inputs.pulse()))
 
     def _sense(self) -> None:
         state = self._controller

@@ -234,10 +234,11 @@ class Controller:
             pulse_us = min(order.pulse_us, order.record_ms * 1000)
             self.release.pulse(order.release, self._now_ns, pulse_us)
         changes = self._lab.drop(order.label)
-        snapshots = take_snapshots(changes, 0, order.gates, self._counter.hz)
+        hz = self._counter.hz(self._now_ns)
+        snapshots = take_snapshots(changes, 0, order.gates, hz)
         self.coming.extend(
             Coming(
-                self._now_ns + round(s.ticks / self._counter.hz * 1e9),
+                self._now_ns + round(s.ticks / hz * 1e9),
                 (tick + s.ticks) % 2**32,
                 s.state,
             )

@@ -51,8 +51,16 @@ class Dials:
         Chance for each struck rod to bounce back through the lowest beam.
     clock
         Error of the device's clock, relative.
+    drift
+        By how much that changes in an hour, relative.
+    wander
+        Standard deviation of its random walk after an hour, relative.
+    reference
+        Error of a wired 1 Hz reference, relative; not-a-number: none is wired.
     latency
         Mean of the exponential delay of the host's reads, s.
+    stalled, stall
+        Share of the host's reads that are held up, and for how long, s.
     corrupt, lose
         Share of bytes on the line, either way, that are changed or lost.
     restitution, friction
@@ -75,7 +83,12 @@ class Dials:
     string: float = 0.002
     bounce: float = 0.05
     clock: float = -1300e-6
+    drift: float = 0.0
+    wander: float = 0.0
+    reference: float = math.nan
     latency: float = 0.3e-3
+    stalled: float = 0.0
+    stall: float = 50e-3
     corrupt: float = 0.0
     lose: float = 0.0
     restitution: float = math.nan
@@ -88,10 +101,12 @@ class Dials:
 
 
 _NAMES = tuple(field.name for field in fields(Dials))
-_KEPT = {"delay", "restitution", "friction"}
-_TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency"}
+_KEPT = {"delay", "restitution", "friction", "reference", "stall"}
+_TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall"}
 _LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
-_SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose"}
+_SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled"}
+_SIGNED = {"clock", "drift", "reference", "restitution"}
+_RATES = {"clock", "reference"}
 
 
 def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
@@ -128,14 +143,14 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
             changes[name] = parse(text, dimension).value
         except UnitError as error:
             raise InputError(f"{scheme}://: {name}: {error}") from None
-        if changes[name] < 0.0 and name not in {"clock", "restitution"}:
+        if changes[name] < 0.0 and name not in _SIGNED:
             raise InputError(f"{scheme}://: {name}: {text} is negative; zero or more is accepted")
         if changes[name] > 1.0 and name in _SHARES:
             raise InputError(
                 f"{scheme}://: {name}: {text} is more than all", "a share is 0 to 100 %"
             )
-        if changes[name] <= -1.0 and name == "clock":
+        if changes[name] <= -1.0 and name in _RATES:
             raise InputError(
-                f"{scheme}://: clock: {text} would stop it", "a real one is off by < 0.5 %"
+                f"{scheme}://: {name}: {text} would stop it", "a real one is off by < 0.5 %"
             )
     return replace(dials, **changes)

@@ -16,10 +16,20 @@ class Inputs:
         Whether the emergency stop is open.
     pulses_ns
         When the reference will give a pulse, in order of time.
+    period_ns
+        After the last of these it goes on with this period; 0 for not at all.
     sense_s
         How long after a release fires the sense input changes; `None` for not at all.
     """
 
     stopped: bool = False
     pulses_ns: deque[int] = field(default_factory=deque)
+    period_ns: int = 0
     sense_s: float | None = None
+
+    def pulse(self) -> int:
+        """Take the next pulse: when it is."""
+        when_ns = self.pulses_ns.popleft()
+        if self.period_ns and not self.pulses_ns:
+            self.pulses_ns.append(when_ns + self.period_ns)
+        return when_ns

@@ -21,5 +21,15 @@ class Serial(SimulatedSerial):
         scene = set_scene("sim", read_settings(str(self.port)))
         self.clock = VirtualClock(scene.pace)
         self.disturb(scene.seed, **scene.line())
-        ppm = scene.dials.clock * 1e6
-        return VirtualBoard(scene.lab, scene.seed, ppm=ppm, baudrate=self.baudrate)
+        dials = scene.dials
+        board = VirtualBoard(
+            scene.lab,
+            scene.seed,
+            ppm=dials.clock * 1e6,
+            drift_ppm=dials.drift * 1e6,
+            wander_ppm=dials.wander * 1e6,
+            baudrate=self.baudrate,
+        )
+        if (second_ns := scene.second_ns()) is not None:
+            board.reference([second_ns], second_ns)
+        return board

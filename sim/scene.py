@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
@@ -24,6 +25,8 @@ class LineDials(TypedDict):
     """How bad the line is, see `SimulatedSerial.disturb`."""
 
     jitter_s: float
+    stalled: float
+    stall_s: float
     corrupt: float
     lose: float
 
@@ -46,7 +49,18 @@ class Scene:
     def line(self) -> LineDials:
         """Name the dials of the line."""
         dials = self.dials
-        return {"jitter_s": dials.latency, "corrupt": dials.corrupt, "lose": dials.lose}
+        return {
+            "jitter_s": dials.latency,
+            "stalled": dials.stalled,
+            "stall_s": dials.stall,
+            "corrupt": dials.corrupt,
+            "lose": dials.lose,
+        }
+
+    def second_ns(self) -> int | None:
+        """Length of the wired reference's second; `None` where none is wired."""
+        error = self.dials.reference
+        return None if math.isnan(error) else round(1e9 / (1.0 + error))
 
 
 def read_settings(url: str) -> dict[str, str]:

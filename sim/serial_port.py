@@ -33,6 +33,8 @@ class SimulatedSerial(SerialBase):
         Chooses latencies and line faults: same seed, same bytes.
     jitter_s
         Mean of the exponential delay with which the host sees a byte.
+    stalled, stall_s
+        Probability of a read to be held up besides, and for how long.
     corrupt, lose
         Probability of each byte, either way, to be changed or lost.
     reset_on_open
@@ -49,6 +51,8 @@ class SimulatedSerial(SerialBase):
         clock: VirtualClock | None = None,
         seed: int = 0,
         jitter_s: float = 0.3e-3,
+        stalled: float = 0.0,
+        stall_s: float = 50e-3,
         corrupt: float = 0.0,
         lose: float = 0.0,
         reset_on_open: bool = True,
@@ -57,17 +61,27 @@ class SimulatedSerial(SerialBase):
         self.clock = VirtualClock() if clock is None else clock
         self.board = board
         self.reset_on_open = reset_on_open
-        self.disturb(seed, jitter_s=jitter_s, corrupt=corrupt, lose=lose)
+        self.disturb(
+            seed, jitter_s=jitter_s, stalled=stalled, stall_s=stall_s, corrupt=corrupt, lose=lose
+        )
         self._buffer = bytearray()
         self._line_free_ns = 0
         super().__init__(port, **settings)
 
     def disturb(
-        self, seed: int, *, jitter_s: float = 0.3e-3, corrupt: float = 0.0, lose: float = 0.0
+        self,
+        seed: int,
+        *,
+        jitter_s: float = 0.3e-3,
+        stalled: float = 0.0,
+        stall_s: float = 50e-3,
+        corrupt: float = 0.0,
+        lose: float = 0.0,
     ) -> None:
         """Choose latencies and line faults; the parameters are those of the class."""
         self._random = random.Random(f"latency {seed}")  # noqa: S311 - noise, not secrets
         self._jitter_s = jitter_s
+        self._stalled, self._stall_s = stalled, stall_s
         self._to_board = LineFaults(corrupt, lose, seed=2 * seed)
         self._to_host = LineFaults(corrupt, lose, seed=2 * seed + 1)
 
@@ -123,6 +137,8 @@ class SimulatedSerial(SerialBase):
             clock.advance_to(next_ns or 0)
             if arrives and self._jitter_s > 0:
                 clock.sleep(self._random.expovariate(1 / self._jitter_s))
+            if arrives and self._stalled > 0 and self._random.random() < self._stalled:
+                clock.sleep(self._stall_s)
             self._pass(0)
         data = bytes(self._buffer[:size])
         del self._buffer[:size]

@@ -45,7 +45,7 @@ def packages_loaded_by(program: str, *arguments: str) -> set[str]:
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-@pytest.mark.parametrize("package", ["numpy", "yaml", "matplotlib"])
+@pytest.mark.parametrize("package", ["numpy", "yaml", "matplotlib", "textual"])
 def test_an_import_does_show(package):
     assert package in packages_loaded_by(f"import {package}")
 

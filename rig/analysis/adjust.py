@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from rig.analysis.normal import normal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,10 +25,9 @@ if TYPE_CHECKING:
 _STEPS = 60
 _DONE = 1e-6  # of a standard uncertainty
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
-_HUBER = 4.0  # standard deviations beyond which an edge counts less
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Estimate:
     """Unknowns after adjustment.
 
@@ -54,11 +56,16 @@ class Estimate:
     scatter: float
     settled: bool = True
 
+    @cached_property
+    def covariance(self) -> Array:
+        """Inverse of the normal matrix."""
+        return np.linalg.inv(self.information).astype(float, copy=False)
 
-def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
+
+def adjust(model: DropModel, matches: Matches, x: Array, centre: Array | None = None) -> Estimate:
     """Find the unknowns that fit all matched edges best.
 
-    Gauss–Newton on ‖r/σ‖² + ‖x/sd‖²; residuals beyond 4 σ weigh less (Huber).
+    Gauss–Newton on ‖r/σ‖² + ‖(x − centre)/sd‖²; residuals beyond 4 σ weigh less (Huber).
 
     Parameters
     ----------
@@ -66,30 +73,29 @@ def adjust(model: DropModel, matches: Matches, x: Array) -> Estimate:
         For each side what `rig.analysis.align.align` found.
     x
         Where to begin.
+    centre
+        Prior means of the unknowns, zero if not given.
     """
     sd = model.unknowns.sd
     free = sd > 0.0
     scaled = np.divide(x, sd, out=np.zeros_like(x), where=free)
+    prior = np.zeros_like(x)
+    if centre is not None:
+        prior = np.divide(centre, sd, out=prior, where=free)
     information = data = np.eye(x.size)
     chi2, degrees = 0.0, 0.0
     inflation = 1.0
     settled = False
     for step in range(_STEPS):
-        rows = [model.equations(role, scaled * sd, match) for role, match in matches.items()]
-        sigma = np.concatenate([row.sigma for row in rows]) * inflation
-        residuals = np.concatenate([row.residuals for row in rows]) / sigma
-        jacobian = np.concatenate([row.jacobian for row in rows]) * sd / sigma[:, None]
-        size = np.abs(residuals)
-        weight = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-300)))
-        residuals, jacobian = residuals * weight, jacobian * weight[:, None]
-        data = jacobian.T @ jacobian
+        found = normal(model, matches, scaled * sd, sd, inflation)
+        data = found.matrix
         information = data + np.eye(x.size)
-        new = np.linalg.solve(information, jacobian.T @ (jacobian @ scaled - residuals))
+        new = np.linalg.solve(information, data @ scaled - found.vector + prior)
         moved = float(np.abs(new - scaled).max(initial=0.0))
         scaled = new
-        before, chi2 = chi2, float(residuals @ residuals)
+        before, chi2 = chi2, found.chi2
         if step and abs(chi2 - before) <= _STEADY * max(chi2, 1.0):
-            degrees = residuals.size - float(np.trace(np.linalg.solve(information, data)))
+            degrees = found.size - float(np.trace(np.linalg.solve(information, data)))
             factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
             if factor >= 1.05:
                 inflation *= factor  # the edges scatter more than assumed: weigh them so
@@ -114,7 +120,7 @@ def uncertainty(
     groups
         Lines of the budget.
     """
-    inverse = np.linalg.solve(estimate.information, gradient * estimate.sd)
+    inverse = estimate.covariance @ (gradient * estimate.sd)
     whole = math.sqrt(max(0.0, float(gradient * estimate.sd @ inverse)))
     parts = {
         name: math.sqrt(sum(float(inverse[block] @ inverse[block]) for block in blocks))

@@ -2,7 +2,8 @@
 
 Each observed edge is matched to an expected one of the same polarity, or is extra; each expected
 edge is matched or missed. Order is kept, so the cheapest assignment is found by dynamic
-programming over (observed, expected), here for all gates of a side at once.
+programming over (observed, expected), for all gates of a side at once; gates where every edge has
+one possible partner need none.
 """
 
 from __future__ import annotations
@@ -60,6 +61,31 @@ def align(
         _costs(train, level, trajectory, scale, 1.0 + clock)
         for train, level in zip(trains, levels, strict=True)
     ]
+    found = [_plain(cost) for cost in costs]
+    hard = [gate for gate, match in enumerate(found) if match is None]
+    solved = dict(zip(hard, _best([costs[gate] for gate in hard]), strict=True))
+    return [solved[gate] if match is None else match for gate, match in enumerate(found)]
+
+
+def _plain(costs: Array) -> Index | None:
+    """Match a gate where every edge has at most one partner; `None` where there is a choice.
+
+    A pair is worth while if it costs less than a missed and an extra edge. Where all such pairs
+    are apart and in order, taking all of them is the cheapest of all matchings.
+    """
+    worth = costs < MISSED + EXTRA
+    if costs.size and (worth.sum(axis=0).max() > 1 or worth.sum(axis=1).max() > 1):
+        return None
+    matched = np.full(costs.shape[1], -1, dtype=np.intp)
+    edge, rod = np.nonzero(worth)
+    if np.any(np.diff(rod) < 0):
+        return None
+    matched[rod] = edge
+    return matched
+
+
+def _best(costs: Sequence[Array]) -> list[Index]:
+    """Match several gates by dynamic programming, side by side."""
     rows = max((cost.shape[0] for cost in costs), default=0)
     columns = max((cost.shape[1] for cost in costs), default=0)
     stacked = np.full((rows, len(costs), columns), np.inf)

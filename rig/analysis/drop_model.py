@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.components import STATED, Components
 from rig.analysis.trajectory import (
     COMMON,
     GRAVITY,
@@ -15,15 +18,7 @@ from rig.analysis.trajectory import (
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import (
-    ANY_GRAVITY,
-    ANYTHING,
-    BEAM_U,
-    HANG_U,
-    IMPULSE_FLOOR,
-    IMPULSE_U,
-    Unknowns,
-)
+from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SIDE_U, Unknowns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -31,17 +26,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.pattern import Guess
-    from rig.analysis.trains import Side
+    from rig.analysis.trains import Side, Train
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.scene import Protocol
 
     Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
-
-FLOOR = 0.1e-3
-"""What an edge may be off for reasons not in the equations (a rod not quite round), m."""
-JITTER = 2e-6
-"""Scatter of one time stamp, s."""
 
 
 class Equations(NamedTuple):
@@ -55,11 +46,69 @@ class Equations(NamedTuple):
         Derivatives by all unknowns.
     sigma
         Standard deviation of each residual, m.
+    speed
+        Of the chain at each edge, m/s.
+    clean
+        Whether each edge is no part of a flicker.
     """
 
     residuals: Array
     jacobian: Array
     sigma: Array
+    speed: Array
+    clean: Flags
+
+
+class Expected(NamedTuple):
+    """All gates of a side one after another.
+
+    Attributes
+    ----------
+    times, burst
+        Of every observed edge, see `rig.analysis.trains.Train`.
+    rods, gate, levels
+        Of every expected edge.
+    sign
+        By how much its height follows the rods' width: −½ where it darkens the beam, else ½.
+    begins, ends
+        Number of observed edges before each gate, and of expected ones after each but the last.
+    """
+
+    times: Array
+    burst: Array
+    rods: Index
+    gate: Index
+    levels: Array
+    sign: Array
+    begins: Index
+    ends: Index
+
+    @classmethod
+    def of(cls, trains: Sequence[Train]) -> Expected:
+        """Join the gates of a side."""
+        observed = np.array([train.times.size for train in trains])
+        expected = [train.rods.size for train in trains]
+        return cls(
+            np.concatenate([train.times for train in trains]),
+            np.concatenate([train.burst for train in trains]),
+            np.concatenate([train.rods for train in trains]),
+            np.repeat([train.gate for train in trains], expected),
+            np.concatenate([train.levels for train in trains]),
+            np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
+            np.cumsum(observed) - observed,
+            np.cumsum(expected)[:-1],
+        )
+
+    def chosen(self, matches: Sequence[Index]) -> tuple[Index, Index]:
+        """Expected edges that are matched, and the observed edge of each."""
+        edges = np.concatenate(
+            [
+                np.where(match >= 0, match + begin, -1)
+                for match, begin in zip(matches, self.begins, strict=True)
+            ]
+        )
+        pick = np.flatnonzero(edges >= 0)
+        return pick, edges[pick]
 
 
 class DropModel:
@@ -75,6 +124,8 @@ class DropModel:
         First guess for each side, by role.
     clock_u
         Relative standard uncertainty of the time scale.
+    components
+        How much everything scatters.
     """
 
     def __init__(
@@ -83,36 +134,83 @@ class DropModel:
         sides: Sequence[Side],
         guesses: Mapping[str, Guess],
         clock_u: float,
+        components: Components = STATED,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
         self.sides: dict[str, Side] = {side.role: side for side in sides}
         self.guesses = guesses
-        gates = protocol.gates.gates
-        self.heights = np.array([gate.height for gate in gates])
+        self.clock_u = clock_u
+        self.components = components
+        self.expected: dict[str, Expected] = {
+            role: Expected.of(side.trains) for role, side in self.sides.items()
+        }
+        slopes: dict[str, float] = {
+            side.role: math.tan(math.radians(side.chain.tilt_deg)) for side in sides
+        }
+        self._steepest = max(slopes.values(), default=0.0)
+        # A beam is off by as much for a chain of less tilted rods, which shows less.
+        self._tilts: dict[str, float] = {
+            role: slope / (self._steepest or 1.0) for role, slope in slopes.items()
+        }
+        self.unknowns = self._unknowns()
+
+    def _unknowns(self) -> Unknowns:
+        """Name everything that is not known, with what is known of it beforehand."""
+        protocol, components = self.protocol, self.components
+        assert protocol.gates is not None
+        gates = len(protocol.gates.gates)
         free_only = protocol.surface is None
         unknowns = Unknowns()
-        unknowns.add("clock", "clock", clock_u)
+        unknowns.add("clock", "clock", self.clock_u)
         unknowns.add("gravity", "gravity", ANY_GRAVITY if free_only else protocol.gravity.u)
         unknowns.add("drop", "drop height", protocol.drop.u)
-        unknowns.add("beams", "beam heights", [protocol.gates.height_u] * len(gates))
-        slopes = [math.tan(math.radians(side.chain.tilt_deg)) for side in sides]
-        if any(slopes):
-            unknowns.add("ripple", "beam offsets", [BEAM_U * max(slopes)] * len(gates))
-        for side in sides:
-            chain, role = side.chain, side.role
+        if len(self.sides) > 1:
+            unknowns.add("side", "hanging height", SIDE_U)
+        unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
+        if self._steepest:
+            unknowns.add("ripple", "beam offsets", [components.beam * self._steepest] * gates)
+        for role, side in self.sides.items():
+            chain = side.chain
+            places = [components.rods * chain.position_u] * chain.chain.rods
             unknowns.add(f"{role} release", "edges", ANYTHING)
-            unknowns.add(f"{role} hang", "hanging height", HANG_U)
-            unknowns.add(f"{role} rods", "rod places", [chain.position_u] * chain.chain.rods)
+            unknowns.add(f"{role} hang", "hanging height", components.hang)
+            unknowns.add(f"{role} rods", "rod places", places)
             unknowns.add(f"{role} width", "rod width", chain.width_u)
         if "impact" in self.sides:
-            alpha = abs(guesses["impact"].alpha)
-            scatter = math.hypot(IMPULSE_U * alpha, IMPULSE_FLOOR)
+            rods = self.sides["impact"].chain.chain.rods
+            scatter = components.impulses(abs(self.guesses["impact"].alpha))
             unknowns.add("alpha", "edges", ANYTHING)
-            unknowns.add(
-                "impulses", "single impulses", [scatter] * self.sides["impact"].chain.chain.rods
-            )
-        self.unknowns = unknowns
+            unknowns.add("impulses", "single impulses", [scatter] * rods)
+        return unknowns
+
+    def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
+        """Return the same drop with other priors, that of impulses relative to the α found.
+
+        Parameters
+        ----------
+        x
+            Unknowns; α becomes part of the guess, so that its unknown is set to zero in place.
+        """
+        guesses = dict(self.guesses)
+        if "impact" in guesses:
+            at = self.unknowns["alpha"]
+            struck = guesses["impact"]
+            guesses["impact"] = replace(struck, alpha=struck.alpha + float(x[at][0]))
+            x[at] = 0.0
+        other = copy(self)
+        other.components, other.clock_u, other.guesses = components, clock_u, guesses
+        other.unknowns = other._unknowns()
+        return other
+
+    def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
+        """Return the same drop with its edges moved in time, by so many seconds each."""
+        other = copy(self)
+        other.expected = {
+            role: expected._replace(times=expected.times + shifts[role])
+            for role, expected in self.expected.items()
+        }
+        return other
 
     def first(self) -> Array:
         """Unknowns as the first guess has them, shape ``(unknowns,)``."""
@@ -126,6 +224,8 @@ class DropModel:
         at = self.unknowns
         release = self.guesses[role].release + float(x[at[f"{role} release"]][0])
         start = self.protocol.drop.value + float(x[at["drop"]][0] + x[at[f"{role} hang"]][0])
+        if role == "free" and "side" in at:
+            start += float(x[at["side"]][0])
         gravity = self.protocol.gravity.value + float(x[at["gravity"]][0])
         if role == "free":
             return free_trajectory(release, start, gravity)
@@ -153,6 +253,8 @@ class DropModel:
         found[..., at[f"{role} release"]] = derivatives[..., [RELEASE]]
         found[..., at["gravity"]] = derivatives[..., [GRAVITY]]
         found[..., at["drop"]] = found[..., at[f"{role} hang"]] = derivatives[..., [START]]
+        if role == "free" and "side" in at:
+            found[..., at["side"]] = derivatives[..., [START]]
         if role == "impact":
             rods = self.sides["impact"].chain.chain.rods
             by_gain = derivatives[..., COMMON : COMMON + rods]
@@ -163,48 +265,40 @@ class DropModel:
 
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""
-        at = self.unknowns
-        side = self.sides[role]
-        found = []
-        for train in side.trains:
-            shift = x[at["beams"]][train.gate] - x[at[f"{role} rods"]][train.rods]
-            if "ripple" in at:
-                shift -= _alternating(train.rods) * x[at["ripple"]][train.gate]
-            width = 0.5 * float(x[at[f"{role} width"]][0])
-            found.append(train.levels + shift + np.where(train.blocks, width, -width))
+        return np.split(self._levels(role, x), self.expected[role].ends)
+
+    def _levels(self, role: str, x: Array) -> Array:
+        at, expected = self.unknowns, self.expected[role]
+        shift = x[at["beams"]][expected.gate] - x[at[f"{role} rods"]][expected.rods]
+        if "ripple" in at:
+            shift -= self._ripple(role, expected.rods) * x[at["ripple"]][expected.gate]
+        found: Array = expected.levels + shift - expected.sign * x[at[f"{role} width"]][0]
         return found
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges."""
-        at = self.unknowns
-        side = self.sides[role]
+        at, expected = self.unknowns, self.expected[role]
         path = self.trajectory(role, x)
-        pick = [match >= 0 for match in matches]
-        chosen = [match[ok] for match, ok in zip(matches, pick, strict=True)]
-        columns = list(zip(side.trains, chosen, pick, strict=True))
-        raw = np.concatenate([train.times[edge] for train, edge, _ in columns])
-        rods = np.concatenate([train.rods[ok] for train, _, ok in columns])
-        sign = np.concatenate([np.where(train.blocks[ok], -0.5, 0.5) for train, _, ok in columns])
-        gate = np.concatenate([np.full(edge.size, train.gate) for train, edge, _ in columns])
-        level = np.concatenate(
-            [level[ok] for level, ok in zip(self.levels(role, x), pick, strict=True)]
-        )
+        pick, edge = expected.chosen(matches)
+        raw, burst = expected.times[edge], expected.burst[edge]
+        rods, sign, gate = expected.rods[pick], expected.sign[pick], expected.gate[pick]
         times = raw * (1.0 + x[at["clock"]])
         height, speed = path.heights(times)
         jacobian = self.spread(role, path.derivatives(times))
         row = np.arange(times.size)
-        jacobian[row, at["clock"].start] -= speed * raw
+        jacobian[:, at["clock"].start] -= speed * raw
         jacobian[row, at[f"{role} rods"].start + rods] += 1.0
-        jacobian[row, at[f"{role} width"].start] += sign
+        jacobian[:, at[f"{role} width"].start] += sign
         jacobian[row, at["beams"].start + gate] -= 1.0
         if "ripple" in at:
-            jacobian[row, at["ripple"].start + gate] += _alternating(rods)
-        burst = np.concatenate([train.burst[edge] for train, edge, _ in columns])
-        sigma = np.sqrt(FLOOR**2 + (speed * np.hypot(JITTER, burst)) ** 2)
-        return Equations(height - level, jacobian, sigma)
+            jacobian[row, at["ripple"].start + gate] += self._ripple(role, rods)
+        known = self.components
+        sigma = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + burst**2))
+        residuals = height - self._levels(role, x)[pick]
+        return Equations(residuals, jacobian, sigma, speed, burst == 0.0)
 
-
-def _alternating(rods: Index) -> Array:
-    """+1 for even rods, −1 for odd ones: neighbours are tilted the other way."""
-    found: Array = np.where(rods % 2, -1.0, 1.0)
-    return found
+    def _ripple(self, role: str, rods: Index) -> Array:
+        """+ for even rods, − for odd ones: neighbours are tilted the other way."""
+        tilt = self._tilts[role]
+        found: Array = np.where(rods % 2, -tilt, tilt)
+        return found

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.unknowns import HANG_U
+from rig.analysis.components import STATED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -136,7 +136,7 @@ def _refine(
 ) -> tuple[float, float]:
     """Fit release time and start height to the pairs that voted for them."""
     offset = 0.0
-    prior = (_ROUGH / max(start.u, HANG_U)) ** 2
+    prior = (_ROUGH / max(start.u, STATED.hang)) ** 2
     for _ in range(_STEPS):
         since = times - release
         residual = start.value + offset - 0.5 * gravity * since**2 - levels

@@ -20,17 +20,18 @@ if TYPE_CHECKING:
 
 def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
     """Return everything the scene lets one measure, by its JSON name."""
-    found: dict[str, tuple[float, Array]] = {}
-    if "impact" not in model.sides:
-        found["gravity_m_s2"] = _gravity(model, estimate.x)
-    else:
-        if "free" in model.sides:
-            found |= _separation(model, estimate.x)
-        found |= _impact(model, estimate.x)
     return {
         name: _measured(model, estimate, value, gradient)
-        for name, (value, gradient) in found.items()
+        for name, (value, gradient) in measurands(model, estimate.x).items()
     }
+
+
+def measurands(model: DropModel, x: Array) -> dict[str, tuple[float, Array]]:
+    """Return the value of each measurand and its derivatives by all unknowns."""
+    if "impact" not in model.sides:
+        return {"gravity_m_s2": _gravity(model, x)}
+    found = _separation(model, x) if "free" in model.sides else {}
+    return found | _impact(model, x)
 
 
 def _measured(model: DropModel, estimate: Estimate, value: float, gradient: Array) -> Measured:

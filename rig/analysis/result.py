@@ -11,6 +11,9 @@ from rig.analysis.student import coverage_factor
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rig.protocol.scene import Run
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
@@ -30,12 +33,16 @@ class Measured:
         Degrees of freedom of `u`.
     budget
         What each source adds to `u`; the squares add up to its square.
+    shared
+        What of `u` is common to all drops of a session, as a vector: those of two drops multiplied
+        are their covariance. `None` for a drop by itself.
     """
 
     value: float
     u: float
     degrees: float = math.inf
     budget: Mapping[str, float] = field(default_factory=dict)
+    shared: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
 
     @property
     def expanded(self) -> float:
@@ -71,6 +78,11 @@ class Audit:
     spurious: int
     lost: int
 
+    def after(self, matched: int) -> Audit:
+        """Count again, with another number of edges that belong to a rod."""
+        expected = self.matched + self.missed
+        return Audit(self.received, matched, expected - matched, self.received - matched, self.lost)
+
     def json(self) -> dict[str, int]:
         """As `rig analyze --json` prints it."""
         return {name: getattr(self, name) for name in self.__slots__}
@@ -88,6 +100,8 @@ class DropResult:
         For each matched edge (by its number in the drop) its rod, bottom rod 0.
     scatter
         How much more than assumed the edges scatter, at least 1; `None` when nothing was fitted.
+    learned
+        Whether the quantities are in the light of the whole session.
     """
 
     run: Run
@@ -98,6 +112,7 @@ class DropResult:
     quantities: Mapping[str, Measured] = field(default_factory=dict)
     matches: Mapping[int, int] = field(default_factory=dict)
     scatter: float | None = None
+    learned: bool = False
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
@@ -111,6 +126,7 @@ class DropResult:
         found["edges"] = self.audit.json()
         if self.scatter is not None:
             found["scatter"] = self.scatter
+        found["learned"] = self.learned
         found["verdict"] = self.verdict
         found["reasons"] = list(self.reasons)
         found["budget"] = [

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.drop import TimeScale, analyze_drop
+from rig.analysis.drop import TimeScale, fit_drop
+from rig.analysis.learn import FEWEST, learn
+from rig.analysis.lesson_json import lesson_json
+from rig.analysis.refine import Budgets
+from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
 from rig.errors import InputError
 from rig.protocol.measurable import check_measurable
@@ -14,6 +18,8 @@ from rig.protocol.plan import runs as planned_runs
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from rig.analysis.fit import Fit
+    from rig.analysis.learn import Lesson
     from rig.analysis.result import DropResult
     from rig.protocol.scene import Protocol
     from rig.records import Drop
@@ -33,11 +39,14 @@ class Analysis:
         Earlier attempts, by run and attempt.
     summary
         One line an incline.
+    lesson
+        What all good drops together teach; `None` where there are too few of them.
     """
 
     runs: tuple[DropResult, ...]
     superseded: tuple[DropResult, ...]
     summary: tuple[Incline, ...]
+    lesson: Lesson | None = None
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
@@ -47,6 +56,8 @@ class Analysis:
         }
         if self.superseded:
             found["superseded"] = [run.json() for run in self.superseded]
+        if self.lesson is not None:
+            found["learned"] = lesson_json(self.lesson)
         return found
 
 
@@ -86,21 +97,55 @@ def analyze(
     planned = {run.number: run for run in planned_runs(protocol)}
     rejected = rejected or {}
     results: list[DropResult] = []
+    fits: list[Fit | None] = []
     for number, drop in enumerate(drops, start=1):
         if drop.run not in planned:
             raise InputError(
                 f"run {drop.run} is not in the plan, which has {len(planned)} runs",
                 "is it the right protocol? rig check PROTOCOL shows the plan",
             )
-        result = analyze_drop(protocol, planned[drop.run], drop, scale(drop))
+        result, fit = fit_drop(protocol, planned[drop.run], drop, scale(drop))
         causes = rejected.get((drop.run, drop.attempt))
         if causes is not None:
             result = replace(result, verdict="rejected", reasons=(*causes, *result.reasons))
         results.append(result)
+        fits.append(fit)
         if progress is not None:
             progress(number, len(drops))
+    results, lesson = _taught(results, fits)
     results.sort(key=lambda result: (result.run.number, result.attempt))
     last = {result.run.number: result for result in results}
     latest = tuple(last.values())
     earlier = tuple(result for result in results if last[result.run.number] is not result)
-    return Analysis(latest, earlier, tuple(summarize(protocol, latest)))
+    return Analysis(latest, earlier, tuple(summarize(protocol, latest)), lesson)
+
+
+def _taught(
+    results: Sequence[DropResult], fits: Sequence[Fit | None]
+) -> tuple[list[DropResult], Lesson | None]:
+    """Give good drops the numbers that they have in the light of all of them.
+
+    A verdict is on a drop by itself, by limits fixed beforehand: what others teach about the rig
+    changes its numbers and never whether they count.
+    """
+    good = {
+        n: fit
+        for n, (result, fit) in enumerate(zip(results, fits, strict=True))
+        if fit is not None and result.verdict in GOOD and fit.estimate.settled
+    }
+    found = list(results)
+    if len(good) < FEWEST:
+        return found, None
+    lesson = learn(list(good.values()))
+    if not lesson.settled:
+        return found, None
+    budgets = Budgets(lesson)
+    for n, drop in zip(good, lesson.drops, strict=True):
+        found[n] = replace(
+            found[n],
+            audit=found[n].audit.after(drop.matched),
+            quantities=budgets.measured(drop),
+            matches=drop.rods,
+            learned=True,
+        )
+    return found, lesson

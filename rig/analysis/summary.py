@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
 from rig.model.predict import predict
@@ -67,6 +69,7 @@ class Incline:
             if name in self.deviations:
                 symbol, _, unit = name.partition("_")
                 found[f"{symbol}_sd_{unit}"] = self.deviations[name]
+                found[f"{symbol}_se_{unit}"] = self.deviations[name] / math.sqrt(self.n)
         found["predicted"] = {name: model.value for name, model in self.predicted.items()}
         found["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
         main, *others = self.means
@@ -110,8 +113,10 @@ def mean(runs: Sequence[Measured]) -> Measured:
     counts. Degrees of freedom are effective ones (GUM G.4).
     """
     n = len(runs)
-    common = math.sqrt(fmean(_common(run) ** 2 for run in runs))
-    own = math.sqrt(fmean(max(0.0, run.u**2 - _common(run) ** 2) for run in runs))
+    common, each = _common(runs)
+    own = math.sqrt(
+        fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
+    )
     seen = stdev(run.value for run in runs) if n > 1 else 0.0
     single = max(own, seen) / math.sqrt(n)
     u = math.hypot(single, common)
@@ -121,8 +126,18 @@ def mean(runs: Sequence[Measured]) -> Measured:
     )
 
 
-def _common(run: Measured) -> float:
-    return math.hypot(*(u for name, u in run.budget.items() if name in COMMON))
+def _common(runs: Sequence[Measured]) -> tuple[float, list[float]]:
+    """What averaging leaves, of the mean and of each run.
+
+    Runs of one session share errors with known signs, which may cancel where chains change places.
+    Of runs by themselves only the sources are known.
+    """
+    shared = [run.shared for run in runs if run.shared is not None]
+    if len(shared) == len(runs):
+        together = np.mean(shared, axis=0)
+        return math.sqrt(together @ together), [math.sqrt(one @ one) for one in shared]
+    each = [math.hypot(*(u for name, u in run.budget.items() if name in COMMON)) for run in runs]
+    return math.sqrt(fmean(part**2 for part in each)), each
 
 
 def _predicted(

@@ -7,6 +7,7 @@ free, and with the derivative by each of them carried along.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -120,29 +121,43 @@ def struck_trajectory(
     """
     rods = len(places)
     size = COMMON + 2 * rods
-    time, height, speed = (np.empty(rods + 1) for _ in range(3))
+    time, height, speed = [release], [start], [0.0]
     d_time, d_height, d_speed = (np.zeros((rods + 1, size)) for _ in range(3))
-    time[0], height[0], speed[0] = release, start, 0.0
     d_time[0, RELEASE] = d_height[0, START] = 1.0
+    d_height[np.arange(1, rods + 1), COMMON + rods + np.arange(rods)] = -1.0
     arrival, d_arrival = 0.0, np.zeros(size)
-    for k in range(rods):
-        height[k + 1] = -places[k]
-        d_height[k + 1, COMMON + rods + k] = -1.0
-        distance = height[k] - height[k + 1]
-        d_distance = d_height[k] - d_height[k + 1]
-        arrival = float(np.sqrt(speed[k] ** 2 + 2.0 * gravity * max(distance, 0.0)))
-        d_arrival = speed[k] * d_speed[k] + gravity * d_distance
-        d_arrival[GRAVITY] += distance
-        d_arrival /= arrival
+    above, sign = START, 1.0  # the place at which a leg begins, and how its height follows it
+    for k, (gain, ratio, place) in enumerate(
+        zip(gains.tolist(), ratios.tolist(), places.tolist(), strict=True)
+    ):
+        below = COMMON + rods + k
+        distance = height[k] + place
+        arrival = math.sqrt(speed[k] ** 2 + 2.0 * gravity * max(distance, 0.0))
+        # Few parameters change a leg's length: the sparse terms are added one by one.
+        by_length = gravity / arrival
+        d_arrival = (speed[k] / arrival) * d_speed[k]
+        d_arrival[above] += sign * by_length
+        d_arrival[below] += by_length
+        d_arrival[GRAVITY] += distance / arrival
         both = speed[k] + arrival
-        time[k + 1] = time[k] + 2.0 * distance / both
-        d_time[k + 1] = (
-            d_time[k]
-            + 2.0 * d_distance / both
-            - 2.0 * distance * (d_speed[k] + d_arrival) / both**2
-        )
-        factor = 1.0 + gains[k] * ratios[k]
-        speed[k + 1] = arrival * factor
-        d_speed[k + 1] = d_arrival * factor
-        d_speed[k + 1, COMMON + k] += arrival * ratios[k]
-    return Trajectory(time, height, speed, d_time, d_height, d_speed, gravity, arrival, d_arrival)
+        d_time[k + 1] = d_time[k] - (2.0 * distance / both**2) * (d_speed[k] + d_arrival)
+        d_time[k + 1, above] += sign * 2.0 / both
+        d_time[k + 1, below] += 2.0 / both
+        factor = 1.0 + gain * ratio
+        d_speed[k + 1] = factor * d_arrival
+        d_speed[k + 1, COMMON + k] += arrival * ratio
+        time.append(time[k] + 2.0 * distance / both)
+        height.append(-place)
+        speed.append(arrival * factor)
+        above, sign = below, -1.0
+    return Trajectory(
+        np.array(time),
+        np.array(height),
+        np.array(speed),
+        d_time,
+        d_height,
+        d_speed,
+        gravity,
+        arrival,
+        d_arrival,
+    )

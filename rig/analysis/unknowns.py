@@ -13,14 +13,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-HANG_U = 0.3e-3
-"""Scatter of where a chain hangs from run to run, m."""
-BEAM_U = 1.0e-3
-"""How far off a rod's middle a beam may run, m; times tan(tilt) it shifts edges rod by rod."""
-IMPULSE_U = 0.05
-"""Scatter of single impulses about α, relative to α."""
-IMPULSE_FLOOR = 0.003
-"""The same where α is small."""
+SIDE_U = 0.5e-3
+"""How much lower one side may hang than the other in every run, m."""
 ANYTHING = 1.0
 """Prior of release times (s) and α: nothing is known."""
 ANY_GRAVITY = 5.0

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.analysis.faults import find_faults
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.analysis.adjust import Estimate
+    from rig.analysis.fit import Fit
     from rig.analysis.pattern import Guess
     from rig.analysis.result import Audit, Measured, Verdict
     from rig.protocol.scene import Protocol
@@ -41,24 +44,30 @@ def judge(
     guesses: Mapping[str, Guess],
     audit: Audit,
     found: Mapping[str, Measured],
-    estimate: Estimate | None,
+    fit: Fit | None,
 ) -> Judgement:
-    """Judge a drop; without an `estimate`, only whether it can be analysed at all."""
+    """Judge a drop; without a `fit`, only whether it can be analysed at all."""
     void = [*drop.faults]
     doubts: list[str] = []
     if audit.lost:
         void.append(f"the device lost {audit.lost} edges: its memory was full")
     for role, guess in guesses.items():
-        void += _pattern(role, guess)
-    if estimate is not None:
+        void += pattern_faults(role, guess)
+    if fit is not None:
+        faults = find_faults(fit)
         void += _limits(protocol, audit, found)
-        doubts += _doubts(protocol, drop, found, estimate)
+        void += faults.void
+        if void:
+            void += faults.doubts  # which may be why
+        doubts += faults.doubts
+        doubts += _doubts(protocol, drop, found, fit.estimate)
     if void:
         return Judgement("void", tuple(void))
     return Judgement("marginal" if doubts else "accepted", tuple(doubts))
 
 
-def _pattern(role: str, guess: Guess) -> list[str]:
+def pattern_faults(role: str, guess: Guess) -> list[str]:
+    """Say why the edges of a side are not one fall of its chain; nothing where they are."""
     if guess.share < SUPPORT:
         return [
             f"the {role} side does not look like this chain falling: only {guess.share:.0%} of "

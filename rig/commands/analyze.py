@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Compute the results of a session and keep them in it."""
+    if arguments.budget is not None:
+        from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
+
+        return budget.main(arguments)
     with Session.open(arguments.session, readonly=True) as session:
         extent = _extent(session)
         found = results(session, progress("analysing run"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.accuracy import accuracy
+from rig.bench.dials import DOUBLED, doubled
 from rig.commands.output import print_json, say
 
 if TYPE_CHECKING:
@@ -23,12 +24,24 @@ _UNITS = {
 
 def main(arguments: Namespace) -> int:
     """Measure accuracy over several simulated sessions."""
-    found = accuracy(arguments.protocol, arguments.port, arguments.seeds, say)
+    default = _accuracy(arguments, arguments.port)
+    found: dict[str, Any] = default
+    if arguments.doubled:
+        found = {"default": default}
+        for dial in DOUBLED:
+            say(f"{dial} doubled: {DOUBLED[dial]}")
+            found[dial] = _accuracy(arguments, doubled(arguments.port, dial))
     if arguments.json:
         print_json(found)
+    elif arguments.doubled:
+        print("\n\n".join("\n".join([name, *_table(one)]) for name, one in found.items()))
     else:
         print("\n".join(_table(found)))
     return 0
+
+
+def _accuracy(arguments: Namespace, port: str) -> dict[str, Any]:
+    return accuracy(arguments.protocol, port, arguments.seeds, say, arguments.repeats)
 
 
 def _table(found: Mapping[str, Any]) -> list[str]:
@@ -37,21 +50,28 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         f"{found['sessions']} simulated sessions, drops: {verdicts}",
         f"{found['edges_matched']} edges matched, {found['edges_given_to_a_wrong_rod']} to a wrong "
         f"rod, {found['strays_taken_for_a_rod']} strays taken for a rod",
-        f"{'error of one run':<28}{'rms':>9}{'bias':>9}{'worst':>9}{'mean U95':>10}  in U95",
+        f"{'error of one run':<28}{'rms':>9}{'bias':>9}{'worst':>9}{'mean U95':>10}"
+        f"{'bias/U':>8}  in U95",
     ]
     for name, errors in found["quantities"].items():
         label, unit, scale = _UNITS[name]
         rms, bias, worst, u = (errors[key] * scale for key in ("rms", "bias", "worst", "mean_U95"))
         lines.append(
             f"{f'{label} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}{u:10.3f}"
-            f"  {errors['coverage']:.1%}"
+            f"{errors['bias_over_U']:8.2f}  {errors['coverage']:.1%}"
+            + (f" ± {errors['coverage_se']:.1%}" if "coverage_se" in errors else "")
         )
-    for name, errors in found.get("camera_480_fps", {}).items():
-        label, unit, scale = _UNITS[name]
-        rms, bias, worst = (errors[key] * scale for key in ("rms", "bias", "worst"))
-        lines.append(
-            f"{f'camera {label.split()[0]} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}"
-        )
+    for rival, label_ in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
+        for name, errors in found.get(rival, {}).items():
+            label, unit, scale = _UNITS[name]
+            rms, bias, worst = (errors[key] * scale for key in ("rms", "bias", "worst"))
+            lines.append(
+                f"{f'{label_} {label.split()[0]} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}"
+            )
+    own = found["analysis_ms_per_run"]
+    plain = found.get("plain_fit_ms_per_run")
+    ratio = f", {own / plain:.0f} times a plain least-squares fit" if plain else ""
+    lines.append(f"analysis of a run with learning: {own:.0f} ms of processor time{ratio}")
     times = sorted(found["wall_time_s"])
     lines.append(f"wall time of a session: median {times[len(times) // 2]:.1f} s")
     return lines

@@ -10,6 +10,7 @@ from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
 from rig.errors import InputError
 from rig.files import write_atomic
+from rig.report.clock import clock_lines
 from rig.report.html import ReportContext, write_report
 from rig.report.pictures import pictures
 from rig.results import protocol_of, results
@@ -53,6 +54,7 @@ def main(arguments: Namespace) -> int:
                 },
                 identities=[identity for _, identity in session.identities()],
                 clock=found["clock"],
+                notes=clock_lines(found),
             ),
         )
     if arguments.figures is not None:

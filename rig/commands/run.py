@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.output import print_results, say
@@ -26,6 +27,7 @@ def main(arguments: Namespace) -> int:
             operator,
             arguments.seed,
             interrupts,
+            None if arguments.socket is None else Path(arguments.socket),
         )
         code = print_results(found, as_json=arguments.json)
     say(f"session: {arguments.session}")

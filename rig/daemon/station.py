@@ -7,31 +7,37 @@ from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
+from rig.daemon.faults import StoppedError
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, SessionError
-from rig.link.client import Device
-from rig.link.messages import Phase, pack_label, unpack_label
+from rig.link.client import BOOT_WAIT_S, Device
+from rig.link.clock import SystemClock
+from rig.link.hostwatch import HostWatch
+from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
 from rig.link.port import open_port, port_clock
+from rig.link.transcript import Received
 from rig.ports import told
-from rig.records import Ping
+from rig.records import Ping, Pulse
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.messages import Identity
+    from rig.daemon.record import Record as Book
+    from rig.daemon.view import View
+    from rig.link.messages import DisarmReason, Identity
     from rig.link.port import Port
     from rig.link.transcript import Direction, Record
     from rig.protocol.scene import Protocol
     from rig.records import Drop
-    from rig.session.store import Session
 
 RECORD_MS = 1500
 """How long after the release to record: no drop of a lab lasts longer."""
 ARM_TIMEOUT_MS = 10_000
 DISCARD = "taking the power from the board discards the drop, a reset does not"
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
-_ARMED_PING_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
+_ARMED_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
+_REFERENCE_S = 10.0  # between two questions for the latest pulse of the reference
 
 
 class Station:
@@ -48,16 +54,39 @@ class Station:
         The port.
     interrupts
         Kept waiting during each call; by default nobody's.
+    view
+        What is told of everything that becomes known.
+    halted
+        Asked all the time whether everything shall be off.
+
+    Attributes
+    ----------
+    lapsed
+        Why the device disarmed itself since `arm`, as far as it has said so.
     """
 
-    def __init__(self, session: Session, url: str, interrupts: Interrupts | None = None) -> None:
+    def __init__(
+        self,
+        session: Book,
+        url: str,
+        interrupts: Interrupts | None = None,
+        *,
+        view: View | None = None,
+        halted: Callable[[], bool] = lambda: False,
+    ) -> None:
         self.session = session
         self.url = url
         self.interrupts = Interrupts() if interrupts is None else interrupts
+        self._view = view
+        self._halted = halted
         self._port: Port | None = None
         self._device: Device | None = None
         self._uneven = random.Random(0)  # noqa: S311 - spacing, not secrets
         self._armed: tuple[int, int] | None = None
+        self.lapsed: DisarmReason | None = None
+        self._sample: Ping | None = None  # the latest
+        self._host: HostWatch | None = None
+        self._reference_ns = 0  # when to ask for the next pulse
         self._disk_must_not_matter = False
 
     def __enter__(self) -> Self:
@@ -67,8 +96,13 @@ class Station:
     def __exit__(self, *_exc: object) -> None:
         self.close()
 
-    def connect(self) -> Identity:
-        """Open the port and learn who is there.
+    def connect(self, port: Port | None = None) -> Identity:
+        """Learn who is there.
+
+        Parameters
+        ----------
+        port
+            What `give_up` returned, with a board that is running; else the port is opened.
 
         Raises
         ------
@@ -76,11 +110,13 @@ class Station:
             No such port, nobody there, or another protocol version.
         """
         with self.interrupts.held():
-            self._port = open_port(self.url)
+            self._port = open_port(self.url) if port is None else port
             try:
                 self.clock = port_clock(self._port)
+                self._host = HostWatch() if isinstance(self.clock, SystemClock) else None
+                self._reference_ns = self.clock.now_ns()
                 self._device = Device(self._port, self.clock, self._log, on_record=self._note)
-                identity = self._device.connect()
+                identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
                 known = asdict(identity) | {"unique_id": identity.unique_id.hex()}
                 self.session.add_identity(known | {"port": told(self.url)}, self.clock.now_ns())
                 self.session.commit()
@@ -103,6 +139,19 @@ class Station:
                 port.close()
             self.session.commit()
 
+    def give_up(self) -> Port | None:
+        """Make safe and let go of the port without closing it; `None` when there is none."""
+        with self.interrupts.held():
+            if self._armed is not None:
+                self.abort()
+            port, self._port = self._port, None
+            return port
+
+    @property
+    def armed(self) -> tuple[int, int] | None:
+        """Run and attempt of the drop that waits for `fire`."""
+        return self._armed
+
     @property
     def device(self) -> Device:
         """The device client.
@@ -116,22 +165,43 @@ class Station:
             raise DeviceError("not connected", "connect first")
         return self._device
 
-    def wait(self, seconds: float, stop: Callable[[], bool] | None = None) -> None:
+    def wait(self, seconds: float) -> None:
         """Let time pass and use it to compare clocks, at uneven intervals.
 
         What is armed stays so: the device hears from this program often enough.
         """
         until = self.clock.now_ns() + round(seconds * 1e9)
-        while not (stop is not None and stop()):
+        while not self._halted():
             left = (until - self.clock.now_ns()) * 1e-9
             if left <= 0.0:
                 break
             longest = _PING_S * self._uneven.uniform(0.5, 1.5)
-            self.clock.sleep(min(left, longest if self._armed is None else _ARMED_PING_S))
-            with self.interrupts.held():
-                self.device.ping()
+            self.clock.sleep(min(left, longest if self._armed is None else _ARMED_S))
+            self.ping() if self._armed is None else self.look()
         with self.interrupts.held():
             self.session.commit()
+
+    def look(self) -> None:
+        """Ask what the device is doing, and let it know that somebody is there."""
+        with self.interrupts.held():
+            self.device.status()
+
+    def ping(self) -> None:
+        """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
+        with self.interrupts.held():
+            if self._host is not None and (found := self._host.look()) is not None:
+                self.session.add_host_break(found)
+            self._sample = self.device.ping()
+            if self.clock.now_ns() >= self._reference_ns:
+                self._reference_ns = self.clock.now_ns() + round(_REFERENCE_S * 1e9)
+                self.device.reference()
+
+    def statistics(self) -> dict[str, object]:
+        """Count what went over the line since it is up, see rig/daemon/API.md."""
+        trip = self._sample
+        return self.device.statistics() | {
+            "round_trip_s": None if trip is None else (trip.host_recv_ns - trip.host_send_ns) * 1e-9
+        }
 
     def held(self) -> tuple[int, int] | None:
         """Run and attempt of a drop the device still holds, or `None`."""
@@ -164,7 +234,7 @@ class Station:
                 timeout_ms=ARM_TIMEOUT_MS,
                 record_ms=RECORD_MS,
             )
-            self._armed = run, attempt
+            self._armed, self.lapsed = (run, attempt), None
             self.state(run, attempt, RunState.ARMED)
             return token
 
@@ -178,16 +248,18 @@ class Station:
         """
         run, attempt = self._armed or (0, 0)
         with self.interrupts.held():
-            self.device.ping()  # a slow disk may take most of the silence allowed, twice
+            self.device.status()  # a slow disk may take most of the silence allowed, twice
             self.state(run, attempt, RunState.FIRED)
             self.interrupts.check()  # whoever asked to stop until now sees nothing fall
+            if self._halted():
+                raise StoppedError("stopped before the release", "arm again when all is well")
             self.device.fire(token)
             self._armed = None  # from here on there is a recording, which `close` leaves alone
 
     def collect(self, run: int, attempt: int) -> Drop:
         """Read the drop whole, store it, and only then let the device forget it."""
         with self.interrupts.held():
-            return self._keep(self.device.collect(pack_label(run, attempt)))
+            return self._keep(self.device.collect(pack_label(run, attempt), stop=self._halted))
 
     def fetch(self, run: int, attempt: int) -> Drop | None:
         """Read a held drop; `None` when the session has it and only the device did not know.
@@ -199,8 +271,7 @@ class Station:
         """
         with self.interrupts.held():
             drop = self.device.collect(pack_label(run, attempt), timeout=0.0)
-            key = run, attempt
-            known = next((d for d in self.session.drops() if (d.run, d.attempt) == key), None)
+            known = self.session.drop(run, attempt)
             if known is None:
                 return self._keep(drop)
             if known.certificate != drop.certificate or known.fire_tick != drop.fire_tick:
@@ -227,10 +298,14 @@ class Station:
         with self.interrupts.held():
             self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
             self.session.commit()
+            if self._view is not None:
+                self._view.state(run, attempt, state, reasons)
 
     def _keep(self, drop: Drop) -> Drop:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
+        if self._view is not None:
+            self._view.recorded(drop)
         self._acknowledge(drop)
         return drop
 
@@ -249,3 +324,9 @@ class Station:
     def _note(self, record: Record) -> None:
         if isinstance(record, Ping):
             self.session.add_ping(record)
+        elif isinstance(record, Pulse):
+            self.session.add_pulse(record)
+        if isinstance(record, Received) and isinstance(record.message, Disarmed):
+            self.lapsed = record.message.reason
+        if self._view is not None:
+            self._view.know(record)

@@ -111,6 +111,26 @@ class Device:
             raise DeviceRefusedError(wire.Reason.VERSION, identity.protocol_version)
         return identity
 
+    def statistics(self) -> dict[str, int]:
+        """Count frames, faults and bytes since the connection began.
+
+        Returns
+        -------
+        dict
+            By the names of the daemon's interface (rig/daemon/API.md).
+        """
+        line, read = self._line, self.transcript
+        return {
+            "rx_frames": read.good_frames,
+            "rx_bad": read.bad_frames,
+            "rx_unreadable": read.unreadable,
+            "requests": line.requests,
+            "repeats": line.repeats,
+            "rx_bytes": line.rx_bytes,
+            "tx_bytes": line.tx_bytes,
+            "port_waiting": line.waiting(),
+        }
+
     def ping(self) -> Ping | None:
         """Take a clock sample.
 

@@ -47,6 +47,10 @@ class Exchange:
         The machine all bytes go through.
     expect_boot
         While true, a restart of the board is not an error.
+    requests, repeats
+        How many were sent, and how often one was sent again.
+    rx_bytes, tx_bytes
+        How much went over the line.
     """
 
     def __init__(
@@ -56,6 +60,8 @@ class Exchange:
         self.clock = clock
         self.tries = tries
         self.expect_boot = False
+        self.requests = self.repeats = 0
+        self.rx_bytes = self.tx_bytes = 0
         self._port = port
         self._tap = tap
         self._on_record = on_record
@@ -99,7 +105,9 @@ class Exchange:
         seq = self._seq
         code, payload = wire.pack(message)
         data = encode(Frame(code, seq, 0, payload))
-        for _ in range(tries or self.tries):
+        self.requests += 1
+        for number in range(tries or self.tries):
+            self.repeats += number > 0
             self.write(data)
             answer = self.wait(wait, lambda got: got.ack == seq)
             wait = min(wait * _BACK_OFF, _LONGEST_WAIT_S)
@@ -156,6 +164,7 @@ class Exchange:
             data = self._port.read(max(1, self._port.in_waiting))
         except OSError as error:  # SerialException is one
             raise _lost(error) from error
+        self.rx_bytes += len(data)
         records = self._chunk("rx", data) if data else []
         boots = (r for r in records if isinstance(r, Received) and isinstance(r.message, wire.Boot))
         if not self.expect_boot and any(boots):
@@ -179,9 +188,23 @@ class Exchange:
         DeviceError
             The connection broke.
         """
+        self.tx_bytes += len(data)
         self._chunk("tx", data)
         try:
             self._port.write(data)
+        except OSError as error:
+            raise _lost(error) from error
+
+    def waiting(self) -> int:
+        """Count the bytes that have arrived and were not read yet.
+
+        Raises
+        ------
+        DeviceError
+            The connection broke.
+        """
+        try:
+            return self._port.in_waiting
         except OSError as error:
             raise _lost(error) from error
 

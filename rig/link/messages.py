@@ -49,6 +49,7 @@ __all__ = [
     "HOST_SILENCE_MS",
     "PROTOCOL_VERSION",
     "TABLE",
+    "TEST_RUN",
     "Abort",
     "Acknowledge",
     "Arm",
@@ -89,6 +90,8 @@ EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
 """Six-byte events that fit behind an EVENTS frame's label and index."""
 HOST_SILENCE_MS = 250
 """An armed device that heard no request for so long disarms itself."""
+TEST_RUN = 0
+"""The run in the labels of drops that belong to no session: plans count from 1."""
 
 
 class Phase(IntEnum):

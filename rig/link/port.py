@@ -9,6 +9,7 @@ import serial
 
 from rig.errors import DeviceError, RigError
 from rig.link.clock import Clock, SystemClock
+from rig.link.network import NETWORK, REACH, NetworkPort, why_unreachable
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
@@ -81,14 +82,20 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
     except RigError:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
+        if _scheme(url) in NETWORK:
+            raise DeviceError(f"cannot open {url}: {why_unreachable(error)}", REACH) from error
         cause, hint = _CAUSES.get(error.errno or 0, (str(error), _LOOK))
         raise DeviceError(f"cannot open {url}: {cause}", hint) from error
     except ValueError as error:
-        if url.lower().startswith("emu://"):  # pyserial says no more of a handler it cannot import
+        if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import
             raise DeviceError("the emulator is not installed, or is broken", _EMULATOR) from error
         raise DeviceError(f"cannot open {url}: {error}", _LOOK) from error
-    opened: Port = port
+    opened: Port = NetworkPort(port) if _scheme(url) == "socket" else port
     return opened
+
+
+def _scheme(url: str) -> str:
+    return url.partition("://")[0].lower() if "://" in url else ""
 
 
 def port_clock(port: object) -> Clock:

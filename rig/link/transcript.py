@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.frames import DELIMITER, Decoder, Frame
-from rig.records import Drop, Ping
+from rig.records import Drop, Ping, Pulse
 
 if TYPE_CHECKING:
     from rig.link.messages import Identity, Message
@@ -31,7 +31,7 @@ class Received:
     message: Message
 
 
-Record: TypeAlias = Received | Ping | Drop
+Record: TypeAlias = Received | Ping | Pulse | Drop
 
 
 class Transcript:
@@ -56,10 +56,15 @@ class Transcript:
         self._rx = Decoder()
         self._request: tuple[int, Message] = (0, wire.Status())
         self._answered = False
-        self._ping_sent: tuple[int, int] | None = None  # seq and host time of the open sample
+        self._sample_sent: tuple[int, int] | None = None  # seq and host time of the open sample
         self._tokens: dict[int, int] = {}
         self._drops: dict[int, Assembly] = {}
         self._given: set[int] = set()
+
+    @property
+    def good_frames(self) -> int:
+        """Frames that were read, from the device."""
+        return self._rx.good
 
     @property
     def bad_frames(self) -> int:
@@ -87,7 +92,7 @@ class Transcript:
             # A client begins a connection with this. Half a frame from the connection before
             # must not swallow the first of this one: live, each connection starts afresh.
             self._rx.feed(DELIMITER)
-            self._ping_sent = None
+            self._sample_sent = None
         decoder, take = (self._tx, self._sent) if direction == "tx" else (self._rx, self._got)
         records: list[Record] = []
         for frame in decoder.feed(data):
@@ -154,9 +159,9 @@ class Transcript:
         self._request = (frame.seq, message)
         self._answered = repeated and self._answered
         match message:
-            case wire.Ping():
+            case wire.Ping() | wire.Reference():
                 # It cannot be told which of two equal requests an answer belongs to.
-                self._ping_sent = None if repeated else (frame.seq, host_ns)
+                self._sample_sent = None if repeated else (frame.seq, host_ns)
             case wire.Read(label=label) if not repeated:
                 self.assembly(label)  # asking for it means wanting it, even once given out
             case wire.Acknowledge(label=label) if label in self._drops:
@@ -174,9 +179,14 @@ class Transcript:
         match message:
             case wire.Identity():
                 self.identity = message
-            case wire.Pong(tick=tick) if self._ping_sent and self._ping_sent[0] == frame.ack:
-                records.append(Ping(self._ping_sent[1], host_ns, tick))
-                self._ping_sent = None
+            case wire.Pong(tick=tick) if self._sample_sent and self._sample_sent[0] == frame.ack:
+                records.append(Ping(self._sample_sent[1], host_ns, tick))
+                self._sample_sent = None
+            case wire.ReferencePulse(count=count, tick=tick) if (
+                count and self._sample_sent and self._sample_sent[0] == frame.ack
+            ):
+                records.append(Pulse(self._sample_sent[1], host_ns, count, tick))
+                self._sample_sent = None
             case wire.Armed(token=token) if isinstance(asked, wire.Arm):
                 self._armed(token, asked)
             case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):
@@ -190,7 +200,7 @@ class Transcript:
             case wire.DropCertificate(label=label) if label not in self._given:
                 self.assembly(label).certificate = message
             case wire.Boot():
-                self._ping_sent = None
+                self._sample_sent = None
                 for drop in self._drops.values():
                     drop.reset = True
         return records

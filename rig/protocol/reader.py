@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
 from rig.protocol.fields import Faults, Range, Section
-from rig.protocol.scene import AT_REST, Accept, Plan, Protocol, Release
+from rig.protocol.scene import AT_REST, PPS_U, Accept, Plan, Protocol, Release
 from rig.protocol.yamltree import Mapping, Place, Scalar, load
 from rig.units import Dimension, Quantity
 
@@ -27,13 +27,14 @@ if TYPE_CHECKING:
 MAX_BYTES = 1_000_000
 KEYS = (
     "protocol", "title", "chains", "surface", "drop", "initial_speed", "gravity", "site", "drag",
-    "gates", "release", "plan", "accept", "notes",
+    "gates", "reference", "release", "plan", "accept", "notes",
 )  # fmt: skip
 DROP = Range(Dimension.LENGTH, 0.0, 100.0, "m")
 INITIAL_SPEED = Range(Dimension.SPEED, 0.0, 1000.0, "m/s")
 GRAVITY = Range(Dimension.ACCELERATION, 1e-3, 1000.0, "m/s^2")
 LATITUDE = Range(Dimension.ANGLE, -90.0, 90.0, "deg")
 HEIGHT = Range(Dimension.LENGTH, -500.0, 9000.0, "m")
+REFERENCE = Range(Dimension.NUMBER, 0.0, 1e-3, "ppm", open_low=True)
 
 
 def read(path: str | os.PathLike[str]) -> Protocol:
@@ -130,11 +131,12 @@ def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
     drop = top.take("drop", fields.quantity(DROP), Quantity(0.0), required=example)
     start = top.take("initial_speed", fields.quantity(INITIAL_SPEED), AT_REST)
     drag = _drag(top, chains) if "drag" in top else None
+    reference = top.take("reference", fields.exact(REFERENCE), PPS_U)
     release, plan, accept = _settings(top)
     gates = _gates(top, chains, drop) if has_gates else None
     if title is None or chains is None or gravity is None or drop is None:
         return None
-    if release is None or plan is None or accept is None or start is None:
+    if release is None or plan is None or accept is None or start is None or reference is None:
         return None
     return Protocol(
         title=title,
@@ -148,6 +150,7 @@ def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
         accept=accept,
         initial_speed=start,
         drag=drag,
+        reference_u=reference,
         text=text,
         source=faults.source,
     )

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Side = Literal["impact", "free"]
 Order = Literal["ABBA", "alternate", "fixed"]
 AT_REST = Quantity(0.0)
+PPS_U = 1e-7
+"""Of a GPS receiver's pulse per second, relative: modules state 0.1 ppm or better with a fix."""
 SIDES: tuple[Side, ...] = ("impact", "free")
 
 
@@ -164,6 +166,8 @@ class Protocol:
         Of every chain as it is let go, downward, m/s.
     drag
         `None` where the air is left out.
+    reference_u
+        Relative standard uncertainty of the 1 Hz reference, where one is wired.
     gates
         `None` for a scene that is only predicted.
     text
@@ -181,6 +185,7 @@ class Protocol:
     accept: Accept = field(default_factory=Accept)
     initial_speed: Quantity = AT_REST
     drag: Drag | None = None
+    reference_u: float = PPS_U
     text: str = ""
     source: str = ""
 

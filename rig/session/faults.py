@@ -42,7 +42,7 @@ _ADVICE = {
     ),
     sqlite3.SQLITE_CORRUPT: (
         "{path} is damaged",
-        "work on a copy: sqlite3 COPY '.recover' saves what can be read",
+        "rig recover says what is whole, and with -o NEW saves all that can be read",
     ),
     sqlite3.SQLITE_NOTADB: ("{path} is not a session file", _NOT_A_SESSION),
     sqlite3.SQLITE_CONSTRAINT: (

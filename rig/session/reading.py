@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.errors import SessionError
-from rig.records import Certificate, Drop, Edge, Ping
+from rig.records import Certificate, Drop, Edge, HostBreak, Ping, Pulse
 from rig.session.faults import translated
 from rig.session.schema import RunState
 
@@ -91,9 +91,24 @@ class Reader:
         rows = self._rows("SELECT host_send_ns, host_recv_ns, tick FROM ping ORDER BY id")
         return [Ping(*row) for row in rows]
 
+    def pulses(self) -> list[Pulse]:
+        """All pulses of the 1 Hz reference that were asked for, in order."""
+        columns = "host_send_ns, host_recv_ns, number, tick"
+        return [Pulse(*row) for row in self._newer("reference", columns)]
+
+    def host_breaks(self) -> list[HostBreak]:
+        """When the host slept or its clock was set, in order."""
+        columns = "host_ns, slept_ns, stepped_ns"
+        return [HostBreak(*row) for row in self._newer("host_break", columns)]
+
     def drops(self) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording."""
         yield from map(self._drop, list(self._rows('SELECT * FROM "drop" ORDER BY id')))
+
+    def drop(self, run: int, attempt: int) -> Drop | None:
+        """Return one recorded attempt; `None` when there is no such record."""
+        rows = self._rows('SELECT * FROM "drop" WHERE run = ? AND attempt = ?', run, attempt)
+        return next(map(self._drop, list(rows)), None)
 
     def latest_drops(self) -> list[Drop]:
         """Return the last attempt at each run, by run."""
@@ -132,6 +147,11 @@ class Reader:
             # Not the cursor itself: it would be closed with this generator, which a traceback can
             # keep alive until after the database.
             yield from iter(self._opened().execute(sql, values).fetchone, None)
+
+    def _newer(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
+        """Read a table that a file of an older format, opened read-only, does not have."""
+        if any(self._rows("SELECT 1 FROM sqlite_master WHERE name = ?", table)):
+            yield from self._rows(f"SELECT {columns} FROM {table} ORDER BY id")  # noqa: S608
 
     def _one(self, sql: str) -> Any:
         return next(self._rows(sql))[0]

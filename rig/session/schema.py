@@ -7,11 +7,8 @@ from enum import StrEnum
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """In SQLite's ``user_version``; a program refuses files with a higher one."""
-
-UPGRADES = {1: 'ALTER TABLE "drop" ADD COLUMN release_sense INTEGER'}
-"""What makes a file of one version one of the next."""
 
 
 class RunState(StrEnum):
@@ -29,6 +26,23 @@ class RunState(StrEnum):
 
 
 _STATES = ", ".join(f"'{state}'" for state in RunState)
+
+_CLOCK_TABLES = """
+CREATE TABLE reference (
+    id INTEGER PRIMARY KEY,
+    host_send_ns INTEGER NOT NULL,
+    host_recv_ns INTEGER NOT NULL,
+    number INTEGER NOT NULL,
+    tick INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE host_break (
+    id INTEGER PRIMARY KEY,
+    host_ns INTEGER NOT NULL,
+    slept_ns INTEGER NOT NULL,
+    stepped_ns INTEGER NOT NULL
+) STRICT;
+"""
 
 _TABLES = f"""
 CREATE TABLE meta (
@@ -116,6 +130,8 @@ _IDENTICAL = {
     "identity": "id = NEW.id",
     "bytes": "id = NEW.id",
     "ping": "id = NEW.id",
+    "reference": "id = NEW.id",
+    "host_break": "id = NEW.id",
     "drop": "id = NEW.id OR (run = NEW.run AND attempt = NEW.attempt)",
     "edge": '"drop" = NEW."drop" AND idx = NEW.idx',
     "run_state": "id = NEW.id",
@@ -134,8 +150,16 @@ WHEN EXISTS (SELECT 1 FROM "{table}" WHERE {identical}) BEGIN {refuse} END;
 """  # noqa: S608 - all names are constants of this file
 
 
+UPGRADES = {
+    1: 'ALTER TABLE "drop" ADD COLUMN release_sense INTEGER',
+    2: _CLOCK_TABLES
+    + "".join(_guards(table, _IDENTICAL[table]) for table in ("reference", "host_break")),
+}
+"""What makes a file of one version one of the next."""
+
 CREATE = (
     _TABLES
+    + _CLOCK_TABLES
     + "".join(_guards(table, identical) for table, identical in _IDENTICAL.items())
     + f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {SCHEMA_VERSION};\n"
 )

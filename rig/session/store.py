@@ -22,7 +22,7 @@ from rig.session.reading import Direction, Reader
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from rig.records import Drop, Ping
+    from rig.records import Drop, HostBreak, Ping, Pulse
     from rig.session.schema import RunState
 
 
@@ -195,6 +195,19 @@ class Session(Reader):
         self._add(
             "INSERT INTO ping (host_send_ns, host_recv_ns, tick) VALUES (?, ?, ?)",
             *map(tuple, pings),
+        )
+
+    def add_pulse(self, pulse: Pulse) -> None:
+        """Add what the device said of its 1 Hz reference."""
+        self._add(
+            "INSERT INTO reference (host_send_ns, host_recv_ns, number, tick) VALUES (?, ?, ?, ?)",
+            tuple(pulse),
+        )
+
+    def add_host_break(self, found: HostBreak) -> None:
+        """Add that the host slept or its clock was set."""
+        self._add(
+            "INSERT INTO host_break (host_ns, slept_ns, stepped_ns) VALUES (?, ?, ?)", tuple(found)
         )
 
     def add_drop(self, drop: Drop, *, host_ns: int | None = None, provenance: str = "") -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.analysis.align import align
+from rig.analysis.components import STATED, Components
 from rig.analysis.drop import TimeScale, analyze_drop
 from rig.analysis.drop_model import DropModel
 from rig.analysis.pattern import Guess, guess
@@ -47,8 +48,8 @@ class Case:
     truth: Truth
     scale: TimeScale
 
-    def analyze(self) -> DropResult:
-        return analyze_drop(self.protocol, self.run, self.drop, self.scale)
+    def analyze(self, components: Components = STATED) -> DropResult:
+        return analyze_drop(self.protocol, self.run, self.drop, self.scale, components)
 
     def with_edges(self, edges) -> Case:
         """The same drop with other edges; they need not be in order of time."""

@@ -37,7 +37,11 @@ class Linear:
 
     def equations(self, role: str, x, match) -> Equations:
         residuals = self.offset[role] + self.jacobian[role] @ x
-        return Equations(residuals[match], self.jacobian[role][match], self.sigma[role][match])
+        sigma = self.sigma[role][match]
+        ones = np.ones_like(sigma)
+        return Equations(
+            residuals[match], self.jacobian[role][match], sigma, ones, ones.astype(np.bool_)
+        )
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """All rows in standard deviations: J/σ and r(0)/σ."""

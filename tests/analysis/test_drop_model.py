@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.adjust import adjust
-from rig.analysis.drop_model import FLOOR, JITTER, DropModel
+from rig.analysis.components import STATED
+from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import _gravity, _impact, _separation, quantities
 from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, UNIFORM, case
 
@@ -132,7 +133,7 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
         burst = np.concatenate([t.burst[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
         _, speed = model.trajectory(role, x).heights(times)
         expected = [
-            math.sqrt(FLOOR**2 + v**2 * (JITTER**2 + b**2))
+            math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2))
             for v, b in zip(speed, burst, strict=True)
         ]
         np.testing.assert_allclose(found.sigma, expected, rtol=1e-12)

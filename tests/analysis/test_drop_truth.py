@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis import drop_model
-from rig.analysis.drop_model import FLOOR
+from rig.analysis.components import STATED
 from rig.model.chain import Chain
 from rig.units import Quantity
 from sim.dials import Dials
@@ -45,9 +44,9 @@ def test_a_perfect_rig_measures_the_truth(scene, incline):
         "received": edges, "matched": edges, "missed": 0, "spurious": 0, "lost": 0,
     }  # fmt: skip
     assert result.matches == {n: edge[3] for n, edge in enumerate(one.truth.edges)}
-    # An estimate that is linear in the edges has, from edges that scatter by FLOOR, the budget's
-    # line `edges`; edges rounded to a tick scatter by tick/√12 times their speed instead.
-    rounding = FASTEST / HZ / math.sqrt(12) / FLOOR
+    # An estimate that is linear in the edges has, from edges that scatter by the floor, the line
+    # `edges` of the budget; edges rounded to a tick scatter by tick/√12 times their speed instead.
+    rounding = FASTEST / HZ / math.sqrt(12) / STATED.floor
     for name, measured in result.quantities.items():
         error = measured.value - truth_of(one, name)
         assert abs(error) < 5 * rounding * measured.budget["edges"], name
@@ -153,10 +152,10 @@ CLOCK = 3e-4
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_stated_uncertainties_are_the_real_ones(scene, monkeypatch):
+def test_stated_uncertainties_are_the_real_ones(scene):
     """Errors over standard uncertainties: mean square 1, where the rig is as bad as assumed."""
     # The simulation has no scatter of this kind; that it is allowed for makes u larger than it is.
-    monkeypatch.setattr(drop_model, "FLOOR", 1e-6)
+    components = replace(STATED, floor=1e-6)
     protocol = replace(SCENES[scene], accept=replace(SCENES[scene].accept, release_skew=1.0))
     fence_bars = replace(AS_ASSUMED, rod_sd=0.1e-3)
     rng = np.random.default_rng(11)
@@ -166,7 +165,7 @@ def test_stated_uncertainties_are_the_real_ones(scene, monkeypatch):
         incline = 40.0 if scene == "uniform" else None
         one = case(protocol, replace(dials, clock=CLOCK * rng.normal()), incline=incline, seed=seed)
         uncalibrated = replace(one, scale=one.scale._replace(hz=float(HZ), u=CLOCK))
-        result = uncalibrated.analyze()
+        result = uncalibrated.analyze(components)
         assert result.verdict == "accepted", result.reasons
         for name, measured in result.quantities.items():
             ratios.setdefault(name, []).append((measured.value - truth_of(one, name)) / measured.u)

@@ -144,7 +144,9 @@ def test_what_an_import_lacks_can_be_measured_afterwards(bring, call, exported, 
     done = call("run", finished.protocol, "--port", "sim://", "--session", session, "--json")
     assert done.code == 0, done.err
     assert drops_of(session) == [(1, 1), (2, 1), (3, 1), (4, 1)]
-    assert json.loads(done.out)["runs"][:2] == before, "its own clock stays its own"
+    # What the new drops teach about the rig changes the numbers of the old ones, but not this.
+    for old, new in zip(before, json.loads(done.out)["runs"], strict=False):
+        assert new["calibration"] == old["calibration"], "its own clock stays its own"
 
 
 def refused(done, tmp_path, session="imported"):

@@ -11,7 +11,7 @@ import pytest
 from rig.daemon.station import Station
 from rig.session.store import Session
 
-GUARDED = ("bytes", "ping", "drop", "edge", "identity", "run_state")
+GUARDED = ("bytes", "ping", "reference", "drop", "edge", "identity", "protocol", "run_state")
 
 
 def tamper(session, sql, *values):
@@ -26,8 +26,8 @@ def tamper(session, sql, *values):
 def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
     connect = Station.connect
 
-    def wired(station):
-        connect(station)
+    def wired(station, port):
+        connect(station, port)
         station._port.board.sense(0.0125)
 
     monkeypatch.setattr(Station, "connect", wired)

@@ -68,11 +68,12 @@ def run(call, tmp_path, protocol):
 def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
     code, out, err = finished.table
     assert code == 0, err
-    stamp, headings, rule, *rows = out.splitlines()
+    stamp, headings, rule, *rows, clock = out.splitlines()
     assert stamp == "SIMULATED DATA"
     assert headings.split()[:2] == ["incline", "(°)"]
     assert set(rule) == {"─", " "}
     assert [row.split()[:2] for row in rows] == [["40", "2"], ["60", "2"]]
+    assert clock.startswith("time scale: board −13")
     told = [line for line in err.splitlines() if line.startswith("run ")]
     assert [line.split()[1] for line in told] == ["1/4", "2/4", "3/4", "4/4"]
     assert "run " not in out

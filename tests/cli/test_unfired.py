@@ -107,7 +107,7 @@ def test_a_slow_disk_does_not_disarm(run, tmp_path, monkeypatch):
         if stations and stations[0]._port is not None:
             stations[0].clock.sleep(0.2)
 
-    monkeypatch.setattr(Station, "connect", lambda s: (connect(s), stations.append(s)))
+    monkeypatch.setattr(Station, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
     monkeypatch.setattr(Session, "commit", slow)
     done = run()
     assert done.code == 0
@@ -133,7 +133,8 @@ def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
 
     def warm(campaign, *what):
         prepare(campaign, *what)
-        clock, board = campaign.station.clock, campaign.station._port.board
+        station = campaign.rig.station
+        clock, board = station.clock, station._port.board
         board._controller.release.pulse(1, clock.now_ns(), 500_000)
         waited.append(clock.now_ns())
 
@@ -177,7 +178,7 @@ def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fenc
         stations[0]._port.board.stop(len(asked) == 1)
 
     stations, connect = [], Station.connect
-    monkeypatch.setattr(Station, "connect", lambda s: (connect(s), stations.append(s)))
+    monkeypatch.setattr(Station, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
     operator = Operator(say=lambda _: None, ask=ask)
     run_protocol(str(fence), "sim://", str(tmp_path / "s"), operator, 1)
     assert asked[1].startswith("not armed: the emergency stop is open; ")

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import quote
 
@@ -16,10 +17,10 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.clock import tick_rate
 from rig.link.frames import Decoder
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
+from rig.link.rate import tick_rate
 from rig_emulator import pty
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make
@@ -114,6 +115,26 @@ def test_the_clock_dial_shows_in_the_pings():
         pings.append(ping)
     rate = tick_rate(pings, HZ)
     assert abs(rate.hz / HZ - 1 + 1300e-6) < 4 * rate.u_hz / HZ < 200e-6
+
+
+def test_the_firmware_stamps_a_wired_reference_each_second():
+    port = open_port(url(clock="-1300 ppm", reference="0"))
+    device = Device(port, port_clock(port))
+    device.connect()
+    found = []
+    for _ in range(4):
+        port_clock(port).sleep(2.0)
+        found.append(device.reference())
+    counts = [pulse.count for pulse in found]
+    assert counts[1] > counts[0] > 0
+    for one, two in pairwise(found):
+        passed = (two.tick - one.tick) % 2**32
+        assert abs(passed - (two.count - one.count) * HZ * (1 - 1300e-6)) <= 2
+
+
+def test_a_clock_that_the_emulator_has_not_is_refused():
+    with pytest.raises(InputError, match="steady"):
+        open_port(url(wander="5 ppm"))
 
 
 def test_a_read_waits_in_virtual_time_only():

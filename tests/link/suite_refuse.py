@@ -6,6 +6,7 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.messages import Phase, Reason, pack_label
+from rig.selftest.requests import BAD_ORDERS, UNKNOWN_CODES, wrong_lengths
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm, order
@@ -49,19 +50,7 @@ class RefusalSuite(Suite):
         device.abort()
         device.fire(arm(device))
 
-    @pytest.mark.parametrize(
-        "bad",
-        [
-            {"label": 0},
-            {"gates": 0},
-            {"release": 0x80},
-            {"release": 0},
-            {"pulse_us": 0},
-            {"pulse_us": 2**32 - 1},
-            {"timeout_ms": 0},
-            {"record_ms": 0},
-        ],
-    )
+    @pytest.mark.parametrize("bad", BAD_ORDERS)
     def test_bad_parameters(self, device, bad):
         self.refused(Reason.BAD_PARAMETER, arm, device, **bad)
         assert device.status().phase is Phase.IDLE
@@ -101,24 +90,17 @@ class RefusalSuite(Suite):
 
     def test_unknown_messages(self, bench):
         line = Wire(bench)
-        for seq, code in enumerate([0x55, 0x00, 0x82, 0xFF], start=1):
+        for seq, code in enumerate(UNKNOWN_CODES, start=1):
             line.send(code, b"", seq)
             assert line.hear() == [(seq, wire.Refused(Reason.UNKNOWN_MESSAGE, code))]
 
     def test_requests_of_another_length(self, bench):
         line = Wire(bench)
-        values = {wire.Identify: wire.Identify(), wire.Arm: order(), wire.Fire: wire.Fire(1)}
-        values |= {wire.Read: wire.Read(LABEL, 0, 1), wire.Acknowledge: wire.Acknowledge(LABEL, 0)}
-        for code, kind in wire.TABLE.items():
-            if code >= 0x80:
-                continue
-            _, payload = wire.pack(values.get(kind) or kind())
-            for seq, wrong in ((1, payload + b"\1"), (2, payload[:-1])):
-                if wrong != payload:
-                    line.send(code, wrong, seq)
-                    answers = line.hear(until=lambda ack, _, seq=seq: ack == seq)
-                    assert answers == [(seq, wire.Refused(Reason.BAD_PARAMETER, 0))], kind
-        assert line.ask(wire.Status(), 3).phase is Phase.IDLE
+        for seq, (code, wrong) in enumerate(wrong_lengths(order()), start=1):
+            line.send(code, wrong, seq)
+            answers = line.hear(until=lambda ack, _, seq=seq: ack == seq)
+            assert answers == [(seq, wire.Refused(Reason.BAD_PARAMETER, 0))], wire.TABLE[code]
+        assert line.ask(wire.Status(), 99).phase is Phase.IDLE
 
     def test_requests_far_too_long(self, bench):
         """Such a frame need not fit a device's memory: no answer is as good as a refusal."""

@@ -14,7 +14,7 @@ import pytest
 
 import rig
 from rig.errors import SessionError
-from rig.records import Certificate, Drop, Edge, Ping
+from rig.records import Certificate, Drop, Edge, HostBreak, Ping, Pulse
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 from rig.session.store import Session
 
@@ -32,11 +32,21 @@ DEVICE_DROP = Drop(
     faults=("1 snapshot lost",),
 )
 IMPORTED = Drop(run=1, attempt=1, tick_hz=10**12, edges=(Edge(5, 15, False),))
+PULSE = Pulse(5, 9, 65_535, 2**32 - 1)
+BREAK = HostBreak(7, 2 * 10**9, -(10**9))
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "a session #1?.rig"
+
+
+def tables(path: Path) -> list[tuple[str, str]]:
+    connection = sqlite3.connect(path)
+    found = connection.execute("SELECT type, name FROM sqlite_master ORDER BY type, name")
+    names = found.fetchall()
+    connection.close()
+    return names
 
 
 def make(path: Path) -> Session:
@@ -48,6 +58,8 @@ def fill(session: Session) -> None:
     session.log_bytes("rx", 2, b"")
     session.add_identity({"serial": "A1", "tick_hz": 2_000_000}, 3)
     session.add_pings([Ping(1, 2, 3), Ping(4, 5, 2**32 - 1)])
+    session.add_pulse(PULSE)
+    session.add_host_break(BREAK)
     session.add_drop(DEVICE_DROP, host_ns=99, provenance="device")
     session.add_drop(IMPORTED)
     session.add_state(2, 0, RunState.PLANNED, 1)
@@ -73,7 +85,7 @@ def kill(process: subprocess.Popen[str]) -> None:
 def test_everything_comes_back_as_it_went_in(path: Path) -> None:
     with make(path) as session:
         fill(session)
-        assert session.pending == 8
+        assert session.pending == 10
         session.commit()
         assert session.pending == 0
     with Session.open(path, readonly=True) as session:
@@ -83,6 +95,8 @@ def test_everything_comes_back_as_it_went_in(path: Path) -> None:
         ]
         assert session.identities() == [(3, {"serial": "A1", "tick_hz": 2_000_000})]
         assert session.pings() == [Ping(1, 2, 3), Ping(4, 5, 2**32 - 1)]
+        assert session.pulses() == [PULSE]
+        assert session.host_breaks() == [BREAK]
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
         assert session.latest_drops() == [IMPORTED, DEVICE_DROP]
         assert [entry.state for entry in session.states()] == [RunState.PLANNED, RunState.VOID]
@@ -101,6 +115,8 @@ def test_a_file_of_the_first_format_is_read_and_continued(path: Path) -> None:
     with make(path) as session:
         fill(session)
     connection = sqlite3.connect(path)
+    connection.execute("DROP TABLE reference")
+    connection.execute("DROP TABLE host_break")
     connection.execute('ALTER TABLE "drop" DROP COLUMN release_sense')
     connection.execute("PRAGMA user_version = 1")
     connection.close()
@@ -108,11 +124,17 @@ def test_a_file_of_the_first_format_is_read_and_continued(path: Path) -> None:
     without = replace(DEVICE_DROP, certificate=replace(DEVICE_DROP.certificate, release_sense=None))
     with Session.open(path, readonly=True) as session:
         assert list(session.drops()) == [without, IMPORTED]
+        assert session.pulses() == session.host_breaks() == []
     third = replace(DEVICE_DROP, run=3)
     with Session.open(path) as session:
         session.add_drop(third)
+        session.add_pulse(PULSE._replace(number=1))
     with Session.open(path) as session:
         assert list(session.drops()) == [without, IMPORTED, third]
+        assert session.pulses() == [PULSE._replace(number=1)]
+    new = path.with_name("new.rig")
+    make(new).close()
+    assert tables(path) == tables(new), "an upgraded file is like a new one, guards and all"
 
 
 def test_latest_drops_are_the_last_attempts(path: Path) -> None:
@@ -142,6 +164,8 @@ def test_results_are_replaced_as_a_whole(path: Path) -> None:
             "bytes",
             "edge",
             "ping",
+            "reference",
+            "host_break",
             "run_state",
             "protocol",
             "identity",

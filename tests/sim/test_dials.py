@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from rig.errors import InputError
 from sim.dials import Dials, read_dials
 
-TIMES = ("skew_sd", "delay", "delay_sd", "jitter_sd", "latency")
+TIMES = ("skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall")
 LENGTHS = ("hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd")
-SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose")
-FACTORS = ("drop_error", "impulse_sd", "friction", "restitution", "clock")
-UNSET = {"restitution", "friction"}  # not-a-number, which equals nothing
-SIGNED = {"restitution", "clock"}
+SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled")
+FACTORS = (
+    "drop_error", "impulse_sd", "friction", "restitution", "clock", "drift", "wander", "reference",
+)  # fmt: skip
+UNSET = {"restitution", "friction", "reference"}  # not-a-number, which equals nothing
+SIGNED = {"restitution", "clock", "drift", "reference"}
 NAMES = {field.name for field in fields(Dials)}
 
 REGISTRY = pint.UnitRegistry()
@@ -82,8 +84,9 @@ def test_units_agree_with_pint(dial, number):
 def test_quiet_switches_every_disturbance_off():
     quiet = asdict(read_dials({"quiet": "1"}))
     assert quiet.pop("delay") == Dials().delay > 0
-    assert math.isnan(quiet.pop("restitution"))
-    assert math.isnan(quiet.pop("friction"))
+    assert quiet.pop("stall") == Dials().stall > 0  # how long, where any is
+    for name in UNSET:
+        assert math.isnan(quiet.pop(name))
     assert set(quiet.values()) == {0.0}
 
 
@@ -149,6 +152,7 @@ def test_a_share_is_at_most_all(name):
         read_dials({name: "2"})  # 2 % was meant
 
 
-def test_a_clock_runs_forward():
-    with pytest.raises(InputError, match="clock"):
-        read_dials({"clock": "-100 %"})
+@pytest.mark.parametrize("name", ["clock", "reference"])
+def test_a_clock_runs_forward(name):
+    with pytest.raises(InputError, match=name):
+        read_dials({name: "-100 %"})

@@ -12,9 +12,9 @@ import pytest
 
 from rig.errors import InputError
 from rig.link.client import Device
-from rig.link.clock import tick_rate
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
+from rig.link.rate import tick_rate
 from rig.records import Drop, Ping
 from tests.sim.falls import PROTOCOLS
 

@@ -58,6 +58,8 @@ class EmulatedBoard:
         What it sends.
     history
         What its output pins did of late.
+    second_ns
+        Period of a 1 Hz reference that gives pulses from now on; `None`: none is wired.
     """
 
     def __init__(
@@ -83,6 +85,9 @@ class EmulatedBoard:
             if pin is not None:
                 self.avr.edge(0, pin, False)
         self._sense_s: float | None = None
+        self._looped: str | None = None
+        self.second_ns: int | None = None
+        self._pulses = 0
         self._sniff()
         self._origin = 0
         self._run(_POWERED_CYCLES + int.from_bytes(draw[8:10]))
@@ -166,6 +171,10 @@ class EmulatedBoard:
         """Have the release-sense input change so long after each FIRE to come, or never."""
         self._sense_s = seconds
 
+    def loop_back(self, gate: int) -> None:
+        """Join the sync output to a gate input with a wire."""
+        self._looped = self.wiring.gates[gate]
+
     def outputs(self) -> int:
         """Mask of the release outputs that are on now."""
         return sum(self.avr.output(pin) << n for n, pin in enumerate(self.wiring.releases))
@@ -199,6 +208,7 @@ class EmulatedBoard:
             self.touch(self.lab.rest(order.label))
 
     def _run(self, until: int, *, stop_on_sent: bool = False) -> None:
+        self._pulse(until)
         while True:
             why = self.avr.run(until, stop_on_sent=stop_on_sent)
             for cycle, value in self.avr.take_sent():
@@ -208,10 +218,23 @@ class EmulatedBoard:
                         self._label = self._asked[frame.ack]
             for change in self.avr.take_changes():
                 self.history.append(change)
-                if change.pin == self.wiring.sync and change.high:
+                if change.pin != self.wiring.sync:
+                    continue
+                if self._looped is not None:
+                    self.avr.edge(change.cycle, self._looped, change.high)
+                if change.high:
                     self._let_go(change.cycle)
             if why is not Stop.PIN:
                 return
+
+    def _pulse(self, until: int) -> None:
+        """Wire the reference's pulses up to a cycle."""
+        while self.second_ns is not None:
+            due_ns = (self._pulses + 1) * self.second_ns
+            if self.cycle_at(due_ns) >= until:
+                break
+            self.reference([due_ns])
+            self._pulses += 1
 
     def _let_go(self, cycle: int) -> None:
         if self._sense_s is not None and self.wiring.sense is not None:

@@ -62,7 +62,7 @@ def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> 
     Raises
     ------
     InputError
-        When the scene has more gates than the board.
+        When the scene has more gates than the board, or a clock that the emulator has not.
     """
     for gate in scene.lab.gates:
         if gate.channel >= len(wiring.gates):
@@ -70,5 +70,10 @@ def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> 
                 f"emu://: an {wiring.mcu} board has no gate {gate.channel}",
                 f"its gates are 0 to {len(wiring.gates) - 1}",
             )
-    ppm = scene.dials.clock * 1e6
-    return EmulatedBoard(wiring, program, scene.lab, scene.seed, ppm=ppm, baudrate=baudrate)
+    dials = scene.dials
+    if dials.drift or dials.wander:
+        raise InputError("emu://: this clock is steady", "drift and wander are dials of sim://")
+    ppm = dials.clock * 1e6
+    board = EmulatedBoard(wiring, program, scene.lab, scene.seed, ppm=ppm, baudrate=baudrate)
+    board.second_ns = scene.second_ns()
+    return board

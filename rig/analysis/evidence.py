@@ -1,0 +1,148 @@
+"""How much each kind of nuisance scatters, by what was found (empirical Bayes).
+
+A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has determined
+γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
+largest (MacKay 1992). What was stated counts as one more member, so that where nothing is
+determined, s stays as stated. Where several components make up one variance, each is multiplied
+by the share of Σx² that it explains (an EM step), which keeps all of them positive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.components import STATED
+from rig.analysis.normal import STRAY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.components import Components
+    from rig.analysis.drop_model import DropModel, Equations
+
+    Array = NDArray[np.float64]
+
+STATED_WEIGHT = 1.0
+"""Members that a stated uncertainty counts for."""
+_INNER = 40
+_BINS = 64
+
+
+class Evidence:
+    """Sums over a session, and the components that follow.
+
+    Parameters
+    ----------
+    components
+        With which the sums are made.
+
+    Attributes
+    ----------
+    components
+        After `settled`, the new ones.
+    degrees
+        Degrees of freedom of each.
+    """
+
+    def __init__(self, components: Components) -> None:
+        self.components = components
+        self.degrees: dict[str, float] = {}
+        self._squares = dict.fromkeys(("gates", "rods", "beam", "hang"), 0.0)
+        self._determined = dict.fromkeys(("gates", "rods", "beam", "hang"), 0.0)
+        self._impulses: list[tuple[float, float, float]] = []
+        self._edges: list[tuple[Array, Array]] = []
+
+    def common(self, name: str, y: Array, v: Array, sd: Array) -> None:
+        """Count a block of the session's unknowns.
+
+        Parameters
+        ----------
+        y, v
+            Estimates and variances in units of the prior uncertainties `sd`.
+        """
+        kind = {"beams": "gates", "ripple": "beam"}.get(name)
+        if name.endswith(" rods"):
+            kind = "rods"
+        if kind is not None:
+            self._count(kind, y[sd > 0.0], v[sd > 0.0])
+
+    def drop(self, model: DropModel, y: Array, v: Array) -> None:
+        """Count the unknowns of one drop, in units of their prior uncertainties."""
+        at = model.unknowns
+        for role in model.sides:
+            self._count("hang", y[at[f"{role} hang"]], v[at[f"{role} hang"]])
+        if "impulses" in at:
+            block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
+            variance = self.components.impulses(alpha) ** 2
+            self._impulses.append(
+                (alpha**2, float(y[block] @ y[block]) * variance, float(np.sum(1.0 - v[block])))
+            )
+
+    def edges(self, equations: Iterable[Equations]) -> None:
+        """Count what is left over of the edges that are no part of a flicker."""
+        for row in equations:
+            good = row.clean & (np.abs(row.residuals) <= STRAY * row.sigma)
+            self._edges.append((row.residuals[good] ** 2, row.speed[good] ** 2))
+
+    def _count(self, kind: str, y: Array, v: Array) -> None:
+        self._squares[kind] += float(y @ y)
+        self._determined[kind] += float(np.sum(1.0 - v))
+
+    def settled(self, parameters: float) -> Evidence:
+        """Estimate the components.
+
+        Parameters
+        ----------
+        parameters
+            Number of unknowns that all edges together have determined.
+        """
+        old = self.components
+        new: dict[str, float] = {}
+        for kind, found in self._squares.items():
+            stated = (getattr(STATED, kind) / getattr(old, kind)) ** 2
+            self.degrees[kind] = STATED_WEIGHT + self._determined[kind]
+            share = (STATED_WEIGHT * stated + found) / self.degrees[kind]
+            new[kind] = getattr(old, kind) * share**0.5
+        if self._impulses:
+            sizes, squares, counts = np.array(self._impulses).T
+            new["impulse"], new["impulse_floor"] = _two(
+                squares, counts, sizes, (old.impulse, old.impulse_floor)
+            )
+            self.degrees["impulse"] = self.degrees["impulse_floor"] = float(counts.sum())
+        squares, speeds = (np.concatenate(parts) for parts in zip(*self._edges, strict=True))
+        free = max(0.5, 1.0 - parameters / squares.size)
+        # Edges at about the same speed scatter alike: few bins do as well as all of them.
+        counts, edges = np.histogram(speeds, _BINS)
+        sums, _ = np.histogram(speeds, edges, weights=squares)
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        new["jitter"], new["floor"] = _two(sums, free * counts, middles, (old.jitter, old.floor))
+        self.degrees["jitter"] = self.degrees["floor"] = squares.size * free
+        self.components = replace(old, **new)
+        return self
+
+
+def _two(
+    squares: Array, counts: Array, sizes: Array, begin: tuple[float, float]
+) -> tuple[float, float]:
+    """Fit variances sizes·a² + b² to sums of squares with so many degrees of freedom.
+
+    The maximum of the χ² likelihood, by multiplicative steps.
+    """
+    a, b = begin[0] ** 2, begin[1] ** 2
+    for _ in range(_INNER):
+        total = a * sizes + b
+        a *= _explained(squares, counts, total, sizes)
+        total = a * sizes + b
+        b *= _explained(squares, counts, total, np.ones_like(sizes))
+    return a**0.5, b**0.5
+
+
+def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:
+    """How much larger a component is than it was thought to be, in the light of all sums."""
+    weight = sizes / total**2
+    return float(weight @ squares) / max(float(weight @ (counts * total)), np.finfo(float).tiny)

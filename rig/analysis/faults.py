@@ -1,0 +1,221 @@
+"""Faults of the rig that edges show: dead and exchanged gates, chains of other rods.
+
+They are said and never fitted away: a drop whose gates or chains are not those of the protocol is
+void, with the fault as its reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rig.analysis.align import align
+from rig.analysis.trains import Train
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.fit import Fit
+    from rig.protocol.scene import Gate
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+
+STRANGE = 0.5
+"""Share of its expected edges below which a gate sees something else than its chain; below `RIGHT`
+too, where more than `FEW` are missing."""
+FEW = 8
+IMPLAUSIBLE = 6.0
+"""Standard uncertainties beyond which a beam is not where the protocol says: by rods all alike and
+evenly spaced, an exchanged gate is fitted well at a wrong height."""
+RIGHT = 0.8
+"""Share that says that it was exchanged with another."""
+_WIDTH = 1e-3  # m: how far off an edge of another gate or rod may be
+_ENOUGH = 3  # gates that must agree on how many rods there are
+_MOST = 3  # rods by which a chain may differ
+
+
+class Faults(NamedTuple):
+    """What is wrong, in words: beyond use, and worth a remark."""
+
+    void: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def find_faults(fit: Fit) -> Faults:
+    """Look for gates and chains that are not those of the protocol."""
+    gates = _gates(fit)
+    void: list[str] = []
+    doubts = [
+        f"{name_of(_gate(fit, one.train))} gave no edges: it is dead or not plugged in"
+        for one in gates
+        if one.train.times.size == 0
+    ]
+    alive = [one for one in gates if one.train.times.size]
+    found: set[int] = set()
+    suspect = [gate for gate in alive if gate.odd or gate.off > IMPLAUSIBLE]
+    for one, other in combinations(suspect, 2):
+        if not {one.train.gate, other.train.gate} & found and _exchanged(fit, one, other):
+            void.append(exchanged(_gate(fit, one.train), _gate(fit, other.train)))
+            found |= {one.train.gate, other.train.gate}
+    for gate in alive:
+        name = name_of(_gate(fit, gate.train))
+        if gate.train.gate in found:
+            continue
+        if gate.strange:
+            void.append(
+                f"{name} sees something else than this chain: only {gate.share:.0%} of its "
+                "expected edges are there"
+            )
+        elif gate.off > IMPLAUSIBLE:
+            void.append(f"{name} is off its height by {gate.off:.0f} times its uncertainty")
+    for role in fit.model.sides:
+        void += _rods(fit, role)
+    return Faults(tuple(void), tuple(doubts))
+
+
+class _Seen(NamedTuple):
+    """A gate, the share of its expected edges that it saw, and how far off its beam seems to be.
+
+    The latter is in standard uncertainties of its height.
+    """
+
+    role: str
+    train: Train
+    match: Index
+    share: float
+    off: float
+
+    @property
+    def matched(self) -> int:
+        """Number of its edges that belong to a rod."""
+        return int((self.match >= 0).sum())
+
+    @property
+    def odd(self) -> bool:
+        """Whether a rod's two edges are missing, or there are two too many."""
+        return self.match.size - self.matched > 1 or self.train.times.size - self.matched > 1
+
+    @property
+    def strange(self) -> bool:
+        """Whether it sees something else than its chain."""
+        missing = self.match.size - self.matched
+        return self.share < STRANGE or (self.share < RIGHT and missing > FEW)
+
+
+def _gates(fit: Fit) -> list[_Seen]:
+    beams = fit.model.unknowns["beams"]
+    x, sd = np.abs(fit.estimate.x[beams]), fit.model.unknowns.sd[beams]
+    off = np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
+    return [
+        _Seen(role, train, match, float((match >= 0).mean()), float(off[train.gate]))
+        for role, side in fit.model.sides.items()
+        for train, match in zip(side.trains, fit.matches[role], strict=True)
+        if match.size
+    ]
+
+
+def _gate(fit: Fit, train: Train) -> Gate:
+    assert fit.model.protocol.gates is not None
+    return fit.model.protocol.gates.gates[train.gate]
+
+
+def exchanged(one: Gate, other: Gate) -> str:
+    """Say that two gates changed places."""
+    return f"{name_of(one)} and {name_of(other)} are plugged in the wrong way round"
+
+
+def name_of(gate: Gate) -> str:
+    """Say which gate, so that one can find it."""
+    return f"the gate on channel {gate.channel} ({gate.side} side, {gate.height * 1e3:g} mm)"
+
+
+def _exchanged(fit: Fit, one: _Seen, other: _Seen) -> bool:
+    """Whether each gate's edges are what the other should have seen, and better than its own.
+
+    Gates that are a whole number of rods apart see nearly the same: the ends of the chain tell.
+    """
+    counts = _count_as(fit, one, other), _count_as(fit, other, one)
+    right = counts[0] > RIGHT * one.match.size and counts[1] > RIGHT * other.match.size
+    far = max(one.off, other.off) > IMPLAUSIBLE
+    return right and (far or sum(counts) > one.matched + other.matched + 1)
+
+
+def _count_as(fit: Fit, expected: _Seen, observed: _Seen) -> int:
+    """Count the edges of one gate that are what another should have seen."""
+    train = replace(
+        expected.train,
+        times=observed.train.times,
+        blocked=observed.train.blocked,
+        burst=observed.train.burst,
+        edge=observed.train.edge,
+    )
+    (match,) = _aligned(fit, expected.role, [train])
+    return int((match >= 0).sum())
+
+
+def _aligned(fit: Fit, role: str, trains: Sequence[Train]) -> list[Index]:
+    """Match other trains to the motion found."""
+    model, x = fit.model, fit.estimate.x
+    path = model.trajectory(role, x)
+    clock = float(x[model.unknowns["clock"]][0])
+    return align(trains, [train.levels for train in trains], path, _WIDTH, clock)
+
+
+def _rods(fit: Fit, role: str) -> list[str]:
+    """Compare the number of rods that passed with the chain's."""
+    chain = fit.model.sides[role].chain
+    rods = chain.chain.rods
+    seen = np.zeros(rods, dtype=np.intp)
+    expected = np.zeros(rods, dtype=np.intp)
+    for gate in _gates(fit):
+        if gate.role == role and gate.train.times.size:
+            np.add.at(expected, np.unique(gate.train.rods), 1)
+            np.add.at(seen, np.unique(gate.train.rods[gate.match >= 0]), 1)
+    there = np.flatnonzero(seen)
+    missing = rods - 1 - int(there[-1]) if there.size else 0
+    if missing and expected[-missing:].min() >= _ENOUGH:
+        return [_count(role, chain.name, rods, rods - missing)]
+    more = _more(fit, role)
+    return [_count(role, chain.name, rods, rods + more)] if more else []
+
+
+def _count(role: str, name: str, stated: int, found: int) -> str:
+    return f"chain {name} on the {role} side has {found} rods, not {stated} as the protocol says"
+
+
+def _more(fit: Fit, role: str) -> int:
+    """Count the rods above the top one of the protocol that most gates saw."""
+    chain = fit.model.sides[role].chain
+    places = chain.chain.heights
+    if len(places) < 2:
+        return 0
+    pitch, width = places[-1] - places[-2], chain.widths[-1]
+    gates = [gate for gate in _gates(fit) if gate.role == role and gate.train.times.size]
+    for more in range(1, _MOST + 1):
+        trains = [_above(fit, gate, places[-1] + more * pitch, width) for gate in gates]
+        both = sum(bool((match >= 0).all()) for match in _aligned(fit, role, trains))
+        if both < max(_ENOUGH, len(gates) / 2):
+            return more - 1
+    return _MOST
+
+
+def _above(fit: Fit, gate: _Seen, place: float, width: float) -> Train:
+    """What is left of a gate's edges, with one rod expected."""
+    left = np.setdiff1d(np.arange(gate.train.times.size), gate.match)
+    level = _gate(fit, gate.train).height - place
+    return Train(
+        gate.train.gate,
+        gate.train.times[left],
+        gate.train.blocked[left],
+        gate.train.burst[left],
+        gate.train.edge[left],
+        np.zeros(2, dtype=np.intp),
+        np.array([True, False]),
+        np.array([level + width / 2, level - width / 2]),
+    )

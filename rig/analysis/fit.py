@@ -1,0 +1,125 @@
+"""One drop matched and adjusted by itself, ready to be judged, or to learn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.adjust import Estimate, adjust
+from rig.analysis.align import align
+from rig.analysis.normal import STRAY
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.drop_model import DropModel
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+    Matches = dict[str, list[Index]]
+
+_COARSE = 2.5e-3  # m: how far off a first guess may put a rod
+_FINE = 0.5e-3  # m: how far off an adjusted trajectory may
+_ROUNDS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A drop's unknowns, and which edge is which rod."""
+
+    model: DropModel
+    matches: Matches
+
+    @property
+    def matched(self) -> int:
+        """Number of edges that belong to a rod."""
+        return sum(int((match >= 0).sum()) for side in self.matches.values() for match in side)
+
+    @property
+    def rods(self) -> dict[int, int]:
+        """Rod of every matched edge of the drop."""
+        return {
+            int(part.edge[edge]): int(rod)
+            for role, side in self.model.sides.items()
+            for part, match in zip(side.trains, self.matches[role], strict=True)
+            for edge, rod in zip(match, part.rods, strict=True)
+            if edge >= 0
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Fit(Matched):
+    """A drop adjusted by itself."""
+
+    estimate: Estimate
+
+
+def settle(model: DropModel) -> Fit:
+    """Match and adjust in turn until the matching stays."""
+    x = model.first()
+    estimate: Estimate | None = None
+    before: Matches = {}
+    for round_ in range(_ROUNDS):
+        matches = match(model, x, _COARSE if round_ == 0 else _FINE)
+        if estimate is not None and _same(matches, before):
+            break
+        estimate = adjust(model, matches, x)
+        x, before = estimate.x, matches
+    assert estimate is not None
+    struck = without_strays(model, x, before, estimate.scatter)
+    if not _same(struck, before):
+        estimate = adjust(model, struck, x)
+    return Fit(model, struck, estimate)
+
+
+def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
+    """Match all edges to rods, given where the chains are.
+
+    Parameters
+    ----------
+    width
+        How far off an edge may be, m.
+    """
+    clock = float(x[model.unknowns["clock"]][0])
+    return {
+        role: align(side.trains, model.levels(role, x), model.trajectory(role, x), width, clock)
+        for role, side in model.sides.items()
+    }
+
+
+def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float = 1.0) -> Matches:
+    """Take back matches far off the adjusted motion: a bounce where a rod's edge was missed.
+
+    Parameters
+    ----------
+    scatter
+        How much more the edges scatter than the model assumes.
+    """
+    return {role: _kept(model, role, x, found, scatter) for role, found in matches.items()}
+
+
+def _kept(
+    model: DropModel, role: str, x: Array, matches: Sequence[Index], scatter: float
+) -> list[Index]:
+    rows = model.equations(role, x, matches)
+    stray = np.abs(rows.residuals) > STRAY * rows.sigma * scatter
+    kept, position = [], 0
+    for one in matches:
+        copy = one.copy()
+        chosen = np.flatnonzero(one >= 0)
+        copy[chosen[stray[position : position + chosen.size]]] = -1
+        position += chosen.size
+        kept.append(copy)
+    return kept
+
+
+def _same(one: Matches, other: Matches) -> bool:
+    return all(
+        np.array_equal(a, b)
+        for role in one
+        for a, b in zip(one[role], other.get(role, []), strict=True)
+    )

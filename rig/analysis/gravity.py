@@ -1,0 +1,149 @@
+"""Gravity from the free chain, as a check of the clock: its rods fall past beams of known height.
+
+This is no result. In g = 2·length/time² an error of the time scale counts twice, so a g that is not
+the place's says that the clock, a beam's height or the protocol's gravity is not what it is said
+to be. It uses none of the adjustment's machinery but its matches of edges to rods.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import fmean, stdev
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.result import GOOD, Measured
+from rig.analysis.student import coverage_factor
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rig.analysis.drop import TimeScale
+    from rig.analysis.result import DropResult
+    from rig.protocol.scene import Protocol
+    from rig.records import Drop
+    from rig.units import Quantity
+
+_EDGE_M = 0.1e-3  # where on a rod's surface a beam is cut
+_EDGE_S = 5e-6  # comparator and stamp
+_BEAM_M = 1e-3  # how far off a rod's middle a beam may run: tan(tilt) makes a height of it
+_FEWEST = 8  # edges
+
+
+@dataclass(frozen=True, slots=True)
+class GravityCheck:
+    """Gravity as the free chain falls and as the protocol says.
+
+    Attributes
+    ----------
+    measured
+        Mean over drops, m/s².
+    stated
+        The protocol's, m/s².
+    drops
+        How many.
+    """
+
+    measured: Measured
+    stated: Quantity
+    drops: int
+
+    @property
+    def normalized_error(self) -> float:
+        """E_n = (measured − stated)/√(U² + U_s²); within ±1 they agree (ISO 13528)."""
+        width = math.hypot(self.measured.expanded, coverage_factor(math.inf) * self.stated.u)
+        return (self.measured.value - self.stated.value) / width
+
+    @property
+    def agrees(self) -> bool:
+        """Whether they do."""
+        return abs(self.normalized_error) <= 1.0
+
+    def json(self) -> dict[str, Any]:
+        """A member of ``calibration``."""
+        return {
+            "gravity_m_s2": self.measured.json(),
+            "stated_m_s2": self.stated.value,
+            "drops": self.drops,
+            "normalized_error": self.normalized_error,
+            "agrees": self.agrees,
+        }
+
+
+def check_gravity(
+    protocol: Protocol, cases: Iterable[tuple[DropResult, Drop, TimeScale]]
+) -> GravityCheck | None:
+    """Compare the free chain's fall with the protocol's gravity.
+
+    Parameters
+    ----------
+    protocol
+        The scene.
+    cases
+        Analysed drops; those that are void or rejected do not count.
+
+    Returns
+    -------
+    GravityCheck or None
+        `None` where no free chain passes gates, and in air that slows it.
+    """
+    if protocol.gates is None or protocol.drag is not None:
+        return None
+    found = [
+        gravity
+        for result, drop, scale in cases
+        if result.verdict in GOOD
+        and (gravity := free_gravity(protocol, result, drop, scale)) is not None
+    ]
+    if not found:
+        return None
+    # Beams, rods and clock are the same in every drop, so that no number of drops averages them.
+    common = math.sqrt(fmean(one.u**2 for one in found))
+    own = stdev(one.value for one in found) / math.sqrt(len(found)) if len(found) > 1 else 0.0
+    mean = Measured(fmean(one.value for one in found), math.hypot(common, own))
+    return GravityCheck(mean, protocol.gravity, len(found))
+
+
+def free_gravity(
+    protocol: Protocol, result: DropResult, drop: Drop, scale: TimeScale
+) -> Measured | None:
+    """Fit h = a + b t − g t²/2 to one drop's matched edges of the free side.
+
+    Generalised least squares: rods off their places, beams off their heights and rods as they
+    look to a beam are common to several edges each, and stand in the covariance.
+    """
+    gates = {gate.channel: gate for gate in protocol.gates.on("free")} if protocol.gates else {}
+    name = result.run.free
+    pairs = [(drop.edges[at], rod) for at, rod in result.matches.items()]
+    pairs = [(edge, rod) for edge, rod in pairs if edge.channel in gates]
+    if name is None or protocol.gates is None or len(pairs) < _FEWEST:
+        return None
+    chain = protocol.chains[name]
+    rods = np.array([rod for _, rod in pairs])
+    channel = np.array([edge.channel for edge, _ in pairs])
+    side = np.array([0.5 if edge.blocked else -0.5 for edge, _ in pairs])
+    time = np.array([edge.tick for edge, _ in pairs]) / scale.hz
+    time -= time.mean()
+    beam = np.array([gates[edge.channel].height for edge, _ in pairs])
+    height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
+    design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
+    _, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
+    sigma2 = _EDGE_M**2 + ((speed - fall * time) * _EDGE_S) ** 2
+    turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
+    ripple = _BEAM_M * math.tan(math.radians(chain.tilt_deg))
+    same_beam = channel[:, None] == channel
+    covariance = (
+        np.diag(sigma2)
+        + chain.position_u**2 * (rods[:, None] == rods)
+        + same_beam * (protocol.gates.height_u**2 + ripple**2 * np.outer(turn, turn))
+        + chain.width_u**2 * np.outer(side, side)
+    )
+    weighted = np.linalg.solve(covariance, np.column_stack([design, height]))
+    inverse = np.linalg.inv(design.T @ weighted[:, :3])
+    best = inverse @ (weighted[:, :3].T @ height)
+    chi2 = float((height - design @ best) @ (weighted[:, 3] - weighted[:, :3] @ best))
+    scatter2 = max(1.0, chi2 / (height.size - 3))
+    fitted = math.sqrt(scatter2 * float(inverse[2, 2]))
+    return Measured(float(best[2]), math.hypot(fitted, 2.0 * float(best[2]) * scale.u))

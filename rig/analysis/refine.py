@@ -1,0 +1,113 @@
+"""A drop's results in the light of its whole session, and where their uncertainty comes from."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.quantities import measurands
+from rig.analysis.result import Measured
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rig.analysis.learn import Lesson, Taught
+
+    Array = NDArray[np.float64]
+
+_DEGREES = {
+    "edges": "jitter",
+    "beam heights": "gates",
+    "beam offsets": "beam",
+    "rod places": "rods",
+    "hanging height": "hang",
+    "single impulses": "impulse",
+}
+"""Budget line → the component whose degrees of freedom it has."""
+
+
+class Budgets:
+    """Uncertainties of functions of a drop's unknowns, from the joint solution.
+
+    With M the normal matrix of all drops, prior included, the variance is gᵀM⁻¹g = wᵀ(N + P)w with
+    w = M⁻¹g: N is the edges' line and each group of priors has its own, and they add up. With the
+    drops' own unknowns eliminated, w_c = C h with h = g_c − Gᵀg_o for the common ones, G C h for
+    the other drops' own, and A⁻¹g_o − G C h for this drop's own.
+
+    Parameters
+    ----------
+    lesson
+        Of all drops.
+    """
+
+    def __init__(self, lesson: Lesson) -> None:
+        self.lesson = lesson
+        size = len(lesson.shared)
+        self._root = np.linalg.cholesky(lesson.covariance)
+        self._others: dict[str, Array] = {}
+        for drop in lesson.drops:
+            place = np.ix_(drop.here, drop.here)
+            for name, rows in _groups(drop).items():
+                total = self._others.setdefault(name, np.zeros((size, size)))
+                total[place] += drop.gain[rows].T @ drop.gain[rows]
+
+    def measured(self, drop: Taught) -> dict[str, Measured]:
+        """Everything the scene lets one measure, by its JSON name."""
+        return {
+            name: self._measured(drop, value, gradient * drop.model.unknowns.sd)
+            for name, (value, gradient) in measurands(drop.model, drop.x).items()
+        }
+
+    def _measured(self, drop: Taught, value: float, gradient: Array) -> Measured:
+        """Put value and uncertainty together; `gradient` is in units of the prior uncertainties."""
+        alone = drop.inverse @ gradient[drop.own]
+        h = np.zeros(len(self.lesson.shared))
+        h[drop.here] = gradient[drop.common] - drop.gain.T @ gradient[drop.own]
+        common = self.lesson.covariance @ h
+        own = alone - drop.gain @ common[drop.here]
+        shared = h @ self._root
+        variance = float(gradient[drop.own] @ alone) + float(shared @ shared)
+        lines: dict[str, float] = {}
+        for name, rows in _groups(drop).items():
+            here = drop.gain[rows] @ common[drop.here]
+            others = float(common @ self._others[name] @ common) - float(here @ here)
+            lines[name] = float(own[rows] @ own[rows]) + max(0.0, others)
+        for name, places in self._common(drop).items():
+            lines[name] = lines.get(name, 0.0) + float(common[places] @ common[places])
+        lines["edges"] = lines.get("edges", 0.0) + max(0.0, variance - sum(lines.values()))
+        budget = {name: math.sqrt(line) for name, line in lines.items() if line > 0.0}
+        u = math.sqrt(variance)
+        return Measured(value, u, self._degrees(u, budget), budget, shared)
+
+    def _common(self, drop: Taught) -> dict[str, NDArray[np.intp]]:
+        """Places in the session's vector of each line of the budget."""
+        places = np.full(drop.x.size, -1)
+        places[drop.common] = drop.here
+        found = {
+            name: np.concatenate([places[block] for block in blocks])
+            for name, blocks in drop.model.unknowns.groups.items()
+        }
+        return {name: here[here >= 0] for name, here in found.items()}
+
+    def _degrees(self, u: float, budget: dict[str, float]) -> float:
+        """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4)."""
+        degrees = self.lesson.degrees
+        share = sum(
+            (line / u) ** 4 / degrees[_DEGREES[name]]
+            for name, line in budget.items()
+            if name in _DEGREES and _DEGREES[name] in degrees
+        )
+        return 1.0 / share if share > 0.0 else math.inf
+
+
+def _groups(drop: Taught) -> dict[str, NDArray[np.intp]]:
+    """Rows of a drop's own unknowns that each line of the budget has."""
+    row = np.full(drop.x.size, -1)
+    row[drop.own] = np.arange(drop.own.size)
+    found = {
+        name: np.concatenate([row[block] for block in blocks])
+        for name, blocks in drop.model.unknowns.groups.items()
+    }
+    return {name: rows[rows >= 0] for name, rows in found.items() if (rows >= 0).any()}

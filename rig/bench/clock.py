@@ -1,0 +1,125 @@
+"""How well the board's clock is known after a time, with and without a 1 Hz reference."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from rig.daemon.record import Unrecorded
+from rig.daemon.station import Station
+from rig.link.epochs import epochs
+from rig.link.rate import ping_rate, pulse_rate
+from rig.protocol.scene import PPS_U
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.rate import TickRate
+    from rig.records import Ping, Pulse
+
+TICK_HZ = 16_000_000
+CLOCK_PPM = -1300.0
+LATENCY_S = 1e-3
+REFERENCE_PPM = 0.05
+DURATIONS_S = (10.0, 30.0, 60.0, 120.0, 300.0, 900.0)
+SOURCES = {"pings": 0.0, "reference": PPS_U}
+
+
+@dataclass(slots=True)
+class _Kept(Unrecorded):
+    """A record of clock samples only."""
+
+    pings: list[Ping] = field(default_factory=list)
+    pulses: list[Pulse] = field(default_factory=list)
+
+    def add_ping(self, ping: Ping) -> None:
+        self.pings.append(ping)
+
+    def add_pulse(self, pulse: Pulse) -> None:
+        self.pulses.append(pulse)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Errors of the rate after one duration, over all seeds, ppm.
+
+    Attributes
+    ----------
+    duration_s, source
+        How long clocks were compared, and with which.
+    rms, worst
+        Of the error.
+    u
+        Mean standard uncertainty as stated; a reference's own is 0.1 ppm.
+    held
+        Share of seeds whose error is within 1.96 u.
+    """
+
+    duration_s: float
+    source: str
+    rms: float
+    worst: float
+    u: float
+    held: float
+
+
+def clock(
+    protocol: str, seeds: int, tell: Callable[[str], None], durations_s: tuple[float, ...]
+) -> list[Row]:
+    """Compare clocks over a simulated line with 1 ms of exponential jitter.
+
+    Parameters
+    ----------
+    protocol
+        Any protocol file: a simulation needs a scene.
+    seeds
+        Simulations 1, 2, ….
+    tell
+        Told how far it is.
+    durations_s
+        After which the rate is looked at.
+    """
+    found: dict[tuple[float, str], list[tuple[float, float]]] = {}
+    for seed in range(1, seeds + 1):
+        kept = _compared(protocol, seed, max(durations_s))
+        begin_ns = kept.pings[0].host_send_ns
+        for duration in durations_s:
+            end_ns = begin_ns + round(duration * 1e9)
+            samples = epochs([p for p in kept.pings if p.host_recv_ns <= end_ns], TICK_HZ)
+            pings = ping_rate(samples)
+            pulses = [p for p in kept.pulses if p.host_recv_ns <= end_ns]
+            rates = pings, pulse_rate(samples, pulses, pings)
+            for (source, u), rate in zip(SOURCES.items(), rates, strict=True):
+                if rate.n:
+                    found.setdefault((duration, source), []).append(_error(rate, u))
+        tell(f"seed {seed} of {seeds}")
+    return [_row(duration, source, pairs) for (duration, source), pairs in found.items()]
+
+
+def _compared(protocol: str, seed: int, seconds: float) -> _Kept:
+    """Let a station compare clocks, as in any session."""
+    dials = f"quiet=1&clock={CLOCK_PPM}ppm&latency={LATENCY_S}s&reference={REFERENCE_PPM}ppm"
+    url = f"sim://?protocol={quote(protocol)}&seed={seed}&{dials}"
+    kept = _Kept()
+    with Station(kept, url) as station:
+        station.wait(seconds + 5.0)
+    return kept
+
+
+def _error(rate: TickRate, u: float) -> tuple[float, float]:
+    true = TICK_HZ * (1.0 + CLOCK_PPM * 1e-6)
+    return (rate.hz / true - 1.0) * 1e6, math.hypot(rate.u_hz / true, u) * 1e6
+
+
+def _row(duration: float, source: str, pairs: list[tuple[float, float]]) -> Row:
+    n = len(pairs)
+    return Row(
+        duration,
+        source,
+        math.sqrt(sum(error**2 for error, _ in pairs) / n),
+        max(abs(error) for error, _ in pairs),
+        sum(u for _, u in pairs) / n,
+        sum(abs(error) <= 1.96 * u for error, u in pairs) / n,
+    )

@@ -1,0 +1,101 @@
+"""What a simpler instrument or a simpler fit makes of the same edges."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.analysis.result import DropResult
+    from rig.protocol.scene import Gate, Protocol, Side
+    from rig.records import Drop
+
+
+class Reading(NamedTuple):
+    """What a plain timer with two gates a side reads, SI units."""
+
+    separation_m: float
+    speed_m_s: float
+
+
+class _Passage(NamedTuple):
+    """A top rod at the lower gate: when, how high, how fast."""
+
+    time: float
+    height: float
+    speed: float
+
+
+def two_gate_timer(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
+    """Time the last passage at two gates of each side, the lowest but one that bounces reach.
+
+    Between two gates a rod's mean speed is that at half time; from the lower one it falls freely.
+    The timer knows no rods: the last thing that darkened a beam is the top one.
+
+    Returns
+    -------
+    Reading or None
+        Nothing where a gate saw nothing or the passages come in the wrong order.
+    """
+    struck = _passage(protocol, drop, hz, "impact")
+    free = _passage(protocol, drop, hz, "free")
+    if struck is None or free is None:
+        return None
+    gravity = protocol.gravity.value
+    speed = math.sqrt(struck.speed**2 + 2.0 * gravity * struck.height)
+    since = struck.time + 2.0 * struck.height / (struck.speed + speed) - free.time
+    height = free.height - (free.speed + 0.5 * gravity * since) * since
+    return Reading(height, speed)
+
+
+def _passage(protocol: Protocol, drop: Drop, hz: float, side: Side) -> _Passage | None:
+    assert protocol.gates is not None
+    gates = sorted(protocol.gates.on(side), key=lambda gate: gate.height)[1:3]
+    if len(gates) < 2:
+        return None
+    low, high = (_last(gate, drop, hz) for gate in gates)
+    if low is None or high is None or low <= high:
+        return None
+    fallen, taken = gates[1].height - gates[0].height, low - high
+    speed = fallen / taken + 0.5 * protocol.gravity.value * taken
+    return _Passage(low, gates[0].height, speed)
+
+
+def _last(gate: Gate, drop: Drop, hz: float) -> float | None:
+    """Return the middle of the last time that a beam was dark, s."""
+    edges = [edge for edge in drop.edges if edge.channel == gate.channel]
+    if len(edges) < 2:
+        return None
+    return 0.5 * (edges[-1].tick + edges[-2].tick) / hz
+
+
+def plain_fit(protocol: Protocol, drop: Drop, result: DropResult, hz: float) -> None:
+    """Fit each gate side's matched edges by a plain numpy least-squares fit, for its time alone.
+
+    One row an edge, one column an unknown that the analysis has as well: release, start, a place
+    a rod and a height a gate; linear, solved once.
+    """
+    assert protocol.gates is not None
+    numbers = {gate.channel: n for n, gate in enumerate(protocol.gates.gates)}
+    for side in ("impact", "free"):
+        channels = {gate.channel for gate in protocol.gates.gates if gate.side == side}
+        rows = [(n, rod) for n, rod in result.matches.items() if drop.edges[n].channel in channels]
+        if rows:
+            _solve(drop, rows, numbers, hz)
+
+
+def _solve(drop: Drop, rows: Sequence[tuple[int, int]], numbers: dict[int, int], hz: float) -> None:
+    times = np.array([drop.edges[n].tick for n, _ in rows]) / hz
+    rods = np.array([rod for _, rod in rows])
+    gates = np.array([numbers[drop.edges[n].channel] for n, _ in rows])
+    places = rods.max() + 1
+    design = np.zeros((times.size, 3 + places + gates.max() + 1))
+    design[:, 0], design[:, 1], design[:, 2] = 1.0, times, times**2
+    row = np.arange(times.size)
+    design[row, 3 + rods] = 1.0
+    design[row, 3 + places + gates] = 1.0
+    np.linalg.lstsq(design, times, rcond=None)

@@ -1,0 +1,157 @@
+"""A whole rig of real processes, so that each can be killed: board, daemon and runner."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Self
+
+from rig.daemon.client import Client
+from rig.errors import DeviceError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FENCE = """\
+protocol: 1
+title: A picket fence that falls often
+chains:
+  fence: {rods: 8, length: 350 mm, diameter: 25 mm, position_uncertainty: 0.1 mm}
+drop: 400 mm ± 2 mm
+gravity: 9.81 m/s^2
+gates:
+  free: [{channel: 0, height: 50 mm}, {channel: 1, height: 350 mm}]
+  height_uncertainty: 0.3 mm
+release: {channel: 0, pulse: 80 ms}
+plan: {repeats: RUNS, settle: 0.2 s}
+accept: {missed_edges: 15 %}
+"""
+_READY_S = 20.0
+
+
+class Stand:
+    """Everything in one temporary folder; a context that ends what it started.
+
+    Parameters
+    ----------
+    runs
+        Of the protocol.
+    seed
+        Of the simulation.
+    dials
+        As in a ``sim://`` URL.
+    """
+
+    def __init__(self, runs: int, seed: int = 0, dials: dict[str, str] | None = None) -> None:
+        self._folder = TemporaryDirectory(prefix="rig-")
+        self.folder = Path(self._folder.name)
+        self.runs, self.seed, self._dials = runs, seed, dials or {}
+        self.protocol = self.folder / "fence.yaml"
+        self.protocol.write_text(FENCE.replace("RUNS", str(runs)), "utf-8")
+        self.port = self.folder / "port"
+        self.socket = self.folder / "door" / "rig.sock"
+        self.log = self.folder / "board.jsonl"
+        self.session = self.folder / "session"
+        self.told = ""  # what the last runner said
+        self.board: subprocess.Popen[str] | None = None
+        self.daemon: subprocess.Popen[str] | None = None
+        self.runner: subprocess.Popen[str] | None = None
+
+    def __enter__(self) -> Self:
+        self.board = self._start(
+            *("-m", "sim.pty", "--protocol", self.protocol, "--seed", self.seed),
+            *("--link", self.port, "--log", self.log),
+            *(f"{name}={value}" for name, value in self._dials.items()),
+            stdin=subprocess.PIPE,
+        )
+        assert self.board.stdout is not None
+        self.board.stdout.readline()
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        for process in (self.runner, self.daemon, self.board):
+            self.kill(process)
+        self._folder.cleanup()
+
+    # ------------------------------------------------------------------ processes
+
+    def start_daemon(self, *options: str) -> None:
+        """Start a daemon and wait until clients can come."""
+        self.daemon = self._start(
+            *("-m", "rig", "daemon", "--port", self.port, "--socket", self.socket), *options
+        )
+        assert self.daemon.stderr is not None
+        line = self.daemon.stderr.readline()
+        if not line.startswith("rig daemon:"):
+            raise DeviceError(f"the daemon does not start: {line}")
+
+    def start_runner(self) -> None:
+        """Start ``rig run`` on the session, through the daemon."""
+        self.runner = self._start(
+            *("-m", "rig", "run", self.protocol, "--port", self.port, "--session", self.session),
+            *("--socket", self.socket, "--yes"),
+        )
+
+    def run(self) -> int:
+        """Have a runner go on with the session to its end; return the exit code."""
+        self.start_runner()
+        assert self.runner is not None
+        _, self.told = self.runner.communicate(timeout=600)
+        if "Traceback" in self.told:
+            raise AssertionError(self.told)
+        return self.runner.returncode
+
+    def kill(self, process: subprocess.Popen[str] | None) -> None:
+        """Kill one of the processes, as ``kill -9`` does."""
+        if process is not None:
+            process.kill()
+            process.wait()
+            for stream in (process.stdin, process.stdout, process.stderr):
+                if stream is not None:
+                    with suppress(BrokenPipeError):
+                        stream.close()
+
+    def hand(self, what: str) -> None:
+        """Do something at the board, see `sim.pty`."""
+        assert self.board is not None
+        assert self.board.stdin is not None
+        self.board.stdin.write(what + "\n")
+        self.board.stdin.flush()
+
+    def client(self, name: str = "a test") -> Client:
+        """Connect to the daemon, once it answers."""
+        return Client(self.socket, name)
+
+    def _start(self, *arguments: object, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+        return subprocess.Popen(  # noqa: S603 - our own program
+            [sys.executable, "-W", "error", *map(str, arguments)],
+            stdin=stdin,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        )
+
+    # ------------------------------------------------------------------ what the board saw
+
+    def happened(self) -> Iterator[dict[str, Any]]:
+        """What the board logged so far."""
+        for line in self.log.read_text("utf-8").splitlines(keepends=True):
+            if line.endswith("\n"):
+                yield json.loads(line)
+
+    def await_phase(self, phase: int, count: int = 1) -> float:
+        """Wait until the board was in a phase so often; return when, s (monotonic)."""
+        until = time.monotonic() + _READY_S
+        while time.monotonic() < until:
+            found = [seen["at_s"] for seen in self.happened() if seen.get("phase") == phase]
+            if len(found) >= count:
+                return float(found[count - 1])
+            time.sleep(0.005)
+        raise TimeoutError(f"the board was not {count} times in phase {phase}")

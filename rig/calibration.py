@@ -1,0 +1,267 @@
+"""The time scale of a session: from its clock samples to seconds, and how far to trust them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, sqrt
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.drop import TimeScale
+from rig.link.epochs import RESONATOR_TOLERANCE, Epochs, epochs
+from rig.link.hosttime import HostTime, one_axis
+from rig.link.rate import ping_rate, pulse_rate
+from rig.protocol import reader
+from rig.session.schema import RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rig.link.rate import TickRate
+    from rig.records import Drop
+    from rig.session.reading import Reader
+
+HOST_U = 50e-6 / sqrt(3)
+"""Of a computer's clock, relative: ±50 ppm for its quartz with temperature and age; a steered one
+(NTP) is better, but nothing here knows. Virtual time is exact."""
+_UNKNOWN = RESONATOR_TOLERANCE / sqrt(3)
+_FIRED_S = 1.0  # FIRED is logged before the request leaves; the device waits 0.25 s at most
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One clock that the board was compared with.
+
+    Attributes
+    ----------
+    name
+        ``pings`` (the host's clock) or ``reference``.
+    rate
+        The board's rate by that clock.
+    u
+        Relative standard uncertainty of that clock itself.
+    """
+
+    name: str
+    rate: TickRate
+    u: float
+
+    def mean(self) -> TimeScale:
+        """Time scale over all its samples."""
+        rate = self.rate
+        return TimeScale(rate.hz, hypot(rate.u_hz / rate.hz, self.u))
+
+    def sometime(self) -> TimeScale:
+        """Time scale at a moment nobody knows: the mean, and how far the rate may be from it."""
+        hz, u = self.mean()
+        track = self.rate.track
+        return TimeScale(hz, hypot(u, track.wander * sqrt(track.span)) if track else u)
+
+    def at(self, seconds: float) -> TimeScale:
+        """Time scale at a moment of the host's time."""
+        hz, u_hz = self.rate.at(seconds)
+        return TimeScale(hz, hypot(u_hz / hz, self.u))
+
+
+@dataclass(frozen=True, slots=True)
+class Falls:
+    """When drops fell.
+
+    Attributes
+    ----------
+    samples
+        Clock samples by epoch.
+    hz
+        The board's mean rate.
+    time
+        The axis of host time they are on.
+    fired_ns
+        About when each run and attempt was fired, by the host's clock as it was then.
+    """
+
+    samples: Epochs
+    hz: float
+    time: HostTime
+    fired_ns: Mapping[tuple[int, int], int]
+
+    def when(self, drop: Drop) -> float | None:
+        """Find when a drop was fired, s of host time, by its tick among the samples around it."""
+        fired_ns = self.fired_ns.get((drop.run, drop.attempt))
+        if fired_ns is None or drop.fire_tick is None:
+            return None
+        # Restarts of the host leave open which of its times a log entry means; the tick decides.
+        found = (
+            self.samples.place(drop.fire_tick, fired_ns + shift, self.hz, 0.0, _FIRED_S)
+            for shift in self.time.shifts(fired_ns)
+        )
+        return next((moment.at_ns * 1e-9 for moment in found if moment is not None), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The time scale of a session.
+
+    Attributes
+    ----------
+    device
+        Mean of drops from the device; `None` where there was none.
+    source
+        In words.
+    details
+        For reports: numbers by name.
+    said
+        What ``rig analyze --json`` prints as ``calibration``.
+    timer_u
+        Relative standard uncertainty of the time scale of imported edges.
+    sources
+        Clocks the board was compared with, the best one first.
+    falls
+        When drops fell.
+    """
+
+    device: TimeScale | None
+    source: str
+    details: dict[str, Any]
+    said: dict[str, Any]
+    timer_u: float = _UNKNOWN
+    sources: tuple[Source, ...] = ()
+    falls: Falls | None = None
+
+    def scale(self, drop: Drop) -> TimeScale:
+        """Time scale of one drop; edges from another timer keep that timer's."""
+        return self._used(drop)[1]
+
+    def used(self, drop: Drop) -> dict[str, Any]:
+        """Say which calibration a drop has: where from, ppm off nominal, and how well known."""
+        name, (hz, u) = self._used(drop)
+        return {"source": name, "rate_ppm": (hz / drop.tick_hz - 1.0) * 1e6, "u_ppm": u * 1e6}
+
+    def _used(self, drop: Drop) -> tuple[str, TimeScale]:
+        if drop.certificate is None or self.device is None:
+            return "stated", TimeScale(drop.tick_hz, self.timer_u)
+        if not self.sources:
+            return "stated", self.device
+        when = self.falls.when(drop) if self.falls else None
+        choice = [
+            (source.name, source.sometime() if when is None else source.at(when))
+            for source in self.sources
+        ]
+        return min(choice, key=lambda one: one[1].u)
+
+
+def calibration(session: Reader) -> Calibration:
+    """Calibrate a session's clock from everything it recorded."""
+    identities = session.identities()
+    nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
+    u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
+    if nominal is None:
+        words = "times as the file gives them"
+        given: dict[str, Any] = {"source": "stated", "rate_ppm": 0.0, "u_ppm": u * 1e6}
+        details = {"source": words, "relative_u": u}
+        return Calibration(None, words, details, given | {"notes": []}, u)
+    breaks = session.host_breaks()
+    axis = one_axis(session.pings(), [ns for ns, _ in identities], breaks)
+    samples = epochs(axis.pings, nominal, axis.cuts_ns)
+    by_host = Source("pings", ping_rate(samples), 0.0 if session.simulated else HOST_U)
+    sources = [by_host] if by_host.rate.n else []
+    if pulses := session.pulses():
+        reference_u = reader.parse(session.protocol_text, session.protocol_source).reference_u
+        shifted = [
+            pulse._replace(
+                host_send_ns=pulse.host_send_ns + shift, host_recv_ns=pulse.host_recv_ns + shift
+            )
+            for pulse in pulses
+            for shift in axis.shifts(pulse.host_send_ns)
+        ]
+        rate = pulse_rate(samples, shifted, by_host.rate)
+        if rate.n:
+            sources.append(Source("reference", rate, reference_u))
+    sources.sort(key=lambda source: source.mean().u)
+    scale = sources[0].mean() if sources else TimeScale(nominal, _UNKNOWN)
+    said: dict[str, Any] = _said(sources, scale, nominal) | {
+        "epochs": len(samples.pings),
+        "host_breaks": len(breaks),
+        "notes": _notes(sources, len(breaks)),
+    }
+    words = _words(sources)
+    shown = sources[0].rate if sources else by_host.rate
+    return Calibration(
+        scale,
+        words,
+        {
+            "source": words,
+            "tick_hz": scale.hz,
+            "nominal_tick_hz": nominal,
+            "error_ppm": said["rate_ppm"],
+            "u_ppm": said["u_ppm"],
+            "samples": shown.n,
+            "span_s": shown.span_s,
+        },
+        said,
+        u,
+        tuple(sources),
+        Falls(samples, scale.hz, axis, _fired(session)),
+    )
+
+
+def _fired(session: Reader) -> dict[tuple[int, int], int]:
+    return {
+        (entry.run, entry.attempt): entry.host_ns
+        for entry in session.states()
+        if entry.state is RunState.FIRED
+    }
+
+
+def _said(sources: list[Source], scale: TimeScale, nominal: int) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "source": sources[0].name if sources else "stated",
+        "rate_ppm": (scale.hz / nominal - 1.0) * 1e6,
+        "u_ppm": scale.u * 1e6,
+        "nominal_tick_hz": nominal,
+    }
+    if sources:
+        best = sources[0]
+        found |= {"clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
+        if best.rate.track is not None:
+            found["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
+    rates = {source.name: source.rate for source in sources}
+    if "pings" in rates:
+        found |= {"pings": rates["pings"].n, "outliers": rates["pings"].outliers}
+    if "reference" in rates:
+        found["pulses"] = rates["reference"].n
+    return found
+
+
+def _words(sources: list[Source]) -> str:
+    if not sources:
+        return "nominal tick rate: too few clock samples"
+    n = sources[0].rate.n
+    if sources[0].name == "reference":
+        return f"device against 1 Hz reference, {n} pulses"
+    return f"device against host clock, {n} samples"
+
+
+def _notes(sources: list[Source], breaks: int) -> list[str]:
+    """Say what a reader should know before trusting the time scale."""
+    notes = []
+    if not sources:
+        notes.append("too few clock samples: times are by the board's nominal rate, ±0.5 %")
+    if breaks:
+        times = "once" if breaks == 1 else f"{breaks} times"
+        notes.append(
+            f"the host slept or its clock was set {times}: no clock sample from before is compared "
+            "with one from after"
+        )
+    if sources and (track := sources[0].rate.track) is not None and track.seen:
+        notes.append(
+            f"the board's clock wanders, by {track.wander * 60e6:.2g} ppm in an hour: each drop "
+            "has the rate of its own time"
+        )
+    if len(sources) > 1:
+        one, other = (source.mean() for source in sources)
+        apart = one.hz / other.hz - 1.0
+        if abs(apart) > 2.0 * hypot(one.u, other.u):
+            notes.append(
+                f"host clock and 1 Hz reference are {abs(apart) * 1e6:.0f} ppm apart, more than "
+                "both allow: is the reference what the protocol says?"
+            )
+    return notes

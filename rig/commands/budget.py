@@ -1,0 +1,107 @@
+"""``rig analyze --budget``: what the uncertainty of one run's results is made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.drop import fit_drop
+from rig.analysis.monte_carlo import monte_carlo
+from rig.analysis.student import coverage_factor
+from rig.commands.output import print_json
+from rig.errors import InputError
+from rig.protocol.plan import runs
+from rig.results import calibration, detailed, protocol_of
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Mapping
+
+    from rig.analysis.result import Measured
+    from rig.session.reading import Reader
+
+SEED = 1
+
+
+def main(arguments: Namespace) -> int:
+    """Print a run's budget in the session's light, and by itself beside Monte Carlo trials."""
+    with Session.open(arguments.session, readonly=True) as session:
+        found = budget(session, arguments.budget, arguments.trials, SEED)
+    if arguments.json:
+        print_json(found)
+    else:
+        print("\n".join(_table(found)))
+    return 0
+
+
+def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, Any]:
+    """Account for the uncertainty of a run's results.
+
+    Parameters
+    ----------
+    number
+        Of the run.
+    trials, seed
+        Of the Monte Carlo propagation, JCGM 101.
+
+    Raises
+    ------
+    InputError
+        A run that was not recorded, or is void.
+    """
+    drop = next((one for one in session.latest_drops() if one.run == number), None)
+    if drop is None:
+        raise InputError(f"run {number} has no drop in this session")
+    protocol = protocol_of(session)
+    planned = next(run for run in runs(protocol) if run.number == number)
+    alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
+    if fit is None:
+        raise InputError(f"run {number} is void: {'; '.join(alone.reasons)}")
+    analysis, _ = detailed(session)
+    result = next(one for one in analysis.runs if one.run.number == number)
+    trial = monte_carlo(fit, trials, seed)
+    return {
+        "run": number,
+        "learned": result.learned,
+        "budget": {name: _lines(measured) for name, measured in result.quantities.items()},
+        "by_itself": {name: _lines(measured) for name, measured in alone.quantities.items()},
+        "monte_carlo": {
+            "trials": trials,
+            "seed": seed,
+            "quantities": {name: one.json() for name, one in trial.items()},
+        },
+    }
+
+
+def _lines(measured: Measured) -> dict[str, Any]:
+    degrees = max(1.0, measured.degrees)
+    return {
+        **measured.json(),
+        "degrees": min(degrees, 1e6),
+        "k": coverage_factor(degrees),
+        "lines": [
+            {"name": name, "u": u, "share": (u / measured.u) ** 2}
+            for name, u in sorted(measured.budget.items(), key=lambda line: -line[1])
+        ],
+    }
+
+
+def _table(found: Mapping[str, Any]) -> list[str]:
+    """One block a quantity; SI units."""
+    lines = [f"run {found['run']}, SI units"]
+    drawn = found["monte_carlo"]
+    for name, one in found["budget"].items():
+        lines += [
+            "",
+            f"{name} = {one['value']:.6g}, u = {one['u']:.2g}, ν = {one['degrees']:.0f}, "
+            f"k = {one['k']:.2f}, U95 = {one['U95']:.2g}",
+        ]
+        lines += [
+            f"  {line['name']:<18}{line['u']:10.2g}{line['share']:8.1%}" for line in one["lines"]
+        ]
+        alone, trial = found["by_itself"][name], drawn["quantities"][name]
+        lines.append(
+            f"  by itself u = {alone['u']:.2g}; by {drawn['trials']} trials (seed "
+            f"{drawn['seed']}) {trial['u']:.2g}, 95 % in {trial['low']:.6g} … {trial['high']:.6g}"
+        )
+    return lines

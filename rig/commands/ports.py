@@ -1,0 +1,74 @@
+"""``rig ports``."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from rig.commands.output import print_json, say
+from rig.errors import DeviceError
+from rig.link.client import Device
+from rig.link.port import open_port, port_clock
+from rig.usb.listing import SerialPort, serial_ports
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Mapping
+
+
+def main(arguments: Namespace) -> int:
+    """List the ports, and ask who is there where that is wanted."""
+    ports = serial_ports()
+    asked: dict[str, dict[str, Any]] = {}
+    if arguments.identify is not None:
+        chosen = arguments.identify or [port.path for port in ports if port.candidate]
+        asked = {path: _who(path) for path in chosen}
+    if arguments.json:
+        print_json({"ports": [_fields(port, asked) for port in _all(ports, asked)]})
+        return 0
+    for port in _all(ports, asked):
+        print(_line(port, asked.get(port.path)))
+    if not any(port.candidate for port in ports):
+        say("no board found: is its cable plugged in, and one that carries data?")
+    return 0
+
+
+def _who(path: str) -> dict[str, Any]:
+    """Ask who is at a port; what is wrong there is an answer too."""
+    try:
+        with closing(open_port(path)) as port:
+            identity = Device(port, port_clock(port), tries=3).connect()
+    except DeviceError as error:
+        return {"identity": None, "trouble": str(error)}
+    fields = asdict(identity) | {"unique_id": identity.unique_id.hex()}
+    return {"identity": fields, "trouble": None}
+
+
+def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPort]:
+    """Add the ports that were named and are no serial ports of this computer."""
+    listed = {port.path for port in ports}
+    why = "no serial port of this computer"
+    return [*ports, *(SerialPort(path, skipped=why) for path in asked if path not in listed)]
+
+
+def _fields(port: SerialPort, asked: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    nobody = {"identity": None, "trouble": None}
+    return asdict(port) | {"candidate": port.candidate} | asked.get(port.path, nobody)
+
+
+def _line(port: SerialPort, who: Mapping[str, Any] | None) -> str:
+    parts = [port.path]
+    if port.vid is not None and port.pid is not None:
+        parts.append(f"USB {port.vid:04x}:{port.pid:04x}")
+    if port.serial_number:
+        parts.append(f"serial number {port.serial_number}")
+    parts += filter(None, dict.fromkeys([port.product, port.kind]))
+    if who is None:
+        parts.append(f"skipped: {port.skipped}" if port.skipped else "a candidate")
+    elif who["identity"] is None:
+        parts.append(who["trouble"].replace("\n", ";"))
+    else:
+        identity = who["identity"]
+        parts.append(f"{identity['board']}, {identity['firmware']}, id {identity['unique_id']}")
+    return "  ".join(parts)

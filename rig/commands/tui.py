@@ -1,0 +1,58 @@
+"""``rig tui``."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig.tui.app import Options, RigApp
+from rig.tui.keys import read_keys
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Show the session, and carry it out."""
+    options = _options(arguments)
+    keys = read_keys(Path(arguments.keys) if arguments.keys else None)
+    if arguments.pictures:
+        from rig.tui.pictures import draw  # noqa: PLC0415 - not for a session
+
+        if options.session is None or not options.session.is_file():
+            raise InputError("--pictures needs --session FILE: what they show")
+        for path in draw(options.session, Path(arguments.pictures), keys):
+            print(path)
+        return 0
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise InputError("rig tui needs a terminal", "without one: rig run PROTOCOL --port URL")
+    RigApp(options, keys).run()
+    return 0
+
+
+def _options(arguments: Namespace) -> Options:
+    if arguments.protocol:
+        files: tuple[Path, ...] = (Path(arguments.protocol),)
+    else:
+        folders = (Path("protocols"), Path())
+        files = tuple(path for folder in folders for path in sorted(folder.glob("*.yaml")))
+    offline = bool(arguments.session) and not (
+        arguments.port or arguments.protocol or arguments.socket
+    )
+    session = Path(arguments.session) if arguments.session else _fresh()
+    return Options(
+        files=files,
+        port=arguments.port or "",
+        session=session,
+        seed=arguments.seed,
+        socket=Path(arguments.socket).absolute() if arguments.socket else None,
+        offline=offline,
+    )
+
+
+def _fresh() -> Path:
+    """Name a session file that is not there yet."""
+    return Path(f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session")

@@ -1,0 +1,155 @@
+"""An asyncio client of the daemon, for faces that show what is going on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import TYPE_CHECKING, Any, Self
+
+from rig.daemon import rpc
+from rig.daemon.mirror import Mirror
+from rig.daemon.place import check_folder, token_file
+from rig.errors import DeviceError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+class AsyncClient:
+    """One connection; `mirror` follows the daemon's state once it is subscribed.
+
+    Parameters
+    ----------
+    reader, writer
+        Of the connection; `connect` makes them.
+
+    Attributes
+    ----------
+    mirror
+        The state.
+    changed
+        Called whenever it has changed. It should only take a note: it is called often.
+    lost
+        Set when the connection has ended.
+    """
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.mirror = Mirror()
+        self.changed: Callable[[], None] = lambda: None
+        self.lost = asyncio.Event()
+        self._writer = writer
+        self._number = 0
+        self._open: dict[int, asyncio.Future[Any]] = {}
+        self._listening = asyncio.get_running_loop().create_task(self._listen(reader))
+
+    @classmethod
+    async def connect(cls, path: Path, name: str) -> Self:
+        """Connect and shake hands.
+
+        Parameters
+        ----------
+        path
+            The daemon's Unix socket; beside it the file that stands for TCP.
+        name
+            What others are told of this client.
+
+        Raises
+        ------
+        DeviceError
+            No daemon there.
+        VersionError
+            It speaks another version.
+        """
+        tcp, token = token_file(path), ""
+        try:
+            check_folder(path.parent)
+            if not path.exists() and tcp.exists():
+                told = json.loads(tcp.read_text("ascii"))
+                token = told["token"]
+                streams = await asyncio.open_connection(
+                    "127.0.0.1", told["port"], limit=rpc.MESSAGE_LIMIT
+                )
+            else:
+                streams = await asyncio.open_unix_connection(path, limit=rpc.MESSAGE_LIMIT)
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
+        client = cls(*streams)
+        try:
+            more = {"token": token} if token else {}
+            await client.call("hello", api=rpc.API, client=name, **more)
+        except BaseException:
+            await client.close()
+            raise
+        return client
+
+    async def call(self, method: str, **params: Any) -> Any:
+        """Ask for anything in the interface, see API.md.
+
+        Raises
+        ------
+        RigError
+            As the daemon raised it, or it is gone.
+        """
+        if self.lost.is_set():
+            raise _gone()
+        self._number += 1
+        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._open[self._number] = answer
+        self._writer.write(rpc.request(method, params, self._number))
+        return await answer
+
+    async def subscribe(self) -> None:
+        """Follow the state."""
+        # The answer is taken in `_listen`: changes may be in the same packet behind it.
+        await self.call("subscribe")
+
+    def renew(self) -> None:
+        """Give a sign of life: every half second while in control."""
+        self._writer.write(rpc.request("renew", {}, None))
+
+    async def close(self) -> None:
+        """Hang up."""
+        self._writer.close()
+        self._listening.cancel()
+        await asyncio.gather(self._listening, return_exceptions=True)
+        self._end()
+
+    async def _listen(self, reader: asyncio.StreamReader) -> None:
+        try:
+            while line := await reader.readline():
+                message = json.loads(line)
+                if "method" in message:
+                    self.mirror.notified(message["method"], message["params"])
+                    self.changed()
+                else:
+                    self._answered(message)
+        except OSError:
+            pass  # gone
+        finally:
+            self._end()
+
+    def _answered(self, message: dict[str, Any]) -> None:
+        answer = self._open.pop(message["id"], None)
+        result = message.get("result")
+        if isinstance(result, dict) and "state" in result:
+            self.mirror.snapshot(result)
+            self.changed()
+        if answer is None or answer.done():
+            return
+        try:
+            answer.set_result(rpc.result_of(message))
+        except Exception as error:
+            answer.set_exception(error)
+
+    def _end(self) -> None:
+        self.lost.set()
+        for answer in self._open.values():
+            if not answer.done():
+                answer.set_exception(_gone())
+        self._open.clear()
+        self.changed()
+
+
+def _gone() -> DeviceError:
+    return DeviceError("the daemon is gone", "start it again: rig daemon")

@@ -1,0 +1,253 @@
+"""A blocking client of the daemon, for the runner and for scripts; without asyncio."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.daemon import rpc
+from rig.daemon.faults import ControlError
+from rig.daemon.interrupts import Interrupts
+from rig.daemon.lease import LEASE_S
+from rig.daemon.place import check_folder, peer_uid, token_file
+from rig.errors import DeviceError, DeviceTimeoutError
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from rig.records import Drop
+    from rig.session.reading import Reader
+    from rig.session.schema import RunState
+
+_LOOK_S = 0.1  # a signal waits no longer than this
+_ANSWER_S = 60.0  # everything but waiting is over by then, or the daemon hangs
+
+
+class Client:
+    """One connection to a daemon; a `rig.daemon.connecting.Rig`. For one thread.
+
+    Parameters
+    ----------
+    path
+        The daemon's Unix socket; beside it the file that stands for TCP.
+    name
+        What others are told of this client.
+    interrupts
+        Let through while the daemon works, and kept waiting inside a message.
+
+    Raises
+    ------
+    DeviceError
+        No daemon there.
+    VersionError
+        It speaks another version.
+    """
+
+    def __init__(self, path: Path, name: str, interrupts: Interrupts | None = None) -> None:
+        self._interrupts = Interrupts() if interrupts is None else interrupts
+        self._buffer = bytearray()
+        self._number = 0
+        self._writing = threading.Lock()
+        self._session: Session | None = None
+        self._armed = False
+        self._over = threading.Event()
+        self._beat: threading.Thread | None = None
+        self._socket, token = _connected(path)
+        try:
+            more: dict[str, Any] = {"token": token} if token else {}
+            self.daemon: dict[str, Any] = self.call("hello", api=rpc.API, client=name, **more)
+        except BaseException:
+            self._socket.close()
+            raise
+
+    def call(self, method: str, *, patience: float = _ANSWER_S, **params: Any) -> Any:
+        """Ask for anything in the interface, see API.md.
+
+        Parameters
+        ----------
+        method, **params
+            As there.
+        patience
+            How long to wait for the answer, s.
+
+        Raises
+        ------
+        RigError
+            As the daemon raised it, or it is gone.
+        """
+        self._number += 1
+        number = self._number
+        with self._interrupts.held():
+            self._send(rpc.request(method, params, number))
+        until = time.monotonic() + patience
+        while True:
+            with self._interrupts.held():
+                for message in self._receive():
+                    if message.get("id") == number and "method" not in message:
+                        return rpc.result_of(message)
+            if time.monotonic() > until:
+                raise DeviceTimeoutError(
+                    f"the daemon does not answer {method}", "stop it and start it again"
+                )
+
+    def take_control(self) -> None:
+        """Take control and keep it until `close`.
+
+        Raises
+        ------
+        ControlError
+            Another client has it.
+        """
+        self.call("take_control")
+        if self._beat is None:
+            self._beat = threading.Thread(target=self._renew, name="sign of life", daemon=True)
+            self._beat.start()
+
+    # ------------------------------------------------------------------ what a rig does
+
+    @property
+    def session(self) -> Reader:
+        """The open session, for reading."""
+        if self._session is None:
+            raise ControlError("no session is open", "open one first")
+        return self._session
+
+    def open_session(
+        self, protocol: str, session: str, seed: int | None = None
+    ) -> tuple[int, int] | None:
+        """Have a session opened, and open it for reading here."""
+        path = Path(session).resolve()
+        opened = self.call(
+            "open_session", protocol=str(Path(protocol).resolve()), session=str(path), seed=seed
+        )
+        self._session = Session.open(path, readonly=True)
+        fetched = opened["fetched"]
+        return None if fetched is None else (fetched[0], fetched[1])
+
+    def close_session(self) -> None:
+        """Have the session closed."""
+        self._let_go()
+        self.call("close_session")
+
+    def wait(self, seconds: float) -> None:
+        """Have the device's clock watched for a while."""
+        self.call("wait", seconds=seconds, patience=seconds + _ANSWER_S)
+
+    def arm(self, run: int, attempt: int) -> int:
+        """Arm; give the token."""
+        # Armed, the thread's sign of life is not enough: this client must be at it.
+        self._armed = True
+        try:
+            token: int = self.call("arm", run=run, attempt=attempt)["token"]
+        except BaseException:
+            self._armed = False
+            raise
+        return token
+
+    def fire(self, token: int) -> None:
+        """Let go."""
+        try:
+            self.call("fire", token=token)
+        finally:
+            self._armed = False
+
+    def collect(self, run: int, attempt: int) -> Drop:
+        """Wait until a drop is stored, and read it from the file."""
+        self.call("collect", run=run, attempt=attempt, patience=2 * _ANSWER_S)
+        drop = self.session.drop(run, attempt)
+        if drop is None:
+            raise DeviceError(f"run {run}, attempt {attempt} is not in {self.session.path}")
+        return drop
+
+    def log_state(
+        self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()
+    ) -> None:
+        """Log a verdict."""
+        self.call("log_state", run=run, attempt=attempt, state=str(state), reasons=list(reasons))
+
+    def stop(self, reason: str) -> None:
+        """Have everything switched off."""
+        self._armed = False
+        self.call("stop", reason=reason)
+
+    def close(self) -> None:
+        """Hang up; a drop that fell is recorded all the same."""
+        self._over.set()
+        self._let_go()
+        self._socket.close()
+        if self._beat is not None:
+            self._beat.join()
+
+    # ------------------------------------------------------------------ the line
+
+    def _let_go(self) -> None:
+        if self._session is not None:
+            self._session.close()
+            self._session = None
+
+    def _renew(self) -> None:
+        line = rpc.request("renew", {}, None)
+        while not self._over.wait(LEASE_S / 4):
+            if not self._armed:
+                with suppress(DeviceError):
+                    self._send(line)
+
+    def _send(self, line: bytes) -> None:
+        try:
+            with self._writing:
+                self._socket.sendall(line)
+        except OSError as error:
+            raise _gone(error) from error
+
+    def _receive(self) -> list[dict[str, Any]]:
+        """Take what has come within `_LOOK_S`."""
+        try:
+            data = self._socket.recv(1 << 16)
+        except TimeoutError:
+            return []
+        except OSError as error:
+            raise _gone(error) from error
+        if not data:
+            raise _gone("it hung up")
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = bytearray(rest)
+        if len(rest) > rpc.MESSAGE_LIMIT:
+            raise DeviceError("what answers there is no daemon of this rig")
+        return [json.loads(line) for line in lines]
+
+
+def _gone(why: object) -> DeviceError:
+    return DeviceError(
+        f"the daemon is gone: {why}",
+        "start it again (rig daemon), then give the same command: a drop that fell is fetched",
+    )
+
+
+def _connected(path: Path) -> tuple[socket.socket, str]:
+    """Connect to a daemon; also give the token that it wants to hear."""
+    tcp, token = token_file(path), ""
+    line: socket.socket | None = None
+    try:
+        check_folder(path.parent)
+        if not path.exists() and tcp.exists():
+            told = json.loads(tcp.read_text("ascii"))
+            line, token = socket.create_connection(("127.0.0.1", told["port"]), 5.0), told["token"]
+        elif sys.platform != "win32":
+            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            line.settimeout(5.0)
+            line.connect(str(path))
+    except (OSError, ValueError) as error:
+        if line is not None:
+            line.close()
+        raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
+    if line is None or peer_uid(line) not in {None, getattr(os, "getuid", int)()}:
+        raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")
+    line.settimeout(_LOOK_S)
+    return line, token

@@ -1,0 +1,110 @@
+"""The rig as its clients see it: through the daemon that owns the port, or without one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn, Protocol
+
+from rig.daemon.desk import Desk
+from rig.daemon.place import default_socket, token_file
+from rig.errors import DeviceError, RigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.daemon.interrupts import Interrupts
+    from rig.records import Drop
+    from rig.session.reading import Reader
+    from rig.session.schema import RunState
+
+
+class Rig(Protocol):
+    """What a client can do. `rig.daemon.desk.Desk` says what each of these is and raises."""
+
+    @property
+    def session(self) -> Reader: ...  # noqa: D102
+
+    def open_session(  # noqa: D102
+        self, protocol: str, session: str, seed: int | None = None
+    ) -> tuple[int, int] | None: ...
+
+    def close_session(self) -> None: ...  # noqa: D102
+
+    def wait(self, seconds: float) -> None: ...  # noqa: D102
+
+    def arm(self, run: int, attempt: int) -> int: ...  # noqa: D102
+
+    def fire(self, token: int) -> None: ...  # noqa: D102
+
+    def collect(self, run: int, attempt: int) -> Drop: ...  # noqa: D102
+
+    def log_state(  # noqa: D102
+        self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()
+    ) -> None: ...
+
+    def stop(self, reason: str) -> None: ...  # noqa: D102
+
+    def close(self) -> None: ...  # noqa: D102
+
+
+def connect(
+    url: str, say: Callable[[str], None], interrupts: Interrupts, socket: Path | None = None
+) -> Rig:
+    """Find the owner of a port, or become it.
+
+    Parameters
+    ----------
+    url
+        The port.
+    say
+        Is told when a daemon does the work.
+    interrupts
+        As for `rig.daemon.station.Station`.
+    socket
+        Of the daemon to ask, which must then be there; else the usual one, if there is one.
+
+    Returns
+    -------
+    Rig
+        To be closed.
+
+    Raises
+    ------
+    RigError
+        The daemon that was named is not there or has another port; another client is in control.
+    """
+    place = default_socket() if socket is None else socket
+    if socket is None and not place.exists() and not token_file(place).exists():
+        return Desk(url, interrupts)
+    from rig.daemon.client import Client  # noqa: PLC0415 - most runs have no daemon
+
+    try:
+        client = Client(place, f"rig run {os.getpid()}", interrupts)
+    except RigError:
+        if socket is not None:
+            raise
+        return Desk(url, interrupts)  # what a killed daemon left, or one of another version
+    try:
+        if not _same(client.daemon["port"], url):
+            if socket is None:
+                client.close()
+                return Desk(url, interrupts)
+            _refuse(f"the daemon has {client.daemon['port']}, not {url}")
+        client.take_control()
+    except BaseException:
+        client.close()
+        raise
+    say(f"through the daemon, process {client.daemon['pid']}, which owns {url}")
+    return client
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether two names are of one port: a board has several in /dev."""
+    if "://" in one + other:
+        return one == other
+    return Path(one).resolve() == Path(other).resolve()
+
+
+def _refuse(why: str) -> NoReturn:
+    raise DeviceError(why, "leave --socket out, or name that port")

@@ -1,0 +1,392 @@
+"""What clients can ask for, carried out on one station and one session by one thread.
+
+`rig run` without a daemon calls a desk of its own; the daemon's worker calls one for its clients.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig import __version__
+from rig.daemon.faults import StoppedError
+from rig.daemon.hub import Hub
+from rig.daemon.interrupts import Interrupts
+from rig.daemon.opening import open_for, port_before, shown
+from rig.daemon.record import Unrecorded
+from rig.daemon.station import DISCARD, Station
+from rig.daemon.view import View
+from rig.errors import DeviceError, InputError, RigError, SessionError
+from rig.link.messages import Reason
+from rig.link.refusals import DeviceRefusedError
+from rig.ports import completed, is_simulated
+from rig.protocol import reader
+from rig.session.schema import RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.port import Port
+    from rig.protocol.scene import Protocol
+    from rig.records import Drop
+    from rig.session.store import Session
+
+_OPEN = (RunState.ARMED, RunState.FIRED)
+_VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
+
+
+class Desk:
+    """The one place where sessions are opened and drops are made.
+
+    Parameters
+    ----------
+    url
+        The port, as the user named it.
+    interrupts
+        As for `Station`.
+    hub
+        Where everything is shown.
+    halted
+        As for `Station`.
+    keep_port
+        Whether the port stays open between sessions.
+
+    Attributes
+    ----------
+    station
+        Connected, or `None`.
+    due
+        Run and attempt of a drop that fell and was not collected yet.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        interrupts: Interrupts | None = None,
+        *,
+        hub: Hub | None = None,
+        halted: Callable[[], bool] = lambda: False,
+        keep_port: bool = False,
+    ) -> None:
+        self.url = url
+        self.interrupts = Interrupts() if interrupts is None else interrupts
+        self.hub = Hub() if hub is None else hub
+        self.station: Station | None = None
+        self.due: tuple[int, int] | None = None
+        self._halted = halted
+        self._keep_port = keep_port and not is_simulated(url)
+        self._session: Session | None = None
+        self._protocol: Protocol | None = None
+        self._line_url = url  # with all that a simulation is told
+        self._unarmed: RigError | None = None  # why what was armed is not
+        self._lost: dict[tuple[int, int], RigError] = {}  # why a drop is not in the session
+
+    # ------------------------------------------------------------------ sessions
+
+    @property
+    def session(self) -> Session:
+        """The open session.
+
+        Raises
+        ------
+        SessionError
+            There is none.
+        """
+        if self._session is None:
+            raise SessionError("no session is open", "open one first")
+        return self._session
+
+    @property
+    def recording(self) -> bool:
+        """Whether a session is open."""
+        return self._session is not None
+
+    def open_session(
+        self, protocol: str, session: str, seed: int | None = None
+    ) -> tuple[int, int] | None:
+        """Make a session or go on with one, connect, and settle what was left behind.
+
+        Parameters
+        ----------
+        protocol, session
+            Files.
+        seed
+            Of a simulation.
+
+        Returns
+        -------
+        tuple of int, or None
+            Run and attempt of a drop that was fetched from the device.
+
+        Raises
+        ------
+        InputError, SessionError
+            Protocol or session cannot be used.
+        DeviceError
+            The device is in trouble, or holds a drop of another session.
+        """
+        source, path = Path(protocol), Path(session)
+        scene = reader.read(protocol)
+        if scene.gates is None:
+            raise InputError(f"{protocol} has no gates, so nothing can be measured")
+        fresh = completed(self.url, source, path, seed)
+        self.close_session()
+        opened = open_for(scene, source, fresh, path)
+        try:
+            self._line_url = completed(self.url, source, path, seed, port_before(opened))
+            self._session, self._protocol = opened, scene
+            self.connect()
+            with self.interrupts.held():
+                opened.put_results([], __version__)  # of less than there will be
+                opened.commit()
+            fetched = self.settle()
+        except BaseException:
+            self._part_with(opened)
+            raise
+        about, plan = shown(opened, scene)
+        self.hub.plan(plan)
+        self.hub.set(session=about, drop=None)
+        return fetched
+
+    def close_session(self) -> None:
+        """Make safe and close the file, whole; nothing when none is open."""
+        if self._session is not None:
+            self._part_with(self._session)
+
+    def _part_with(self, session: Session) -> None:
+        """Close a session; a port that shall stay open does."""
+        self._session = self._protocol = None
+        self._lost.clear()
+        station, self.station, self.due = self.station, None, None
+        port = None
+        try:
+            if station is not None and self._keep_port:
+                with suppress(DeviceError):
+                    port = station.give_up()
+            if station is not None and port is None:
+                station.close()
+        finally:
+            session.close()
+            self.hub.plan(())
+            self.hub.set(
+                session=None, drop=None, link={"state": "closed", "error": None, "retry_s": None}
+            )
+            if port is not None:
+                self.connect(port)
+
+    # ------------------------------------------------------------------ the link
+
+    def connect(self, port: Port | None = None) -> None:
+        """Connect, with the port that is open already if there is one.
+
+        Raises
+        ------
+        DeviceError
+            No such port, nobody there, another protocol version.
+        """
+        if port is None and self.station is not None:
+            try:
+                port = self.station.give_up()
+            except DeviceError:
+                self.station.close()
+        book = Unrecorded() if self._session is None else self._session
+        station = Station(
+            book, self._line_url, self.interrupts, view=View(self.hub), halted=self._halted
+        )
+        self.station = None
+        self.hub.set(link={"state": "opening", "error": None, "retry_s": None})
+        station.connect(port)
+        self.station = station
+        self.hub.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+
+    def disconnect(self) -> None:
+        """Let go of a port that fails."""
+        station, self.station, self.due = self.station, None, None
+        if station is not None:
+            station.close()
+
+    def settle(self) -> tuple[int, int] | None:
+        """Settle what an earlier connection left: a drop the device holds, a run without a record.
+
+        Returns
+        -------
+        tuple of int, or None
+            Run and attempt of the drop that was fetched.
+
+        Raises
+        ------
+        DeviceError
+            The device holds a drop of another session, or is in trouble.
+        """
+        station = self._connected()
+        held = station.held()
+        log = self.session.states()
+        if held is not None:
+            if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in log):
+                run, attempt = held
+                raise DeviceError(
+                    f"the device holds a drop (run {run}, attempt {attempt}) of another session",
+                    f"continue that session first; {DISCARD}",
+                )
+            station.fetch(*held)
+            self._lost.pop(held, None)
+        for entry in {entry.run: entry for entry in log}.values():
+            if entry.state not in _OPEN or (entry.run, entry.attempt) == held:
+                continue
+            if self.session.drop(entry.run, entry.attempt) is None:
+                why = ("the connection ended before the drop was recorded",)
+                station.state(entry.run, entry.attempt, RunState.INTERRUPTED, why)
+        return held
+
+    # ------------------------------------------------------------------ drops
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass, see `Station.wait`."""
+        self._connected().wait(seconds)
+
+    def arm(self, run: int, attempt: int) -> int:
+        """Prepare a drop.
+
+        Returns
+        -------
+        int
+            The token for `fire`.
+
+        Raises
+        ------
+        InputError
+            Not of the plan, or not the attempt that comes next: no drop is made twice.
+        DeviceRefusedError
+            As for `Station.arm`.
+        """
+        station = self._connected()
+        if self._protocol is None or station.armed or self.due:
+            raise InputError("this is not the moment to arm", "open a session; finish the drop")
+        last = self.session.latest_state(run)
+        planned = self.hub.planned(run)
+        if not planned or attempt != (last.attempt if last else 0) + 1:
+            raise InputError(
+                f"run {run}, attempt {attempt} is not what comes next",
+                "read the session again: another client may have gone on with it",
+            )
+        self._unarmed = None
+        return station.arm(run, attempt, self._protocol)
+
+    def notice(self) -> None:
+        """Log that the device has disarmed itself, when it has."""
+        station = self.station
+        if station is None or station.armed is None or station.lapsed is None:
+            return
+        refusal = DeviceRefusedError(Reason.NOT_ARMED, 0, station.lapsed)
+        self.stop(refusal.message)
+        self._unarmed = refusal
+
+    def fire(self, token: int) -> None:
+        """Let go. From here on the drop is collected whatever happens: call `finish`.
+
+        Raises
+        ------
+        DeviceRefusedError
+            As for `Station.fire`.
+        """
+        station = self._connected()
+        armed = station.armed
+        if armed is None:
+            raise self._unarmed or InputError("nothing is armed", "arm first")
+        try:
+            station.fire(token)
+        finally:
+            if station.armed is None:
+                self.due = armed
+
+    def finish(self) -> None:
+        """Collect the drop that fell, store it, and let the device forget it.
+
+        Raises
+        ------
+        RigError
+            It could not be read or stored: the device still has it.
+        """
+        if self.due is None:
+            return
+        due = self.due
+        try:
+            self._connected().collect(*due)
+        except RigError as error:
+            self._lost[due] = error
+            raise
+        finally:
+            self.due = None
+
+    def collect(self, run: int, attempt: int) -> Drop:
+        """Return a drop that fell, once it is in the session.
+
+        Raises
+        ------
+        RigError
+            Why it is not.
+        """
+        self.finish()
+        drop = self.session.drop(run, attempt)
+        if drop is None:
+            raise self._lost.get((run, attempt)) or DeviceError(
+                f"there is no record of run {run}, attempt {attempt}", "repeat the run"
+            )
+        return drop
+
+    def log_state(
+        self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()
+    ) -> None:
+        """Log a verdict on a recorded drop.
+
+        Raises
+        ------
+        InputError
+            No such drop, or no verdict.
+        """
+        last = self.session.latest_state(run)
+        if (
+            state not in _VERDICTS
+            or last is None
+            or last.attempt != attempt
+            or self.session.drop(run, attempt) is None
+        ):
+            raise InputError(
+                f"run {run}, attempt {attempt} cannot be {state}",
+                "only the latest attempt is judged, when it is recorded",
+            )
+        if (last.state, last.reasons) != (state, reasons):
+            self._connected().state(run, attempt, state, reasons)
+
+    def stop(self, reason: str) -> None:
+        """Switch everything off; log an armed drop as interrupted.
+
+        Raises
+        ------
+        DeviceError
+            The device does not answer: it disarms itself.
+        """
+        station = self.station
+        if station is None:
+            return
+        armed = station.armed
+        self._unarmed = StoppedError(reason, "arm again when all is well")
+        try:
+            station.abort()
+        finally:
+            if armed is not None:
+                station.state(*armed, RunState.INTERRUPTED, (reason,))
+
+    def close(self) -> None:
+        """Close session and port."""
+        self._keep_port = False
+        try:
+            self.close_session()
+        finally:
+            self.disconnect()
+
+    def _connected(self) -> Station:
+        if self.station is None:
+            raise DeviceError("there is no connection to the device", "wait until it is back")
+        return self.station

@@ -1,0 +1,154 @@
+"""The state that every client sees: one snapshot, and numbered changes.
+
+The worker writes, the server reads; neither waits for the other. What changed between two
+messages is put together into one, so the rate of messages is the reader's choice and the memory
+is that of the state itself, however fast the device talks.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+EDGES_LIMIT = 1 << 16
+"""Edges shown of one drop; all of them are in the session file."""
+_FIRST: dict[str, Any] = {
+    "daemon": None,
+    "port": None,
+    "link": {"state": "closed", "error": None, "retry_s": None},
+    "device": None,
+    "statistics": None,
+    "gates": None,
+    "phase": "idle",
+    "drop": None,
+    "session": None,
+    "control": None,
+    "clients": 0,
+    "error": None,
+}
+
+Edge3 = tuple[int, int, int]
+"""Tick, channel, blocked."""
+
+
+class Hub:
+    """The state.
+
+    Attributes
+    ----------
+    changed
+        Called, in the thread that made it, with the first change after a `take`.
+    watched
+        Whether anybody looks: what costs and is only shown can be left out otherwise.
+    """
+
+    def __init__(self) -> None:
+        self.changed: Callable[[], None] = lambda: None
+        self.watched = False
+        self._guard = threading.Lock()
+        self._sections = dict(_FIRST)
+        self._runs: dict[int, dict[str, Any]] = {}
+        self._edges: list[Edge3] = []
+        self._n = 0
+        self._dirty: set[str] = set()
+        self._dirty_runs: set[int] = set()
+        self._told = 0  # edges that went out
+
+    def set(self, **sections: Any) -> None:
+        """Give sections new values; equal ones are no change."""
+        with self._guard:
+            first = self._clean
+            for name, value in sections.items():
+                if self._sections[name] != value:
+                    self._sections[name] = value
+                    self._dirty.add(name)
+            first = first and not self._clean
+        if first:
+            self.changed()
+
+    def plan(self, runs: Iterable[dict[str, Any]]) -> None:
+        """Show another plan."""
+        with self._guard:
+            first = self._clean
+            self._runs = {run["run"]: run for run in runs}
+            self._dirty.add("runs")
+        if first:
+            self.changed()
+
+    def run(self, number: int, **fields: Any) -> None:
+        """Change what is said of one run."""
+        with self._guard:
+            first = self._clean
+            if number in self._runs:
+                self._runs[number] = self._runs[number] | fields
+                self._dirty_runs.add(number)
+            first = first and not self._clean
+        if first:
+            self.changed()
+
+    def edges(self, more: Iterable[Edge3]) -> None:
+        """Show more edges of the current drop."""
+        with self._guard:
+            first = self._clean
+            self._edges.extend(more)
+            del self._edges[EDGES_LIMIT:]
+            first = first and not self._clean
+        if first:
+            self.changed()
+
+    def replace_edges(self, edges: Iterable[Edge3]) -> None:
+        """Show these edges instead."""
+        with self._guard:
+            first = self._clean
+            self._edges = list(edges)[:EDGES_LIMIT]
+            self._told = len(self._edges)
+            self._dirty.add("edges")
+        if first:
+            self.changed()
+
+    def planned(self, number: int) -> bool:
+        """Whether the plan has this run."""
+        with self._guard:
+            return number in self._runs
+
+    def get(self, section: str) -> Any:
+        """Read one section."""
+        with self._guard:
+            return self._sections[section]
+
+    def snapshot(self) -> dict[str, Any]:
+        """Return the whole state as of the last `take`'s number, or later by what is not taken."""
+        with self._guard:
+            return {"n": self._n, "state": self._state()}
+
+    def take(self) -> dict[str, Any] | None:
+        """Return what changed since the last time, with its number; `None` for nothing."""
+        with self._guard:
+            if self._clean:
+                return None
+            self._n += 1
+            change: dict[str, Any] = {"n": self._n}
+            sections = self._state(edges="edges" in self._dirty)
+            if self._dirty:
+                change["set"] = {name: sections[name] for name in sorted(self._dirty)}
+            if self._dirty_runs and "runs" not in self._dirty:
+                change["runs"] = [self._runs[number] for number in sorted(self._dirty_runs)]
+            if "edges" in self._dirty:
+                self._told = len(self._edges)
+            elif self._told < len(self._edges):
+                change["edges"] = self._edges[self._told :]
+                self._told = len(self._edges)
+            self._dirty.clear()
+            self._dirty_runs.clear()
+            return change
+
+    @property
+    def _clean(self) -> bool:
+        return not self._dirty and not self._dirty_runs and self._told >= len(self._edges)
+
+    def _state(self, *, edges: bool = True) -> dict[str, Any]:
+        state = self._sections | {"runs": list(self._runs.values())}
+        return state | {"edges": list(self._edges)} if edges else state

@@ -1,0 +1,88 @@
+"""Control: one client at a time has it, and a client that is gone does not."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from rig.daemon.faults import ControlError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+LEASE_S = 2.0
+"""Control lapses when its holder was not heard for so long."""
+
+
+class Lease:
+    """Who holds control. Safe to ask from any thread.
+
+    Parameters
+    ----------
+    now
+        Seconds, monotonic.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._guard = threading.Lock()
+        self._holder: object = None
+        self._name = ""
+        self._until = 0.0
+
+    @property
+    def holder(self) -> object:
+        """The client in control; `None` for nobody, also when its lease has lapsed."""
+        with self._guard:
+            return self._holder if self._now() < self._until else None
+
+    @property
+    def name(self) -> str:
+        """What the holder calls itself."""
+        return self._name
+
+    def take(self, client: object, name: str) -> None:
+        """Give control to a client that may already have it.
+
+        Raises
+        ------
+        ControlError
+            Another client has it.
+        """
+        with self._guard:
+            if self._holder not in {None, client} and self._now() < self._until:
+                raise ControlError(
+                    f"{self._name} has control",
+                    "let it finish, or close it; watching and STOP work meanwhile",
+                )
+            self._holder, self._name, self._until = client, name, self._now() + LEASE_S
+
+    def heard(self, client: object) -> None:
+        """Note a sign of life; control that lapsed and that nobody took comes back with it."""
+        with self._guard:
+            if self._holder is client:
+                self._until = self._now() + LEASE_S
+
+    def release(self, client: object) -> bool:
+        """Take control away from a client; `False` when it did not have it."""
+        with self._guard:
+            if self._holder is not client:
+                return False
+            self._holder, self._name, self._until = None, "", 0.0
+            return True
+
+    def require(self, client: object) -> None:
+        """Let only the client in control go on.
+
+        Raises
+        ------
+        ControlError
+            It is not.
+        """
+        if self.holder is not client:
+            name = self._name or "nobody"
+            raise ControlError(
+                f"this needs control, and {name} has it",
+                "take control first; where somebody else has it, let them finish",
+            )

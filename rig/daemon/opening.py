@@ -1,0 +1,82 @@
+"""Making a session file, or finding that one can be gone on with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rig.errors import SessionError
+from rig.ports import is_simulated, truth_file
+from rig.protocol.plan import runs
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rig.protocol.scene import Protocol
+    from rig.session.reading import Reader
+
+
+def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
+    """Make a session, or open the one to be continued.
+
+    Raises
+    ------
+    SessionError
+        The file cannot be used, or belongs to another protocol or kind of port.
+    """
+    simulated = is_simulated(url)
+    if not path.exists():
+        if simulated:
+            truth_file(path).unlink(missing_ok=True)  # of a session that is gone
+        return Session.create(path, protocol.text, source.name, simulated=simulated, origin=url)
+    session = Session.open(path)
+    clash = None
+    if session.protocol_text != protocol.text:
+        clash = SessionError(
+            f"{path} was made with another protocol ({session.protocol_source})",
+            "give the same protocol file to continue it, or a new session file",
+        )
+    elif session.simulated != simulated:
+        clash = SessionError(
+            f"{path} is a {'simulated' if session.simulated else 'real'} session and {url} is "
+            f"{'a simulation' if simulated else 'a real port'}",
+            "the two are never mixed: give a new session file",
+        )
+    if clash is not None:
+        session.close()
+        raise clash
+    return session
+
+
+def port_before(session: Reader) -> str:
+    """Say which port the session was recorded at so far; empty for none."""
+    ports = [str(identity["port"]) for _, identity in session.identities() if "port" in identity]
+    return ports[-1] if ports else ""
+
+
+def shown(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Describe a session and its plan as the hub's sections ``session`` and ``runs`` do."""
+    latest = {entry.run: entry for entry in session.states()}
+    plan = []
+    for run in runs(protocol):
+        entry = latest.get(run.number)
+        plan.append(
+            {
+                "run": run.number,
+                "incline_deg": run.incline_deg,
+                "impact": run.impact,
+                "free": run.free,
+                "attempt": entry.attempt if entry else 0,
+                "state": str(entry.state) if entry else "planned",
+                "reasons": list(entry.reasons) if entry else [],
+            }
+        )
+    about = {
+        "path": str(session.path),
+        "source": session.protocol_source,
+        "title": protocol.title,
+        "created": session.meta["created"],
+        "simulated": session.simulated,
+        "planned": len(plan),
+    }
+    return about, plan

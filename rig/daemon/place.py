@@ -1,0 +1,71 @@
+"""Where a daemon is found, and that nobody else's is taken for it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+from pathlib import Path
+
+from rig.errors import InputError
+
+_SECRET = 0o077  # what the group and others may not have
+_CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
+
+
+def default_socket() -> Path:
+    """Name the socket of this user's daemon."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    folder = Path(runtime) if runtime else Path.home() / ".cache"
+    return folder / "chainrig" / "rig.sock"
+
+
+def token_file(path: Path) -> Path:
+    """Name the file that stands for a socket where TCP is spoken."""
+    return path.with_suffix(".tcp")
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a daemon's folder, for its user alone.
+
+    Raises
+    ------
+    InputError
+        Somebody else's, or open to others: whoever can write there could pose as the daemon.
+    """
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        check_folder(folder)
+    except OSError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"cannot use {folder}: {error.strerror or error}", "name another place with --socket"
+        ) from error
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that others may write to.
+
+    Raises
+    ------
+    InputError
+        As for `prepare_folder`.
+    """
+    if os.name == "nt":
+        return
+    about = folder.stat()
+    if about.st_uid != os.getuid():
+        raise InputError(f"{folder} belongs to somebody else", "name another place with --socket")
+    if about.st_mode & _SECRET:
+        raise InputError(f"{folder} is open to other users", f"chmod 700 {folder}")
+
+
+def peer_uid(connection: socket.socket) -> int | None:
+    """Ask the kernel which user is at the other end; `None` where it cannot be asked."""
+    option = getattr(socket, "SO_PEERCRED", None)
+    if option is None or connection.family != getattr(socket, "AF_UNIX", None):
+        return None
+    data = connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size)
+    uid: int = _CREDENTIALS.unpack(data)[1]
+    return uid

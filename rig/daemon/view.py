@@ -1,0 +1,126 @@
+"""What the device says, as the clients see it while it happens.
+
+Provisional on purpose: frames that come out of order are left to the record, which the device's
+certificate vouches for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from rig.link import messages as wire
+from rig.link.transcript import Received
+from rig.session.schema import RunState
+
+if TYPE_CHECKING:
+    from rig.daemon.hub import Edge3, Hub
+    from rig.link.transcript import Record
+    from rig.records import Drop
+
+_WRAP = 1 << 32
+_PHASES = {
+    wire.Phase.IDLE: "idle",
+    wire.Phase.ARMED: "armed",
+    wire.Phase.RECORDING: "recording",
+    wire.Phase.HOLDING: "storing",
+}
+
+
+class View:
+    """Keeps a hub's device, gates, phase, drop and edges.
+
+    Parameters
+    ----------
+    hub
+        Where clients look.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._tick_hz = 0
+        self._label = 0
+        self._fire_tick: int | None = None
+        self._state = 0  # of the armed gates, at the last event shown
+        self._next = 0  # number of the event to come
+
+    def know(self, record: Record) -> None:
+        """Take what became known on the line."""
+        if not isinstance(record, Received):
+            return
+        match record.message:
+            case wire.Identity() as identity:
+                self._tick_hz = identity.tick_hz
+                self._hub.set(device=asdict(identity) | {"unique_id": identity.unique_id.hex()})
+            case wire.State(phase=phase, gates=gates):
+                self._hub.set(gates={"blocked": gates}, phase=_PHASES[phase])
+            case wire.Disarmed():
+                self._hub.set(phase="idle")
+            case wire.Fired(tick=tick) if self._label:
+                self._fire_tick = tick
+                self._drop("fired")
+                self._hub.set(phase="recording")
+            case wire.EventsFrame(label=label) as frame if label == self._label:
+                self._events(frame)
+            case wire.DropCertificate():
+                self._hub.set(phase="storing")
+
+    def state(self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...]) -> None:
+        """Take a line of the log of run states."""
+        self._hub.run(run, attempt=attempt, state=str(state), reasons=list(reasons))
+        if state is RunState.ARMED:
+            self._armed(run, attempt)
+        elif state is RunState.INTERRUPTED and self._label == wire.pack_label(run, attempt):
+            self._drop("interrupted")
+            self._label = 0
+
+    def _armed(self, run: int, attempt: int) -> None:
+        self._label = wire.pack_label(run, attempt)
+        self._fire_tick, self._state, self._next = None, 0, 0
+        self._hub.replace_edges(())
+        self._drop("armed")
+        self._hub.set(phase="armed")
+
+    def recorded(self, drop: Drop) -> None:
+        """Show a drop as it was stored."""
+        self._label = wire.pack_label(drop.run, drop.attempt)
+        self._fire_tick = drop.fire_tick
+        self._next = drop.certificate.events if drop.certificate else len(drop.edges)
+        self._hub.replace_edges((e.tick, e.channel, int(e.blocked)) for e in drop.edges)
+        self._drop("recorded")
+        self._hub.set(phase="idle")
+        self._label = 0
+
+    def _drop(self, state: str) -> None:
+        run, attempt = wire.unpack_label(self._label)
+        self._hub.set(
+            drop={
+                "run": run,
+                "attempt": attempt,
+                "state": state,
+                "tick_hz": self._tick_hz,
+                "fire_tick": self._fire_tick,
+                "events": self._next,
+            }
+        )
+
+    def _events(self, frame: wire.EventsFrame) -> None:
+        if frame.first < self._next or self._fire_tick is None:
+            return
+        state = self._state
+        if frame.first > self._next and frame.events:
+            state = frame.events[0].state  # it is not known when the gates changed
+        edges: list[Edge3] = []
+        for event in frame.events:
+            now = event.state
+            changed = state ^ now
+            tick = (event.tick - self._fire_tick + _WRAP // 2) % _WRAP - _WRAP // 2
+            while changed:
+                lowest = changed & -changed
+                edges.append((tick, lowest.bit_length() - 1, 1 if now & lowest else 0))
+                changed ^= lowest
+            state = now
+        self._state, self._next = state, frame.first + len(frame.events)
+        self._hub.edges(edges)
+        self._hub.set(gates={"blocked": state})
+        self._drop("fired")

@@ -1,0 +1,331 @@
+"""The one thread that touches the port and the session file, and that keeps the link alive.
+
+Clients' requests wait in a queue; STOP and the loss of whoever is in control overtake them. Any
+trouble of the link or the disk becomes a state that every client sees, and ends by itself: the
+worker connects again, with growing pauses, and settles what was under way.
+"""
+
+from __future__ import annotations
+
+import queue
+import random
+import threading
+import time
+from concurrent.futures import Future
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rig.daemon.desk import Desk
+from rig.daemon.faults import ControlError, StoppedError, to_data
+from rig.errors import InputError, RigError, SessionError
+from rig.link.refusals import DeviceRefusedError
+from rig.ports import is_simulated
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.daemon.hub import Hub
+    from rig.daemon.lease import Lease
+
+_ARMED_S = 0.08  # between two requests while armed: the device gives the host 250 ms
+_WATCHED_S = 0.15  # between two looks at the gates
+_ALONE_S = 1.0  # when nobody looks: often enough to see that the cable is out
+_PING_S = 0.37  # mean distance of clock samples while a session is open
+_COMMIT_S = 5.0  # so much of the idle talk may be lost with the power
+_STATISTICS_S = 1.0
+_FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
+_LOST = "the client in control was lost"
+
+
+class _Job(NamedTuple):
+    work: Callable[[], Any]
+    outcome: Future[Any]
+
+
+class Worker:
+    """Carries out what clients ask for.
+
+    Parameters
+    ----------
+    url
+        The port.
+    hub
+        Where everything is shown.
+    lease
+        Who may keep a drop armed.
+    """
+
+    def __init__(self, url: str, hub: Hub, lease: Lease) -> None:
+        self.hub = hub
+        self._url = url
+        self._lease = lease
+        self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
+        self._stop = ""  # why everything shall be off
+        self._stops: list[Future[None]] = []
+        self._guard = threading.Lock()  # of the two above
+        self._holder: object = None  # who armed
+        self._ending = False
+        self._uneven = random.Random()  # noqa: S311 - spacing, not secrets
+        self._pause_s = _FIRST_PAUSE_S
+        self._trouble: RigError | None = None
+        self._troubled: object = None  # the session that was open then
+        self._retry_at = 0.0
+        self._looked_at = self._next_ping = self._next_commit = self._next_statistics = 0.0
+        self.desk = Desk(url, hub=hub, halted=self._halted, keep_port=True)
+        self._thread = threading.Thread(target=self._run, name="rig worker")
+
+    # ------------------------------------------------------------------ from other threads
+
+    def start(self) -> None:
+        """Begin to work."""
+        self._thread.start()
+
+    def submit(
+        self, work: Callable[[Desk], Any], holder: object, *, writes: bool = True
+    ) -> Future[Any]:
+        """Have something done, when what was asked for before is done.
+
+        Parameters
+        ----------
+        work
+            Called with the desk, in the worker's thread.
+        holder
+            The client that must be in control at that moment.
+        writes
+            Whether it makes no sense while the session file cannot be written.
+        """
+        outcome: Future[Any] = Future()
+
+        def controlled() -> Any:
+            self._lease.require(holder)
+            self._holder = holder
+            if writes and isinstance(self._trouble, SessionError):
+                raise self._trouble
+            return work(self.desk)
+
+        self._jobs.put(_Job(controlled, outcome))
+        return outcome
+
+    def stop(self, reason: str) -> Future[None]:
+        """Have everything switched off, before anything else is done."""
+        outcome: Future[None] = Future()
+        with self._guard:
+            self._stop = self._stop or reason
+            self._stops.append(outcome)
+        self._jobs.put(None)
+        return outcome
+
+    def lost(self) -> None:
+        """Note that the client in control is gone: look at once whether a drop is armed."""
+        self._jobs.put(None)
+
+    def end(self) -> None:
+        """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""
+        self._ending = True
+        self._jobs.put(None)
+
+    def join(self) -> None:
+        """Wait for the end."""
+        self._thread.join()
+
+    # ------------------------------------------------------------------ the thread
+
+    def _halted(self) -> bool:
+        """Whether what is under way shall end: asked by the station, many times a second."""
+        if self._stop:
+            return True
+        station = self.desk.station
+        armed = station is not None and station.armed is not None
+        return (self._ending or not self._held) and (armed or not self.desk.due)
+
+    @property
+    def _held(self) -> bool:
+        return self._holder is not None and self._lease.holder is self._holder
+
+    def _run(self) -> None:
+        if not is_simulated(self._url):
+            self._trying(self.desk.connect)
+        while not self._ending:
+            with suppress(queue.Empty):
+                self._do(self._jobs.get(timeout=self._patience()))
+            self._attend()
+            self._trying(self.desk.finish)
+            self._trying(self.desk.notice)
+            self._idle()
+        self._stop = self._stop or "the daemon ended"
+        self._attend()
+        self._drain(StoppedError("the daemon ends", "start it again: rig daemon"))
+        self._trying(self.desk.close)
+
+    def _do(self, job: _Job | None) -> None:
+        if job is None or not job.outcome.set_running_or_notify_cancel():
+            return  # somebody only wants to be heard, or nobody waits any more
+        if self._stop:
+            job.outcome.set_exception(StoppedError(self._stop))
+            return
+        try:
+            result = job.work()
+        except Exception as error:
+            # First what follows for the link, so that a client sees it before its answer.
+            if self._trouble is None:
+                self._weigh(known(error))
+            job.outcome.set_exception(known(error))
+        else:
+            if self._trouble is not None and self._over():
+                self._well()
+            job.outcome.set_result(result)
+
+    def _over(self) -> bool:
+        """Whether what was asked for has ended the trouble, by the way."""
+        if isinstance(self._trouble, SessionError):
+            return self._troubled is not self._book
+        return self.desk.station is not None
+
+    @property
+    def _book(self) -> object:
+        return self.desk.session if self.desk.recording else None
+
+    def _drain(self, error: RigError) -> None:
+        with suppress(queue.Empty):
+            while True:
+                job = self._jobs.get_nowait()
+                if job is not None and job.outcome.set_running_or_notify_cancel():
+                    job.outcome.set_exception(error)
+
+    def _attend(self) -> None:
+        """Switch off what must not stay on."""
+        station = self.desk.station
+        armed = station is not None and station.armed is not None
+        with self._guard:
+            reason, stops = self._stop, self._stops
+        if reason:
+            self._drain(StoppedError(reason))
+        elif armed and not self._held:
+            reason = _LOST
+        if reason:
+            self._trying(lambda: self.desk.stop(reason))
+        with self._guard:
+            self._stops = [one for one in self._stops if one not in stops]
+            if not self._stops:
+                self._stop = ""
+        for outcome in stops:
+            outcome.set_result(None)
+
+    # ------------------------------------------------------------------ between requests
+
+    def _patience(self) -> float:
+        """How long nothing needs to be done, s."""
+        if self._stop:
+            return 0.0
+        moments = [time.monotonic() + _ALONE_S]
+        if self._trouble is not None:
+            moments.append(self._retry_at)
+        elif self.desk.station is not None:
+            moments.append(self._looked_at + self._look_s)
+            if self.desk.recording:
+                moments.append(self._next_ping)
+            if self.hub.watched:
+                moments.append(self._next_statistics)
+        return max(0.0, min(moments) - time.monotonic())
+
+    def _idle(self) -> None:
+        now = time.monotonic()
+        station = self.desk.station
+        if self._trouble is not None:
+            if now >= self._retry_at:
+                self._trying(self._recover)
+            return
+        if station is None:
+            if not is_simulated(self._url):
+                self._trying(self.desk.connect)
+            return
+        if now >= self._looked_at + self._look_s:
+            self._looked_at = now
+            self._trying(station.look)
+        if self.desk.recording and station.armed is None and now >= self._next_ping:
+            self._next_ping = now + _PING_S * self._uneven.uniform(0.5, 1.5)
+            self._trying(station.ping)
+        if self.desk.recording and station.armed is None and now >= self._next_commit:
+            self._next_commit = now + _COMMIT_S
+            self._trying(self.desk.session.commit)
+        if self.hub.watched and now >= self._next_statistics:
+            self._next_statistics = now + _STATISTICS_S
+            self._trying(self._statistics)
+
+    @property
+    def _look_s(self) -> float:
+        """Time between two looks at the device."""
+        if self.desk.station is not None and self.desk.station.armed is not None:
+            return _ARMED_S
+        return _WATCHED_S if self.hub.watched else _ALONE_S
+
+    def _statistics(self) -> None:
+        station = self.desk.station
+        if station is None:
+            return
+        pending = self.desk.session.pending if self.desk.recording else 0
+        self.hub.set(
+            statistics=station.statistics()
+            | {"uncommitted": pending, "commands_waiting": self._jobs.qsize()}
+        )
+
+    # ------------------------------------------------------------------ trouble
+
+    def _trying(self, work: Callable[[], object]) -> None:
+        """Do something of the worker's own; what goes wrong is everybody's to see."""
+        try:
+            work()
+        except Exception as error:
+            self._weigh(known(error))
+
+    def _weigh(self, error: RigError) -> None:
+        """Decide what an error means for the link."""
+        if isinstance(error, DeviceRefusedError | StoppedError | ControlError | InputError):
+            return
+        if isinstance(error, SessionError):
+            if not self.desk.recording:
+                return  # of a file that is not, or no longer, open
+            station = self.desk.station
+            if station is not None and station.armed is not None:
+                with suppress(RigError):
+                    station.abort()
+        else:
+            with suppress(RigError):
+                self.desk.disconnect()
+            if is_simulated(self._url) and not self.desk.recording:
+                return  # there is no scene, so there is no port to come back to
+        if self._trouble is None:
+            self._pause_s = _FIRST_PAUSE_S
+        self._trouble, self._troubled = error, self._book
+        self._retry_at = time.monotonic() + self._pause_s
+        up = self.desk.station is not None
+        self.hub.set(
+            link={
+                "state": "up" if up else "down",
+                "error": None if up else to_data(error),
+                "retry_s": self._pause_s,
+            },
+            phase="trouble",
+            error=to_data(error),
+            statistics=None,
+        )
+        self._pause_s = min(self._pause_s * _GROWTH, _LONGEST_PAUSE_S)
+
+    def _recover(self) -> None:
+        if self.desk.recording:
+            self.desk.session.commit()  # what waits in memory since the disk was full
+        self.desk.connect()
+        if self.desk.recording:
+            self.desk.settle()
+        self._well()
+
+    def _well(self) -> None:
+        self._trouble = self._troubled = None
+        self.hub.set(error=None, phase="idle")
+
+
+def known(error: Exception) -> RigError:
+    """Put any failure into words."""
+    if isinstance(error, RigError):
+        return error
+    return RigError(f"unexpected: {error!r}", "a fault of this program: please report it")

@@ -1,0 +1,133 @@
+"""Checks of a board: firmware, clock, line, gates."""
+
+from __future__ import annotations
+
+import cmath
+from math import tau
+from typing import TYPE_CHECKING
+
+from rig.doctor.findings import Finding
+from rig.link.epochs import RESONATOR_TOLERANCE
+from rig.link.gatewatch import listed
+from rig.link.messages import HOST_SILENCE_MS
+from rig.link.rate import tick_rate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.doctor.facts import BoardFacts
+
+_MAINS_HZ = (50, 60, 100, 120)  # lamps flicker at twice the mains' frequency
+_IN_STEP = 0.8
+_ENOUGH = 10  # edges to tell a rhythm from chance
+_BEAM = "clear the beam, and see that its emitter has power and its plugs sit"
+
+
+def firmware(board: BoardFacts) -> Finding:
+    """See that the board has the firmware that comes with this program."""
+    has = board.identity.firmware
+    if not board.shipped:
+        return Finding("firmware", f"{has}; none for a {board.identity.board} comes with rig")
+    if has == board.shipped:
+        return Finding("firmware", f"{has}, as it comes with rig")
+    return Finding("firmware", f"{has}, but {board.shipped} comes with rig", "rig flash")
+
+
+def held_drop(board: BoardFacts) -> Finding:
+    """See that the board holds no drop that somebody waits for."""
+    if board.held is None:
+        return Finding("held drop", "none")
+    run, attempt = board.held
+    return Finding(
+        "held drop", f"run {run}, attempt {attempt}", "continue the session it belongs to: rig run"
+    )
+
+
+def clock(board: BoardFacts) -> Finding:
+    """See that the board's clock is within what a resonator may be off."""
+    nominal = board.identity.tick_hz
+    rate = tick_rate(board.pings, nominal)
+    if not rate.n:
+        return Finding(
+            "clock",
+            f"its rate cannot be told from {len(board.pings)} pings",
+            "take another cable or USB port; is the firmware for this very board? rig flash",
+        )
+    off, u = rate.hz / nominal - 1, rate.u_hz / nominal
+    said = f"{off * 1e6:+.0f} ± {2 * u * 1e6:.0f} ppm"
+    if abs(off) > RESONATOR_TOLERANCE + 2 * u:
+        return Finding("clock", said, "its resonator is broken: take another board")
+    return Finding("clock", said)
+
+
+def round_trip(board: BoardFacts) -> Finding:
+    """See that answers come fast enough to keep an armed board armed."""
+    if not board.pings:
+        return Finding("round trip", "no ping came through", "take another cable or USB port")
+    slowest = max(ping.host_recv_ns - ping.host_send_ns for ping in board.pings) * 1e-6
+    said = f"{slowest:.1f} ms at most"
+    if slowest > HOST_SILENCE_MS / 2:
+        return Finding("round trip", said, "close what keeps this computer busy; no USB hub")
+    return Finding("round trip", said)
+
+
+def stuck_gates(board: BoardFacts) -> Finding:
+    """See that no gate is blocked all the time."""
+    stuck = board.states.stuck
+    if not stuck:
+        return Finding("blocked gates", "none")
+    return Finding(
+        "blocked gates", listed(stuck), f"{_BEAM}; wire inputs that have no gate to ground"
+    )
+
+
+def flickering_gates(board: BoardFacts) -> Finding:
+    """See that no gate changes while nothing moves, and whether the mains do it if one does."""
+    name = "flickering gates"
+    if board.edges is None:
+        seen = board.states.flickering
+        if seen:
+            return Finding(name, listed(seen), f"{_BEAM}; let the chains hang still")
+        return Finding(name, f"none seen at a glance; not recorded: {board.unwatched}")
+    rises: dict[int, list[float]] = {}
+    for edge in board.edges:
+        if edge.blocked:
+            rises.setdefault(edge.channel, []).append(edge.tick / board.identity.tick_hz)
+    said, mains = [], False
+    for channel, times in sorted(rises.items()):
+        hz = mains_ripple(times)
+        mains |= hz is not None
+        said.append(
+            f"gate {channel} {len(times)} times" + (f", in step with {hz} Hz" if hz else "")
+        )
+    if not said:
+        return Finding(name, f"none within {board.watched_s:g} s")
+    lamp = "keep lamps off the receivers and mains leads off the cables; shield the beams"
+    return Finding(
+        name,
+        "; ".join(said) + f" within {board.watched_s:g} s",
+        lamp if mains else f"{_BEAM}; let the chains hang still",
+    )
+
+
+def mains_ripple(times_s: Sequence[float]) -> int | None:
+    """Find the mains' rhythm in a gate's edges.
+
+    Parameters
+    ----------
+    times_s
+        When the gate was blocked, over about a second.
+
+    Returns
+    -------
+    int or None
+        The lowest of 50, 60, 100 and 120 Hz with which the edges keep step: the length of their
+        mean phasor is above 0.8, where edges at random times would give 1/√n.
+    """
+    if len(times_s) < _ENOUGH:
+        return None
+    for hz in _MAINS_HZ:
+        mean = sum(cmath.exp(1j * tau * hz * t) for t in times_s) / len(times_s)
+        if abs(mean) > _IN_STEP:
+            return hz
+    return None

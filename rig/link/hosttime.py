@@ -1,0 +1,89 @@
+"""One axis of host time for a session, over sleep and restarts of the host."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.records import Ping
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.records import HostBreak
+
+_APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
+
+
+class Stretch(NamedTuple):
+    """From when on, by the host's clock, what is added to put a time on the axis."""
+
+    begin_ns: int
+    shift_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class HostTime:
+    """Clock samples on one axis of time.
+
+    Attributes
+    ----------
+    pings
+        In order of time, host times put on the axis.
+    cuts_ns
+        Moments of the axis over which no two samples may be compared: the board or the host's
+        clock may have begun again there.
+    lives
+        For each life of the host's clock its stretches, in order: sleep begins a new one.
+    """
+
+    pings: tuple[Ping, ...]
+    cuts_ns: tuple[int, ...]
+    lives: tuple[tuple[Stretch, ...], ...]
+
+    def shifts(self, host_ns: int) -> list[int]:
+        """Find what to add to a host time: one value for each life it may be of.
+
+        Of a record without a sample beside it nobody knows in which life it was made.
+        """
+        return [_shift(life, host_ns) for life in self.lives]
+
+
+def one_axis(
+    pings: Sequence[Ping], boots_ns: Sequence[int] = (), breaks: Sequence[HostBreak] = ()
+) -> HostTime:
+    """Put samples on one axis where the host's clock began again or stood still in between.
+
+    Parameters
+    ----------
+    pings
+        In order of recording.
+    boots_ns
+        When the board may have begun again, by the host's clock of that time.
+    breaks
+        When the host slept or its clock was set.
+    """
+    found: list[Ping] = []
+    lives = [[Stretch(0, 0)]]
+    cuts: list[int] = []
+    before_ns = 0  # the last sample, by the host's clock
+    for ping in pings:
+        shift = lives[-1][-1].shift_ns
+        if ping.host_send_ns < before_ns:
+            shift += before_ns + _APART_NS - ping.host_send_ns
+            lives.append([Stretch(0, shift)])
+            cuts.append(found[-1].host_recv_ns)
+        elif found:
+            for one in breaks:
+                if before_ns <= one.host_ns <= ping.host_send_ns:
+                    shift += one.slept_ns
+                    lives[-1].append(Stretch(one.host_ns, shift))
+        before_ns = ping.host_recv_ns
+        found.append(Ping(ping.host_send_ns + shift, before_ns + shift, ping.tick))
+    moments = [*boots_ns, *(one.host_ns for one in breaks)]
+    cuts += [moment + _shift(life, moment) for life in lives for moment in moments]
+    return HostTime(tuple(found), tuple(sorted(cuts)), tuple(map(tuple, lives)))
+
+
+def _shift(life: Sequence[Stretch], host_ns: int) -> int:
+    return max((one for one in life if one.begin_ns <= host_ns), default=life[0]).shift_ns

@@ -1,0 +1,87 @@
+"""Whether the host's clocks go on as one: sleep and set clocks, noticed by comparing them."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.records import HostBreak
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+TOLERANCE_NS = 50_000_000
+"""Differences below this are the reading's own: a process can be held up between two clocks."""
+_QUICK_NS = 1_000_000
+_TRIES = 5
+_BOOTTIME: int | None = getattr(time, "CLOCK_BOOTTIME", None)
+
+
+class Reading(NamedTuple):
+    """The host's clocks at one moment, ns.
+
+    Attributes
+    ----------
+    monotonic
+        The clock of all samples; on Linux it stands still while the host sleeps.
+    boottime
+        The same, going on through sleep; `None` where the system has none.
+    wall
+        Time of day, which may be set.
+    """
+
+    monotonic: int
+    boottime: int | None
+    wall: int
+
+
+def read_clocks() -> Reading:
+    """Read them as close together as the system allows."""
+    best: tuple[int, Reading] | None = None
+    for _ in range(_TRIES):
+        before = time.monotonic_ns()
+        boottime = None if _BOOTTIME is None else time.clock_gettime_ns(_BOOTTIME)
+        wall = time.time_ns()
+        took = time.monotonic_ns() - before
+        if best is None or took < best[0]:
+            best = took, Reading(before + took // 2, boottime, wall)
+        if took < _QUICK_NS:
+            break
+    assert best is not None
+    return best[1]
+
+
+class HostWatch:
+    """Compares the clocks from look to look.
+
+    The monotonic clock is steered (slewed) together with the others, so only sleep moves it
+    against the boot-time clock, and only somebody's hand the wall clock against that. Without a
+    boot-time clock the two cannot be told apart, and whatever moves the wall clock counts as a
+    step: either way no line goes through samples from both sides.
+
+    Parameters
+    ----------
+    read
+        Where the clocks are read.
+    """
+
+    def __init__(self, read: Callable[[], Reading] = read_clocks) -> None:
+        self._read = read
+        self._last = read()
+
+    def look(self) -> HostBreak | None:
+        """Return what happened since the last look, `None` when nothing did."""
+        last, now = self._last, self._read()
+        awake_ns = passed_ns = now.monotonic - last.monotonic
+        if now.boottime is not None and last.boottime is not None:
+            passed_ns = now.boottime - last.boottime
+        slept_ns = _large(passed_ns - awake_ns)
+        stepped_ns = _large(now.wall - last.wall - passed_ns)
+        if not slept_ns and not stepped_ns:
+            return None  # what is too small to tell stays in the comparison, and may add up
+        self._last = now
+        return HostBreak(now.monotonic, slept_ns, stepped_ns)
+
+
+def _large(difference_ns: int) -> int:
+    return difference_ns if abs(difference_ns) >= TOLERANCE_NS else 0

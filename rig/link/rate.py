@@ -1,0 +1,254 @@
+"""The device's tick rate, from pings by the host's clock and from pulses of a 1 Hz reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rig.link.epochs import RESONATOR_TOLERANCE, epochs
+from rig.link.wander import Readings, Track
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.link.epochs import Epochs
+    from rig.records import Ping, Pulse
+
+    Array = NDArray[np.float64]
+
+_OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
+_PASSES = 5
+_MOSTLY = 0.9  # of the samples: leaving out more than the rest is no gate, it is another model
+_EDGE_S = 1e-7  # scatter of a GPS receiver's pulses; the capture itself adds a tick's
+_STALE_S = 1.2  # an older pulse is the last of a reference that was taken away
+_COUNT_WRAP = 1 << 16
+_ODD = 1e-3  # part of the ticks between two pulses that may be missing or too many
+_ODD_S = 0.1
+
+
+class Rate(NamedTuple):
+    """Ticks a second, and the standard uncertainty (k = 1) of that."""
+
+    hz: float
+    u_hz: float
+
+
+@dataclass(frozen=True, slots=True)
+class TickRate:
+    """How fast the device counts, by another clock.
+
+    Attributes
+    ----------
+    hz
+        Mean number of ticks a second of that clock, over all samples.
+    u_hz
+        Its standard uncertainty (k = 1); the other clock's own error is not in it.
+    n
+        Samples used; 0 when the nominal rate had to do.
+    span_s
+        Time they cover, without the gaps across resets.
+    outliers
+        Samples left out.
+    nominal_hz
+        What the device says its rate is.
+    track
+        The rate as a function of time.
+    """
+
+    hz: float
+    u_hz: float
+    n: int
+    span_s: float
+    outliers: int = 0
+    nominal_hz: float = 0.0
+    track: Track | None = field(default=None, compare=False, repr=False)
+
+    def at(self, seconds: float) -> Rate:
+        """Return the rate at a moment, s on the axis of the samples' host times."""
+        if self.track is None:
+            return Rate(self.hz, self.u_hz)
+        return _least(self.nominal_hz, self.track.rate(seconds))
+
+
+def tick_rate(pings: Iterable[Ping], nominal_hz: int, cuts_ns: Sequence[int] = ()) -> TickRate:
+    """Measure the device's tick rate from clock samples in any order, see `ping_rate`.
+
+    Parameters
+    ----------
+    pings
+        Clock samples.
+    nominal_hz
+        What the device says its rate is.
+    cuts_ns
+        See `rig.link.epochs.epochs`.
+    """
+    return ping_rate(epochs(pings, nominal_hz, cuts_ns))
+
+
+def ping_rate(found: Epochs) -> TickRate:
+    """Measure the tick rate by the host's clock.
+
+    A line through (host time in the middle of the round trip, tick): one slope for all samples,
+    which may wander slowly, and one intercept for each epoch. Each sample is weighted by what its
+    own round trip allows: the tick was read at an unknown moment within it. Samples far off the
+    line are left out. The uncertainty is scaled by the scatter that was seen. Space pings
+    unevenly: a period in step with a USB frame turns its delay into a false slope.
+
+    Parameters
+    ----------
+    found
+        Clock samples by epoch.
+
+    Returns
+    -------
+    TickRate
+        The rate; the nominal one with u = 0.5 %/√3 when the samples say no more than that.
+    """
+    pieces = [_ping_piece(pings, found.nominal_hz) for pings in found.pings if len(pings) > 1]
+    rate = _fitted(pieces, found.nominal_hz)
+    return replace(rate, outliers=sum(map(len, found.pings)) - rate.n)
+
+
+def pulse_rate(found: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickRate:
+    """Measure the tick rate by the seconds of a reference.
+
+    Parameters
+    ----------
+    found
+        Clock samples by epoch: they say which second of the host a pulse belongs to.
+    pulses
+        What the device said of its reference, in any order.
+    pings
+        The rate by the host's clock.
+
+    Returns
+    -------
+    TickRate
+        The rate; the nominal one when there are not two pulses of one stretch. A pulse that was
+        missed or one too many begins a new stretch.
+    """
+    pieces: list[_Piece] = []
+    stretch: list[tuple[int, int]] = []  # count and wide tick
+    began_ns, epoch = 0, -1
+    for pulse in sorted(pulses):
+        host_ns = (pulse.host_send_ns + pulse.host_recv_ns) // 2
+        moment = found.place(pulse.tick, host_ns, pings.hz, _STALE_S, 0.0)
+        if moment is None:
+            continue
+        if stretch and moment.epoch == epoch:
+            count, tick = stretch[-1]
+            if moment.tick == tick:
+                continue  # the same pulse again
+            seconds = (moment.tick - tick) / pings.hz
+            counted = (pulse.number - count) % _COUNT_WRAP
+            counted += round((seconds - counted) / _COUNT_WRAP) * _COUNT_WRAP
+            if abs(seconds - counted) < _ODD_S + _ODD * counted:
+                stretch.append((count + counted, moment.tick))
+                continue
+        pieces.append(_pulse_piece(stretch, began_ns, found.nominal_hz))
+        stretch = [(pulse.number, moment.tick)]
+        began_ns, epoch = moment.at_ns, moment.epoch
+    pieces.append(_pulse_piece(stretch, began_ns, found.nominal_hz))
+    return _fitted([piece for piece in pieces if len(piece.at) > 1], found.nominal_hz)
+
+
+class _Piece(NamedTuple):
+    """Readings of one intercept: s, s beyond nominal, s."""
+
+    at: list[float]
+    phase: list[float]
+    sigma: list[float]
+
+
+def _ping_piece(pings: Sequence[Ping], nominal_hz: int) -> _Piece:
+    """Turn samples of one epoch into numbers small enough for floats."""
+    first = pings[0]
+    # The fastest trip is the line's own; what a trip takes beyond it is delay on one unknown
+    # side, and displaces the middle by half. A quarter of the fastest trip stands for the rest.
+    fastest_ns = min(ping.host_recv_ns - ping.host_send_ns for ping in pings)
+    piece = _Piece([], [], [])
+    for ping in pings:
+        trip_ns = ping.host_recv_ns - ping.host_send_ns
+        middle_ns2 = ping.host_send_ns + ping.host_recv_ns - 2 * first.host_send_ns
+        # In integers: a day's ticks times 1e9 do not fit a float's 53 bits.
+        excess = (ping.tick - first.tick) * 2_000_000_000 - nominal_hz * middle_ns2
+        if len(pings) > 2:
+            sigma_ns = sqrt(((trip_ns - fastest_ns) / 2) ** 2 + (fastest_ns / 4) ** 2)
+        else:
+            sigma_ns = trip_ns / sqrt(12)  # nothing to compare with: anywhere in the trip
+        piece.at.append(first.host_send_ns * 1e-9 + middle_ns2 * 0.5e-9)
+        piece.phase.append(excess / (2e9 * nominal_hz))
+        piece.sigma.append(sqrt(sigma_ns**2 * 1e-18 + 1 / (12 * nominal_hz**2)))
+    return piece
+
+
+def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: int) -> _Piece:
+    """Turn a stretch of pulses, none missed, into readings."""
+    sigma = sqrt(_EDGE_S**2 + 1 / (12 * nominal_hz**2))
+    seconds = [count - stretch[0][0] for count, _ in stretch]
+    excess = [
+        tick - stretch[0][1] - nominal_hz * passed
+        for (_, tick), passed in zip(stretch, seconds, strict=True)
+    ]
+    return _Piece(
+        [began_ns * 1e-9 + passed for passed in seconds],
+        [ticks / nominal_hz for ticks in excess],
+        [sigma] * len(stretch),
+    )
+
+
+def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
+    """Fit a track, leave out what is far off even for its own scatter, and fit again."""
+    given = Readings(
+        np.array([at for piece in pieces for at in piece.at]),
+        np.array([phase for piece in pieces for phase in piece.phase]),
+        np.array([sigma for piece in pieces for sigma in piece.sigma]),
+        np.repeat(np.arange(len(pieces)), [len(piece.at) for piece in pieces]),
+    )
+    nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)
+    # A walk can follow stray samples, and a steady rate takes a walk's ends for stray: what
+    # little strays from a steady rate is left out first, and the rest asked whether it wanders.
+    kept, track = _gated(given, steady=True)
+    if track is not None:
+        track.search()
+        if track.seen or kept.at.size < _MOSTLY * given.at.size:
+            kept, track = _gated(given, steady=False)
+    if track is None:
+        return nominal
+    hz, u_hz = _least(nominal_hz, track.mean())
+    if hz == nominal.hz and u_hz == nominal.u_hz:
+        return nominal
+    ends = np.flatnonzero(np.diff(kept.epoch, append=-1))
+    starts = np.flatnonzero(np.diff(kept.epoch, prepend=-1))
+    span = float((kept.at[ends] - kept.at[starts]).sum())
+    n = kept.at.size
+    return TickRate(hz, u_hz, n, span, given.at.size - n, nominal_hz, track)
+
+
+def _gated(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
+    """Leave out what is far off, a few passes long; no track where too little is left."""
+    for number in range(_PASSES):
+        if readings.at.size < 2 or readings.at[-1] <= readings.at[0]:
+            return readings, None
+        track = Track(readings)
+        if not steady:
+            track.search()
+        pulls = np.abs(track.residuals(readings))
+        far = pulls > _OUTLIER * max(1.4826 * float(np.median(pulls)), 1e-3)
+        if readings.at.size < 5 or not far.any() or number == _PASSES - 1:
+            break
+        readings = readings.only(~far)
+    return readings, track
+
+
+def _least(nominal_hz: float, relative: tuple[float, float] | None = None) -> Rate:
+    """Turn a relative rate to Hz; the nominal one where that is as well known."""
+    u = RESONATOR_TOLERANCE / sqrt(3)
+    if relative is None or relative[1] >= u:
+        return Rate(nominal_hz, nominal_hz * u)
+    return Rate(nominal_hz * (1.0 + relative[0]), nominal_hz * relative[1])

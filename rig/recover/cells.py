@@ -1,0 +1,151 @@
+"""The records in a page of a SQLite file, each on its own: a bad one costs no other."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rig.recover.pages import Pages
+
+Value: TypeAlias = int | float | str | bytes | None
+
+TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR = 0x0D, 0x0A, 0x02
+_INTEGERS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}  # serial type → bytes, section 2.1
+
+
+class Cell(NamedTuple):
+    """One record; `rowid` is `None` in an index, and in a table that is kept as one."""
+
+    rowid: int | None
+    values: tuple[Value, ...]
+
+
+class BadCellError(ValueError):
+    """Bytes that are no record."""
+
+
+class Found(NamedTuple):
+    """The records of a page, and how many of its cells are none."""
+
+    cells: list[Cell]
+    bad: int
+
+
+def read_cells(pages: Pages, number: int) -> Found:
+    """Read all records of a page; a page without records has none.
+
+    Parameters
+    ----------
+    pages
+        The database.
+    number
+        Of the page.
+    """
+    page = pages.pages[number]
+    start = pages.start(number)
+    kind = page[start]
+    if kind not in {TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR}:
+        return Found([], 0)
+    count = int.from_bytes(page[start + 3 : start + 5], "big")
+    pointers = start + (12 if kind == INDEX_INTERIOR else 8)
+    if pointers + 2 * count > pages.usable:
+        return Found([], 1)
+    found, bad = [], 0
+    for n in range(count):
+        at = int.from_bytes(page[pointers + 2 * n : pointers + 2 * n + 2], "big")
+        try:
+            found.append(_cell(pages, page, kind, at))
+        except (BadCellError, IndexError, struct.error):
+            bad += 1
+    return Found(found, bad)
+
+
+def _cell(pages: Pages, page: bytes, kind: int, at: int) -> Cell:
+    """Read a cell, sections 1.6 and 2.1."""
+    if kind == INDEX_INTERIOR:
+        at += 4  # the page to its left
+    size, at = _varint(page, at)
+    rowid = None
+    if kind == TABLE_LEAF:
+        rowid, at = _varint(page, at)
+    return Cell(rowid, tuple(_record(_payload(pages, page, kind, at, size))))
+
+
+def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
+    """Put a record together from its page and the pages it flows over to."""
+    usable = pages.usable
+    most = usable - 35 if kind == TABLE_LEAF else (usable - 12) * 64 // 255 - 23
+    if size > len(pages.pages) * usable:
+        raise BadCellError("longer than the file")
+    if size <= most:
+        return _cut(page, at, size, usable)
+    least = (usable - 12) * 32 // 255 - 23
+    here = least + (size - least) % (usable - 4)
+    here = here if here <= most else least
+    parts = [_cut(page, at, here, usable)]
+    follow = int.from_bytes(_cut(page, at + here, 4, usable), "big")
+    left = size - here
+    while left > 0:
+        if follow not in pages.pages:
+            raise BadCellError("its end is missing")
+        over = pages.pages[follow]
+        parts.append(over[4 : min(4 + left, usable)])
+        left -= len(parts[-1])
+        follow = int.from_bytes(over[:4], "big")
+    return b"".join(parts)
+
+
+def _cut(page: bytes, at: int, size: int, usable: int) -> bytes:
+    if at < 8 or at + size > usable:
+        raise BadCellError("outside of its page")
+    return page[at : at + size]
+
+
+def _record(payload: bytes) -> Iterator[Value]:
+    header, at = _varint(payload, 0)
+    body = header
+    while at < header:
+        kind, at = _varint(payload, at)
+        if kind in {10, 11}:
+            raise BadCellError("no such type")
+        size = _INTEGERS.get(kind, 8 if kind == 7 else max(0, kind - 12) // 2)
+        data = payload[body : body + size]
+        if len(data) != size:
+            raise BadCellError("cut short")
+        body += size
+        yield _value(kind, data)
+    if at != header or body != len(payload):
+        raise BadCellError("of another length than it says")
+
+
+def _value(kind: int, data: bytes) -> Value:
+    if kind == 0:
+        return None
+    if kind in {8, 9}:
+        return kind - 8
+    if kind == 7:
+        (number,) = struct.unpack(">d", data)
+        return float(number)
+    if kind < 7:
+        return int.from_bytes(data, "big", signed=True)
+    if kind % 2 == 0:
+        return data
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BadCellError("no text") from error
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    """Read SQLite's number of variable length: 7 bits a byte, at most 9 bytes, big end first."""
+    value = 0
+    for n in range(8):
+        byte = data[at + n]
+        value = value << 7 | byte & 0x7F
+        if byte < 0x80:
+            return value, at + n + 1
+    value = value << 8 | data[at + 8]
+    return value - (1 << 64) if value >> 63 else value, at + 9

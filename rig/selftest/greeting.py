@@ -1,0 +1,109 @@
+"""Checks of who is there, and of every request that needs no drop."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.link import messages as wire
+from rig.link.client import BOOT_WAIT_S
+from rig.link.frames import DELIMITER
+from rig.link.gatewatch import listed
+from rig.link.messages import PROTOCOL_VERSION, Reason
+from rig.selftest.requests import UNKNOWN_CODES, wrong_lengths
+from rig.selftest.stage import insist_refused
+from rig.selftest.verdicts import CheckFailedError, NotPossibleError
+
+if TYPE_CHECKING:
+    from rig.selftest.stage import Stage
+
+
+def handshake(stage: Stage) -> str:
+    """See that the board introduces itself, sensibly and twice alike."""
+    stage.line.port.write(DELIMITER)
+    stage.unasked(BOOT_WAIT_S, wire.Boot)
+    identity = stage.answer(wire.Identify(), wire.Identity)
+    stage.identity = identity
+    odd = [
+        what
+        for what, wrong in (
+            ("no name", not (identity.board and identity.firmware)),
+            ("no id", not any(identity.unique_id)),
+            ("no gates", not identity.gates),
+            ("gates without a name", len(identity.channels.split()) != identity.gates),
+            ("no release", not identity.releases),
+            ("an impossible tick rate", identity.tick_hz < 1_000_000),
+            ("hardly any memory", identity.capacity < 100),
+        )
+        if wrong
+    ]
+    if odd:
+        raise CheckFailedError(f"its IDENTITY has {', '.join(odd)}")
+    if stage.answer(wire.Identify(), wire.Identity) != identity:
+        raise CheckFailedError("asked twice, it gives two different IDENTITYs")
+    return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
+
+
+def another_version(stage: Stage) -> str:
+    """See that clients of other versions are turned away."""
+    for version in (0, PROTOCOL_VERSION + 1):
+        stage.refused(wire.Identify(version), Reason.VERSION, PROTOCOL_VERSION)
+    return ""
+
+
+def every_message(stage: Stage) -> str:
+    """See that each request gets its own kind of answer; those about drops have their own tests."""
+    stage.answer(wire.Ping(), wire.Pong)
+    stage.answer(wire.Status(), wire.State)
+    stage.answer(wire.Reference(), wire.ReferencePulse)
+    stage.need_idle()  # ABORT would let a held drop be discarded
+    stage.answer(wire.Abort(), wire.Done)
+    return ""
+
+
+def unknown_messages(stage: Stage) -> str:
+    """See that types that are no requests are refused."""
+    for code in UNKNOWN_CODES:
+        what = f"type 0x{code:02X}"
+        answer = stage.ask_raw(code, b"", what)
+        insist_refused(answer, what, Reason.UNKNOWN_MESSAGE, code)
+    return ""
+
+
+def other_lengths(stage: Stage) -> str:
+    """See that a request that is too long or too short is refused."""
+    for code, payload in wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
+        what = f"{wire.TABLE[code].__name__} of {len(payload)} bytes"
+        insist_refused(stage.ask_raw(code, payload, what), what, Reason.BAD_PARAMETER, 0)
+    return ""
+
+
+def gates_now(stage: Stage) -> str:
+    """See that every gate is clear and keeps still."""
+    seen, count = stage.gates(), stage.known().gates
+    faults = [
+        f"{listed(mask)} {what}"
+        for mask, what in (
+            (seen.stuck, "blocked all the time"),
+            (seen.flickering, "changing with nothing moving"),
+        )
+        if mask
+    ]
+    if faults:
+        raise CheckFailedError(
+            f"{'; '.join(faults)}: clear the beam, check its wires, and wire unused gates to ground"
+        )
+    return f"{count} gates clear"
+
+
+def a_blocked_gate(stage: Stage) -> str:
+    """See that a gate that is blocked forbids arming."""
+    stage.need_idle()
+    stuck = stage.gates().stuck
+    if not stuck:
+        raise NotPossibleError("no gate is blocked; block one by hand to see this")
+    gate = stuck & -stuck
+    answer = stage.ask(stage.order(gates=gate))
+    if answer == wire.Refused(Reason.STOPPED, 0):
+        stage.armed_by(answer)
+    insist_refused(answer, "Arm", Reason.GATE_BLOCKED, gate)
+    return listed(gate)

@@ -1,0 +1,133 @@
+"""The checks in order, and what becomes of each."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.errors import DeviceError
+from rig.link.messages import MessageError
+from rig.selftest import arming, disturbances, drops, greeting, loopback, timing
+from rig.selftest.stage import Stage
+from rig.selftest.verdicts import CheckFailedError, NotPossibleError, Outcome, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rig.link.clock import Clock
+    from rig.link.port import Port
+    from rig.selftest.stage import Options
+
+
+class Check(NamedTuple):
+    """A check; one that needs a board that is idle cannot be made while it holds a drop."""
+
+    name: str
+    make: Callable[[Stage], str]
+    idle: bool = True
+
+
+def _needs(what: str) -> Callable[[Stage], str]:
+    def never(_stage: Stage) -> str:
+        raise NotPossibleError(what)
+
+    return never
+
+
+CHECKS = (
+    Check("handshake", greeting.handshake, idle=False),
+    Check("VERSION", greeting.another_version, idle=False),
+    Check("every message", greeting.every_message, idle=False),
+    Check("UNKNOWN_MESSAGE", greeting.unknown_messages, idle=False),
+    Check("BAD_PARAMETER by length", greeting.other_lengths, idle=False),
+    Check("round trips", timing.round_trips, idle=False),
+    Check("gates", greeting.gates_now, idle=False),
+    Check("GATE_BLOCKED", greeting.a_blocked_gate),
+    Check("NOT_ARMED", arming.fire_unarmed),
+    Check("NO_SUCH_DROP", arming.no_drop),
+    Check("BAD_PARAMETER", arming.bad_orders),
+    Check("ARM and ABORT", arming.arm_and_abort),
+    Check("WRONG_TOKEN", arming.wrong_tokens),
+    Check("arming times out", timing.arming_times_out),
+    Check("a silent host disarms", timing.a_silent_host),
+    Check("repeated frames", disturbances.repeats),
+    Check("frames without seq", disturbances.without_seq, idle=False),
+    Check("junk on the line", disturbances.junk),
+    Check("certificate", drops.certificate),
+    Check("BUSY", drops.busy),
+    Check("ABORT of a recording", drops.abort_a_recording),
+    Check("HOLDING_A_DROP", drops.holding),
+    Check("reading again", drops.reading_again),
+    Check("ACKNOWLEDGE and WRONG_CRC", drops.acknowledging),
+    Check("sync output to gate", loopback.sync_edges),
+    Check("COOLING", drops.cooling),
+    Check("GATE_UNSTEADY", _needs("it needs a hand in a beam")),
+    Check("STOPPED", _needs("it needs a hand at the emergency stop")),
+    Check("NOT_KEPT", _needs("it needs more edges than the memory holds")),
+)
+
+
+def selftest(port: Port, clock: Clock, options: Options) -> Iterator[Outcome]:
+    """Make every check, one after the other.
+
+    Parameters
+    ----------
+    port, clock
+        The open port and its time.
+    options
+        What may be done.
+
+    Yields
+    ------
+    Outcome
+        As soon as it is known. When the board is silent the rest is not possible.
+
+    Raises
+    ------
+    DeviceError
+        The connection broke.
+    """
+    stage = Stage(port, clock, options)
+    silent = ""
+    try:
+        for check in CHECKS:
+            if silent:
+                yield Outcome(check.name, Verdict.NOT_POSSIBLE, silent)
+                continue
+            outcome = _made(check, stage)
+            yield outcome
+            if outcome.verdict is Verdict.FAILED:
+                silent = _lost(stage)
+    except OSError as error:
+        raise DeviceError(
+            f"the connection broke: {error}", "check the cable, then start again"
+        ) from error
+    finally:
+        with suppress(CheckFailedError, MessageError, OSError):
+            stage.settle()
+
+
+def _made(check: Check, stage: Stage) -> Outcome:
+    try:
+        if stage.identity is not None:
+            stage.settle()
+        if check.idle:
+            stage.need_idle()
+        return Outcome(check.name, Verdict.OK, check.make(stage))
+    except CheckFailedError as failed:
+        return Outcome(check.name, Verdict.FAILED, str(failed))
+    except NotPossibleError as why:
+        return Outcome(check.name, Verdict.NOT_POSSIBLE, str(why))
+    except MessageError as error:
+        return Outcome(check.name, Verdict.FAILED, f"it sent what is no message: {error}")
+
+
+def _lost(stage: Stage) -> str:
+    """Say why no more checks can be made, if so."""
+    if stage.identity is None:
+        return "nobody has introduced themselves"
+    try:
+        stage.settle()
+    except (CheckFailedError, MessageError) as error:
+        return str(error)
+    return ""

@@ -1,0 +1,320 @@
+"""A board under test: asking it, waiting for it, and bringing it back to rest."""
+
+from __future__ import annotations
+
+import zlib
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+from rig.link import messages as wire
+from rig.link.frames import DELIMITER
+from rig.link.gatewatch import watch_gates
+from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
+from rig.selftest.line import Heard, Line
+from rig.selftest.verdicts import CheckFailedError, NotPossibleError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.link.clock import Clock
+    from rig.link.gatewatch import GateStates
+    from rig.link.port import Port
+
+Answer = TypeVar("Answer", bound=wire.DeviceMessage)
+
+LABEL = pack_label(TEST_RUN, 1)
+OTHER_LABEL = pack_label(TEST_RUN, 2)
+RECORD_MS = 60
+PULSE_US = 50_000
+_TRIES = 3
+_ANSWER_S = 0.3
+_END_S = 1.0  # at most, from the end of a recording to its certificate
+_WATCH_S = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the user allows and has wired.
+
+    Attributes
+    ----------
+    loopback
+        The gate that a wire joins to the sync output, or `None`.
+    drops
+        How often to fire for the loop-back's statistics.
+    release
+        Whether release 0 may be driven.
+    """
+
+    loopback: int | None = None
+    drops: int = 20
+    release: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A drop as the board sent it of its own accord."""
+
+    fired: wire.Fired
+    events: tuple[wire.Event, ...]
+    certificate: wire.DropCertificate
+
+    @property
+    def crc32(self) -> int:
+        """CRC-32 over the events that came."""
+        frame = wire.EventsFrame(self.certificate.label, 0, self.events)
+        return zlib.crc32(wire.pack(frame)[1][6:])
+
+
+class Stage:
+    """One board during a self-test.
+
+    No release is driven unless the options allow it: orders to arm pulse none, and where a check
+    offers the board a bad order that would, FIRE stays unsaid until the board is disarmed again.
+
+    Parameters
+    ----------
+    port, clock
+        The open port and its time.
+    options
+        What may be done.
+
+    Attributes
+    ----------
+    identity
+        Known after the first check.
+    foreign
+        Label of a drop of somebody's session that the board holds, or 0.
+    slowest_s
+        Longest round trip of the pings; the slack that time limits get.
+    """
+
+    def __init__(self, port: Port, clock: Clock, options: Options) -> None:
+        self.line = Line(port, clock)
+        self.clock = clock
+        self.options = options
+        self.identity: wire.Identity | None = None
+        self.foreign = 0
+        self.slowest_s = 0.0
+        self._seq = 0
+        self._unasked: deque[Heard] = deque()
+        self._may_release = False
+        self._gates: GateStates | None = None
+
+    # -- asking
+
+    def next_seq(self) -> int:
+        """Give a seq that the request before did not have."""
+        self._seq = self._seq % 255 + 1
+        return self._seq
+
+    def ask(self, message: wire.HostMessage, seq: int | None = None) -> wire.Message:
+        """Send a request, a few times if need be, and give its answer.
+
+        Raises
+        ------
+        CheckFailedError
+            None came.
+        """
+        code, payload = wire.pack(message)
+        if isinstance(message, wire.Arm) and message.release and not self.options.release:
+            self._may_release = True
+        if isinstance(message, wire.Fire) and self._may_release:
+            raise CheckFailedError("a release may be armed: FIRE was not sent")
+        return self.ask_raw(code, payload, type(message).__name__, seq)
+
+    def ask_raw(self, code: int, payload: bytes, name: str, seq: int | None = None) -> wire.Message:
+        """Send any frame as a request, and give its answer; as `ask`."""
+        seq = self.next_seq() if seq is None else seq
+        for _ in range(_TRIES):
+            self.line.send(code, payload, seq)
+            heard = self.wait(_ANSWER_S, lambda heard: heard.ack == seq)
+            if heard is not None:
+                return heard.message
+        raise CheckFailedError(f"no answer to {name}")
+
+    def answer(self, message: wire.HostMessage, kind: type[Answer]) -> Answer:
+        """Ask, and insist on one kind of answer."""
+        answer = self.ask(message)
+        if not isinstance(answer, kind):
+            raise CheckFailedError(f"{type(message).__name__} is answered with {answer}")
+        return answer
+
+    def refused(
+        self, message: wire.HostMessage, reason: Reason, detail: int | None = None
+    ) -> wire.Refused:
+        """Ask, and insist on being refused."""
+        return insist_refused(self.ask(message), type(message).__name__, reason, detail)
+
+    def wait(self, seconds: float, wanted: Callable[[Heard], bool]) -> Heard | None:
+        """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
+        for heard in self.line.listen(seconds):
+            if wanted(heard):
+                return heard
+            if heard.ack == 0:
+                self._unasked.append(heard)
+        return None
+
+    def unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Heard | None:
+        """Give the next message of some kinds that came, or comes in time, of its own accord."""
+        while self._unasked:
+            heard = self._unasked.popleft()
+            if isinstance(heard.message, kinds):
+                return heard
+        return self.wait(seconds, lambda h: h.ack == 0 and isinstance(h.message, kinds))
+
+    # -- arming and drops
+
+    def order(self, **changes: int) -> wire.Arm:
+        """Make an order of a quiet gate that drives nothing."""
+        gates = changes.pop("gates", None)
+        gates = self.quiet_gate() if gates is None else gates
+        return replace(wire.Arm(LABEL, gates, 0, 0, 5000, RECORD_MS), **changes)
+
+    def releasing_order(self, **changes: int) -> wire.Arm:
+        """Make an order that would pulse release 0 for 50 ms, if it were fired."""
+        return replace(self.order(), release=1, pulse_us=PULSE_US, **changes)
+
+    def arm(self, **changes: int) -> int:
+        """Arm without a release; give the token."""
+        return self.armed_by(self.ask(self.order(**changes)))
+
+    def armed_by(self, answer: wire.Message) -> int:
+        """Take the token from an answer to ARM.
+
+        Raises
+        ------
+        NotPossibleError
+            Something that only hands can change forbids arming.
+        """
+        match answer:
+            case wire.Armed(token=token):
+                return token
+            case wire.Refused(reason=Reason.STOPPED):
+                raise NotPossibleError("the emergency stop is open: close it")
+            case wire.Refused(reason=Reason.COOLING):
+                raise NotPossibleError("the release is still cooling: wait a few seconds")
+        raise CheckFailedError(f"Arm is answered with {answer}")
+
+    def fire(self, token: int) -> wire.Fired:
+        """Fire what was armed."""
+        return self.answer(wire.Fire(token), wire.Fired)
+
+    def drop(self, **changes: int) -> Recorded:
+        """Arm, fire, and take what the board sends until its certificate."""
+        return self.ending(self.fire(self.arm(**changes)), changes.get("record_ms", RECORD_MS))
+
+    def ending(self, fired: wire.Fired, record_ms: int = 0) -> Recorded:
+        """Take what the board sends of a drop, up to its certificate."""
+        events: list[wire.Event] = []
+        deadline = self.clock.now_ns() + round((record_ms / 1000 + _END_S) * 1e9)
+        while (left := deadline - self.clock.now_ns()) > 0:
+            heard = self.unasked(left * 1e-9, wire.EventsFrame, wire.DropCertificate)
+            match heard and heard.message:
+                case wire.EventsFrame(events=more):
+                    events += more
+                case wire.DropCertificate() as certificate:
+                    return Recorded(fired, tuple(events), certificate)
+        raise CheckFailedError("no certificate came after the recording")
+
+    def acknowledge(self, recorded: Recorded) -> None:
+        """Let the board forget a drop."""
+        seen = recorded.certificate
+        self.answer(wire.Acknowledge(seen.label, seen.crc32), wire.Done)
+
+    # -- rest
+
+    def phase(self) -> Phase:
+        """Ask what the board is doing."""
+        return self.answer(wire.Status(), wire.State).phase
+
+    def settle(self) -> None:
+        """Bring the board back to IDLE; somebody else's drop is left as it is.
+
+        Raises
+        ------
+        CheckFailedError
+            It does not come to rest.
+        """
+        self.line.port.write(DELIMITER)
+        self._unasked.clear()
+        for _ in range(4):
+            state = self.answer(wire.Status(), wire.State)
+            mine = unpack_label(state.label)[0] == TEST_RUN
+            if state.phase is Phase.IDLE:
+                self._may_release = False
+                return
+            if state.phase is not Phase.ARMED and not mine:
+                self.foreign = state.label
+                return
+            if state.phase is Phase.HOLDING:
+                held = self.answer(wire.Read(state.label, 0, 0), wire.DropCertificate)
+                self.ask(wire.Acknowledge(held.label, held.crc32))
+            else:
+                self.answer(wire.Abort(), wire.Done)
+                self.wait(_ANSWER_S, lambda h: isinstance(h.message, wire.DropCertificate))
+        raise CheckFailedError("the board does not come to rest")
+
+    def need_idle(self) -> None:
+        """Refuse to go on before a board that holds somebody's drop.
+
+        Raises
+        ------
+        NotPossibleError
+            It does.
+        """
+        if self.foreign:
+            run, attempt = unpack_label(self.foreign)
+            raise NotPossibleError(
+                f"the board holds a drop (run {run}, attempt {attempt}): continue its session first"
+            )
+
+    # -- gates
+
+    def gates(self) -> GateStates:
+        """Watch all gates for a moment, once."""
+        if self._gates is None:
+            self._gates = watch_gates(
+                lambda: self.answer(wire.Status(), wire.State).gates, self.clock, _WATCH_S
+            )
+        return self._gates
+
+    def quiet_gate(self) -> int:
+        """Mask of one gate that is clear and steady, and not at the end of the loop-back wire.
+
+        Raises
+        ------
+        NotPossibleError
+            There is none.
+        """
+        seen, identity = self.gates(), self.known()
+        restless = seen.stuck | seen.flickering
+        for gate in reversed(range(identity.gates)):
+            if not restless >> gate & 1 and gate != self.options.loopback:
+                return 1 << gate
+        raise NotPossibleError("no gate is clear and steady")
+
+    def known(self) -> wire.Identity:
+        """Who the board is."""
+        assert self.identity is not None, "the handshake comes first"
+        return self.identity
+
+
+def insist_refused(
+    answer: wire.Message, what: str, reason: Reason, detail: int | None = None
+) -> wire.Refused:
+    """Give an answer that is the right refusal.
+
+    Raises
+    ------
+    CheckFailedError
+        It is something else.
+    """
+    if not isinstance(answer, wire.Refused) or answer.reason is not reason:
+        raise CheckFailedError(f"{what} should be refused with {reason.name}, but: {answer}")
+    if detail is not None and answer.detail != detail:
+        raise CheckFailedError(
+            f"{what}: {reason.name} should have detail {detail}, but has {answer.detail}"
+        )
+    return answer

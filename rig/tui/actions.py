@@ -1,0 +1,113 @@
+"""Everything an operator can do, in one table: key, palette text, and the command that does it too.
+
+Keys, palette and help are made from it, and nothing else binds a key.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rig.tui.flow import BEFORE_RELEASE, Stage
+
+ANY = frozenset(Stage)
+_JUDGED = frozenset({Stage.RESULT})
+_AT_REST = frozenset({Stage.DEVICE, Stage.PREPARE, Stage.RESULT, Stage.DONE})
+
+
+class Action(NamedTuple):
+    """One thing to do.
+
+    Attributes
+    ----------
+    name
+        In keys.toml and in the program.
+    keys
+        As Textual names them, separated by commas; what the operator's file may change.
+    label
+        In the line of keys; short.
+    text
+        In palette and help.
+    command
+        The `rig` command that does the same; empty where only a screen can.
+    stages
+        Where it makes sense.
+    driving
+        Whether it needs control of the rig.
+    """
+
+    name: str
+    keys: str
+    label: str
+    text: str
+    command: str = ""
+    stages: frozenset[Stage] = ANY
+    driving: bool = False
+
+
+ACTIONS: tuple[Action, ...] = (
+    Action("stop", "f9", "STOP", "Stop: everything off, nothing falls", "Ctrl-C in rig run"),
+    Action("go_on", "enter,space", "go on", "Go on: arm, acknowledge, next run",
+           "rig run PROTOCOL --port URL --session FILE",
+           ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True),
+    Action("reject", "x", "reject", "Reject this drop, with a cause", "", _JUDGED, driving=True),
+    Action("note", "n", "note", "Add a note to this drop", "", _JUDGED, driving=True),
+    Action("again", "a", "again", "Another attempt at this run", "",
+           frozenset({Stage.RESULT, Stage.DONE}), driving=True),
+    Action("blind", "b", "blind", "Blind mode: judge a drop before its numbers are shown", "",
+           ANY - _JUDGED),
+    Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
+    Action("close", "z", "close", "Close the session; another protocol can be chosen", "",
+           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
+    Action("wave", "w", "wave", "Begin the wave-your-hand test and the counters again"),
+    Action("page_protocol", "1,p", "protocol", "Page: protocol, its scene and plan",
+           "rig check PROTOCOL"),
+    Action("page_device", "2,d", "device", "Page: device, clock and gates", "rig selftest"),
+    Action("page_run", "3,u", "run", "Page: the run in hand"),
+    Action("page_result", "4,v", "result", "Page: result and verdict of the latest drop",
+           "rig analyze SESSION"),
+    Action("page_session", "5,s", "session", "Page: the session so far",
+           "rig report SESSION -o FILE.html"),
+    Action("page_history", "6,h", "history", "Page: any drop again, forwards and back",
+           "rig replay SESSION"),
+    Action("earlier", "left", "earlier", "History: back in time"),
+    Action("later", "right", "later", "History: on in time"),
+    Action("slower", "minus", "slower", "History: half the speed"),
+    Action("faster", "plus", "faster", "History: twice the speed"),
+    Action("play", "full_stop", "play", "History: play, or stand still"),
+    Action("previous", "up", "previous", "Previous drop, protocol or line"),
+    Action("next", "down", "next", "Next drop, protocol or line"),
+    Action("theme", "t", "theme", "Next theme: dark, light, high contrast"),
+    Action("help", "question_mark,f1", "help", "What can be done here", "rig --help"),
+    Action("palette", "ctrl+p", "palette", "Find an action by its name"),
+    Action("quit", "q,ctrl+q", "quit", "Leave; a run goes on without this screen"),
+)  # fmt: skip
+
+BY_NAME = {action.name: action for action in ACTIONS}
+
+OFFLINE = tuple(
+    action.name
+    for action in ACTIONS
+    if not action.driving and action.name not in {"stop", "control", "blind", "wave"}
+)
+"""What can be done with a file and no rig."""
+
+
+def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
+    """Whether an action makes sense now."""
+    return stage in action.stages and (driving or not action.driving)
+
+
+def shown_key(keys: str) -> str:
+    """Write the first of an action's keys as it stands on a keyboard."""
+    first = keys.partition(",")[0]
+    names = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
+             "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space"}  # fmt: skip
+    if first in names:
+        return names[first]
+    return (
+        "Ctrl-" + first[5:].upper()
+        if first.startswith("ctrl+")
+        else first.upper()[:12]
+        if len(first) > 1
+        else first
+    )

@@ -1,0 +1,333 @@
+"""The operator's way through a session as a pure machine: event in, new stage and effects out.
+
+Nothing here knows of screens, sockets or clocks. Whoever runs it carries the effects out and
+returns what came of them, with the ticket of the effect: an answer to what was stopped meanwhile
+has an old ticket and changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from rig.tui.plan import Job
+
+COUNTDOWN_S = 3.0
+"""From armed to fired: time to take a hand away, or to press a key."""
+
+
+class Stage(StrEnum):
+    """Where the operator is."""
+
+    PROTOCOL = "protocol"
+    DEVICE = "device"
+    PREPARE = "prepare"
+    SETTLING = "settling"
+    ARMING = "arming"
+    COUNTDOWN = "countdown"
+    FIRING = "firing"
+    LIVE = "live"
+    JUDGING = "judging"
+    RESULT = "result"
+    DONE = "done"
+
+
+BEFORE_RELEASE = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
+"""Stages that any key ends."""
+_IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
+
+# ---------------------------------------------------------------- events
+
+
+class Opened(NamedTuple):
+    """A session is open at the daemon."""
+
+
+class Closed(NamedTuple):
+    """The session was closed."""
+
+
+class GoOn(NamedTuple):
+    """The operator wants the next step; `job` is the attempt it would be at."""
+
+    job: Job | None
+    settle_s: float = 0.0
+
+
+class Answered(NamedTuple):
+    """An effect was carried out; `token` is of an `Arm`."""
+
+    ticket: int
+    token: int | None = None
+
+
+class Judged(NamedTuple):
+    """The drop was analysed."""
+
+    ticket: int
+    verdict: str
+    reasons: tuple[str, ...]
+
+
+class Refused(NamedTuple):
+    """An effect failed; `trouble` says why and what to do."""
+
+    ticket: int
+    trouble: str
+
+
+class Tick(NamedTuple):
+    """Time went by."""
+
+    seconds: float
+
+
+class Stopped(NamedTuple):
+    """STOP, or any key before the release."""
+
+
+class Lost(NamedTuple):
+    """The daemon is out of reach, or control is somebody else's."""
+
+    trouble: str
+
+
+class Found(NamedTuple):
+    """The session has a recorded drop that nobody has judged."""
+
+    job: Job
+
+
+class Reject(NamedTuple):
+    """The operator rejects the drop."""
+
+    cause: str
+
+
+class Note(NamedTuple):
+    """The operator has something to say about the drop."""
+
+    text: str
+
+
+class Again(NamedTuple):
+    """The operator wants another attempt."""
+
+    job: Job
+
+
+Event: TypeAlias = (
+    Opened | Closed | GoOn | Answered | Judged | Refused | Tick | Stopped | Lost | Found | Reject
+    | Note | Again
+)  # fmt: skip
+
+# ---------------------------------------------------------------- effects
+
+
+class Wait(NamedTuple):
+    """Let the chains come to rest."""
+
+    seconds: float
+
+
+class Arm(NamedTuple):
+    """Prepare the release."""
+
+    job: Job
+
+
+class Fire(NamedTuple):
+    """Let go."""
+
+    token: int
+
+
+class Collect(NamedTuple):
+    """Wait until the drop is in the session file."""
+
+    job: Job
+
+
+class Judge(NamedTuple):
+    """Analyse the drop."""
+
+    job: Job
+
+
+class Log(NamedTuple):
+    """Put a verdict into the session file."""
+
+    job: Job
+    state: str
+    reasons: tuple[str, ...]
+
+
+class Stop(NamedTuple):
+    """Everything off."""
+
+
+Effect: TypeAlias = Wait | Arm | Fire | Collect | Judge | Log | Stop
+Step: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """Where the operator is.
+
+    Attributes
+    ----------
+    job
+        The attempt in hand, or last in hand.
+    ticket
+        Of the effect that is being waited for.
+    token
+        What the device wants to hear with `Fire`.
+    countdown_s, left_s
+        The countdown, and what is left of it.
+    blind
+        Whether a drop is judged before its numbers are shown.
+    shown
+        Whether the numbers of this drop may be seen.
+    logged
+        Whether the verdict is in the session file.
+    verdict, reasons
+        Of this drop, as logged.
+    trouble
+        What went wrong last; empty when it is over.
+    """
+
+    stage: Stage = Stage.PROTOCOL
+    job: Job | None = None
+    ticket: int = 0
+    token: int = 0
+    countdown_s: float = COUNTDOWN_S
+    left_s: float = 0.0
+    blind: bool = False
+    shown: bool = True
+    logged: bool = True
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
+    trouble: str = ""
+
+    def to(self, stage: Stage, trouble: str = "") -> Flow:
+        """Go to another stage; answers to earlier effects count no more."""
+        return replace(self, stage=stage, ticket=self.ticket + 1, trouble=trouble)
+
+
+def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
+    """Take one event."""
+    match event:
+        case Stopped():
+            return _stopped(flow)
+        case Lost(trouble):
+            return _lost(flow, trouble)
+        case Answered(ticket, token):
+            return _answered(flow, ticket, token)
+        case Refused(ticket, trouble):
+            return _refused(flow, ticket, trouble)
+        case Tick(seconds):
+            return _tick(flow, seconds)
+        case Judged():
+            return _judged(flow, event)
+        case GoOn(job, settle_s):
+            return _go_on(flow, job, settle_s)
+        case Opened() if flow.stage is Stage.PROTOCOL:
+            return flow.to(Stage.DEVICE), ()
+        case Closed() if flow.stage in {*_IDLE, Stage.RESULT}:
+            return replace(flow.to(Stage.PROTOCOL), job=None), ()
+        case Found(job) if flow.stage in _IDLE:
+            return replace(flow, job=job).to(Stage.JUDGING), (Judge(job),)
+        case Again(job) if flow.stage in {*_IDLE, Stage.RESULT} and flow.shown:
+            return replace(flow, job=job).to(Stage.PREPARE), ()
+        case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
+            return _relogged(flow, "rejected", (cause.strip(),), shown=True)
+        case Note(text) if flow.stage is Stage.RESULT and text.strip():
+            noted = (*flow.reasons, f"note: {text.strip()}")
+            return _relogged(flow, flow.verdict, noted, shown=flow.shown)
+    return flow, ()
+
+
+def _stopped(flow: Flow) -> Step:
+    if flow.stage in BEFORE_RELEASE:
+        return flow.to(Stage.PREPARE, "stopped: nothing fell"), (Stop(),)
+    return flow, (Stop(),)
+
+
+def _lost(flow: Flow, trouble: str) -> Step:
+    if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
+        # A chain that fell is recorded by the daemon, and found when it is back.
+        return flow.to(Stage.PREPARE, trouble), ()
+    return flow, ()
+
+
+def _answered(flow: Flow, ticket: int, token: int | None) -> Step:
+    if ticket != flow.ticket:
+        # What was stopped while the device was arming must not stay armed.
+        return flow, () if token is None else (Stop(),)
+    job = flow.job
+    if job is None:
+        return flow, ()
+    if flow.stage is Stage.SETTLING:
+        return flow.to(Stage.ARMING), (Arm(job),)
+    if flow.stage is Stage.ARMING:
+        armed = flow.to(Stage.COUNTDOWN)
+        return replace(armed, token=token or 0, left_s=flow.countdown_s), ()
+    if flow.stage is Stage.FIRING:
+        return flow.to(Stage.LIVE), (Collect(job),)
+    if flow.stage is Stage.LIVE:
+        return flow.to(Stage.JUDGING), (Judge(job),)
+    return replace(flow, logged=True), ()
+
+
+def _refused(flow: Flow, ticket: int, trouble: str) -> Step:
+    if ticket != flow.ticket:
+        return flow, ()
+    if flow.stage is Stage.FIRING:
+        # Whether it was let go is not known for sure when the answer is an error.
+        return flow.to(Stage.PREPARE, trouble), (Stop(),)
+    if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
+        return flow.to(Stage.PREPARE, trouble), ()
+    return replace(flow, trouble=trouble, logged=True), ()
+
+
+def _tick(flow: Flow, seconds: float) -> Step:
+    if flow.stage is not Stage.COUNTDOWN:
+        return flow, ()
+    left = flow.left_s - seconds
+    if left > 0.0:
+        return replace(flow, left_s=left), ()
+    return replace(flow.to(Stage.FIRING), left_s=0.0), (Fire(flow.token),)
+
+
+def _judged(flow: Flow, event: Judged) -> Step:
+    if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
+        return flow, ()
+    assert flow.job is not None
+    log = Log(flow.job, event.verdict, event.reasons)
+    flow = replace(flow, verdict=event.verdict, reasons=event.reasons, shown=not flow.blind)
+    return replace(flow.to(Stage.RESULT), logged=False), (log,)
+
+
+def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Step:
+    if flow.stage is Stage.PREPARE and job is not None:
+        return replace(flow, job=job).to(Stage.SETTLING), (Wait(settle_s),)
+    if flow.stage is Stage.RESULT and not flow.shown:
+        return replace(flow, shown=True), ()  # blind, and nothing against it
+    if flow.stage is Stage.RESULT and not flow.logged:
+        return flow, ()  # what comes next depends on it
+    if flow.stage in {Stage.DEVICE, Stage.RESULT, Stage.DONE}:
+        if job is None:
+            return flow.to(Stage.DONE), ()
+        return replace(flow, job=job).to(Stage.PREPARE), ()
+    return flow, ()
+
+
+def _relogged(flow: Flow, state: str, reasons: tuple[str, ...], *, shown: bool) -> Step:
+    """Log the drop once more."""
+    job = flow.job
+    assert job is not None
+    flow = replace(flow, verdict=state, reasons=reasons, shown=shown, logged=False)
+    flow = replace(flow, ticket=flow.ticket + 1, trouble="")
+    return flow, (Log(job, state, reasons),)

@@ -1,0 +1,122 @@
+"""What the screens are drawn from, put together once a tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.tui.flow import Stage
+
+if TYPE_CHECKING:
+    from rig.protocol.scene import Protocol, Run
+    from rig.tui.findings import Findings
+    from rig.tui.flow import Flow
+    from rig.tui.gates import Lamps
+    from rig.tui.plan import Job
+    from rig.tui.state import State
+
+WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
+"""Where a watcher is, by the state of the drop."""
+
+
+class Alarm(NamedTuple):
+    """What is wrong, and what to do."""
+
+    message: str
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """One moment.
+
+    Attributes
+    ----------
+    connected
+        Whether the daemon is heard.
+    driving
+        Whether this screen has control of the rig.
+    job
+        The attempt that `flow` is at, or would be at next.
+    now_s
+        A clock that only goes on.
+    silence
+        Why the daemon is not heard.
+    offline
+        Whether only a file is looked at.
+    """
+
+    state: State
+    flow: Flow
+    lamps: Lamps
+    protocol: Protocol | None = None
+    findings: Findings | None = None
+    connected: bool = False
+    driving: bool = False
+    job: Job | None = None
+    now_s: float = 0.0
+    silence: str = ""
+    settle_s: float = 0.0
+    port: str = ""
+    offline: bool = False
+
+    @property
+    def stage(self) -> Stage:
+        """Where the session is: by our own flow, or as seen by a watcher."""
+        if self.driving or not self.connected:
+            return self.flow.stage
+        seen = WATCHED.get(str(self.state.section("drop").get("state")))
+        return self.flow.stage if seen is None else seen
+
+    @property
+    def run(self) -> Run | None:
+        """The planned run in hand."""
+        if self.findings is None or self.job is None:
+            return None
+        return self.findings.plan.get(self.job.run)
+
+    @property
+    def verdict(self) -> tuple[str, tuple[str, ...]]:
+        """Verdict and reasons of the attempt in hand; empty before there are any."""
+        if self.flow.stage is Stage.RESULT and self.flow.job == self.job:
+            return self.flow.verdict, self.flow.reasons
+        line = self.state.line(self.job.run) if self.job else None
+        if line is None or self.job is None or line.attempt != self.job.attempt:
+            return "", ()
+        return line.state, line.reasons
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a stamp is needed."""
+        return self.state.simulated or bool(self.findings and self.findings.simulated)
+
+    @property
+    def blindfold(self) -> bool:
+        """Whether the latest drop's numbers must not be seen yet."""
+        return self.flow.stage is Stage.RESULT and not self.flow.shown
+
+
+def alarm(model: Model) -> Alarm | None:
+    """Name what is most wrong now; `None` when all is well."""
+    if not model.connected:
+        return Alarm(
+            f"no daemon: {model.silence or 'connecting'}",
+            "tried again by itself; a drop that was fired is recorded without this screen; "
+            "in danger switch the release's supply off",
+        )
+    link = model.state.section("link")
+    if link.get("state") == "down":
+        why, wait = link.get("error"), link.get("retry_s")
+        text = why.get("message", "") if isinstance(why, dict) else why or ""
+        again = f" (next try in {float(wait):.0f} s)" if wait is not None else ""
+        return Alarm(
+            f"the port is lost: {text}",
+            f"check cable and power; the board is found again by itself{again}",
+        )
+    error = model.state.sections.get("error")
+    if isinstance(error, dict):
+        return Alarm(str(error.get("message", "")), str(error.get("hint", "")))
+    if model.flow.trouble:
+        message, _, hint = model.flow.trouble.partition("\n")
+        return Alarm(message, hint)
+    return None

@@ -1,0 +1,197 @@
+"""Where both chains were during a drop, from its edges, beside where the model has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.trains import Edges, train
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.errors import DomainError
+from rig.model.fall import kicks
+from rig.model.rods import rod_impacts
+from rig.records import Drop, Edge
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.trains import Train
+    from rig.analysis.trajectory import Trajectory
+    from rig.protocol.scene import Protocol, Run
+
+    Array = NDArray[np.float64]
+
+_FIRST = 4
+_POINTS = 120  # of a curve: two a column of a wide terminal
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One chain's way down.
+
+    Attributes
+    ----------
+    role
+        ``impact`` or ``free``.
+    times, heights
+        Of each rod's edge in a beam: seconds since the release fired, and the height of the bottom
+        rod's middle above the contact point that follows, m; in order of time.
+    model
+        `None` outside the model's domain.
+    delay_s
+        By how much the model's release is later than the fire stamp, so that it meets the points.
+    """
+
+    role: str
+    times: Array
+    heights: Array
+    model: Trajectory | None
+    delay_s: float
+
+    def curve(self, end_s: float) -> tuple[Array, Array]:
+        """Model's heights from the fire stamp to a time; empty without a model."""
+        if self.model is None:
+            return np.empty(0), np.empty(0)
+        times = np.linspace(0.0, end_s, _POINTS)
+        return times, self.model.heights(times - self.delay_s)[0]
+
+
+def motions(
+    protocol: Protocol,
+    run: Run,
+    edges: Iterable[Sequence[int]],
+    hz: float,
+    matches: Mapping[int, int] | None = None,
+) -> tuple[Motion, ...]:
+    """Turn a drop's edges into heights.
+
+    Parameters
+    ----------
+    run
+        What hung where.
+    edges
+        Tick, channel and state of each.
+    hz
+        Tick rate.
+    matches
+        Rod of each edge by its number, as the analysis found; without it each edge is taken for the
+        rod that the model has nearest the beam then.
+    """
+    if protocol.gates is None:
+        return ()
+    drop = Drop(
+        run.number,
+        1,
+        round(hz),
+        tuple(Edge(tick, gate, bool(blocked)) for tick, gate, blocked in edges),
+    )
+    table = Edges.of(drop, hz)
+    found = []
+    for role in ("impact", "free"):
+        name = run.impact if role == "impact" else run.free
+        gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
+        if name is None or not gates:
+            continue
+        chain = protocol.chains[name]
+        start = protocol.drop.value
+        parts = [train(n, gate, chain, table, start, role == "impact") for n, gate in gates]
+        model = _model(protocol, run, role)
+        if matches is not None:
+            pairs = [_matched(part, matches) for part in parts]
+        else:
+            pairs = _nearest(parts, model)
+        times = np.concatenate([times for times, _ in pairs])
+        heights = np.concatenate([heights for _, heights in pairs])
+        order = np.argsort(times, kind="stable")
+        found.append(_motion(role, times[order], heights[order], model))
+    return tuple(found)
+
+
+def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Array, Array]:
+    """Δz against time, measured and by the model: two pairs of times and metres.
+
+    Measured at the impact side's edges, the free chain's height read between its neighbours.
+    """
+    nothing = np.empty(0)
+    if len(pair) < 2:
+        return nothing, nothing, nothing, nothing
+    impact, free = pair
+    times = times_in = impact.times
+    gaps = nothing
+    if free.times.size > 1 and times.size:
+        inside = (times >= free.times[0]) & (times <= free.times[-1])
+        times_in = times[inside]
+        gaps = np.interp(times_in, free.times, free.heights) - impact.heights[inside]
+    if impact.model is None or free.model is None:
+        return times_in[: gaps.size], gaps, nothing, nothing
+    curve = np.linspace(0.0, end_s, _POINTS)
+    delay = impact.delay_s
+    model = free.model.heights(curve - delay)[0] - impact.model.heights(curve - delay)[0]
+    return times_in[: gaps.size], gaps, curve, model
+
+
+def _nearest(parts: list[Train], model: Trajectory | None) -> list[tuple[Array, Array]]:
+    """Times and heights of each gate's edges before anybody has matched them."""
+    counted = [_counted(part, part.times.size) for part in parts]
+    if model is None:
+        return counted
+    # Flicker and missed rods have not shifted the count of the first few yet.
+    first = [_counted(part, _FIRST) for part in parts]
+    lags = [times - model.times(levels) for times, levels in first if times.size]
+    if not lags:
+        return counted
+    delay = float(np.median(np.concatenate(lags)))
+    found = []
+    for part in parts:
+        there = model.heights(part.times - delay)[0]
+        off = np.abs(part.levels[None, :] - there[:, None])
+        off[part.blocks[None, :] != part.blocked[:, None]] = np.inf
+        best = off.argmin(axis=1) if part.levels.size else np.empty(0, dtype=np.intp)
+        count = best.size
+        found.append((part.times[:count], part.levels[best]))
+    return found
+
+
+def _counted(part: Train, most: int) -> tuple[Array, Array]:
+    """Take a gate's edges for its rods in order."""
+    count = min(part.times.size, part.levels.size, most)
+    return part.times[:count], part.levels[:count]
+
+
+def _matched(part: Train, matches: Mapping[int, int]) -> tuple[Array, Array]:
+    """Times and heights of one gate's edges, each with the rod it was matched to."""
+    where = {(rod, blocks): at for at, (rod, blocks) in enumerate(
+        zip(part.rods.tolist(), part.blocks.tolist(), strict=True))}  # fmt: skip
+    kept, levels = [], []
+    edges = zip(part.edge.tolist(), part.blocked.tolist(), strict=True)
+    for index, (edge, blocked) in enumerate(edges):
+        at = where.get((matches.get(edge, -1), blocked))
+        if at is not None:
+            kept.append(index)
+            levels.append(at)
+    return part.times[kept], part.levels[levels]
+
+
+def _motion(role: str, times: Array, heights: Array, model: Trajectory | None) -> Motion:
+    delay = 0.0
+    if model is not None and times.size:
+        delay = float(np.median(times - model.times(heights)))
+    return Motion(role, times, heights, model, delay)
+
+
+def _model(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
+    start, gravity = protocol.drop.value, protocol.gravity.value
+    if role == "free" or run.impact is None or protocol.surface is None:
+        return free_trajectory(0.0, start, gravity)
+    chain = protocol.chains[run.impact].chain
+    try:
+        impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
+    except DomainError:
+        return None
+    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    places = np.array(chain.heights)
+    return struck_trajectory(0.0, start, gravity, np.array(gains), np.ones(places.size), places)

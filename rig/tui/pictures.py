@@ -1,0 +1,123 @@
+"""The main screens as SVG, drawn from a recorded session: the same file gives the same pictures."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.tui.app import Options, RigApp
+from rig.tui.findings import Book
+from rig.tui.flow import Flow, Stage
+from rig.tui.replay import Player, end_of
+from rig.tui.state import State
+from rig.tui.still import QUIET, Still
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from rig.tui.findings import Findings
+    from rig.tui.plan import Job
+
+SIZE = (120, 36)
+_LIVE_SHARE = 0.9
+_FONT = '"DejaVu Sans Mono", "Liberation Mono", Menlo, Consolas, monospace'
+
+
+class Scene(NamedTuple):
+    """One picture: its name, and the moment it shows."""
+
+    name: str
+    flow: Flow
+    state: State
+
+
+def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
+    """Draw every main screen.
+
+    Parameters
+    ----------
+    session
+        With one drop at least.
+    folder
+        Made if it is not there.
+    keys
+        Of every action, by name.
+
+    Returns
+    -------
+    list of Path
+        The files.
+    """
+    findings = Book(session).read()
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for scene in scenes(findings):
+        path = folder / f"{scene.name}.svg"
+        path.write_text(asyncio.run(_picture(scene, session, keys)), "utf-8")
+        written.append(path)
+    return written
+
+
+def scenes(findings: Findings) -> list[Scene]:
+    """Choose the moments."""
+    job = findings.jobs[-1]
+    whole = findings.state()
+    session = whole.sections["session"]
+    state = replace(whole, sections={**QUIET, "session": session})
+    before = replace(
+        state,
+        runs=tuple(
+            line._replace(state="planned", attempt=0) if line.run == job.run else line
+            for line in whole.runs
+        ),
+    )
+    record = findings.record(job)
+    result = Flow(
+        Stage.RESULT, job, verdict=record["verdict"], reasons=tuple(record["reasons"])
+    )  # fmt: skip
+    return [
+        Scene("device", Flow(Stage.DEVICE), before),
+        Scene("run", Flow(Stage.PREPARE, job), before),
+        Scene("live", Flow(Stage.LIVE, job), _falling(before, findings, job)),
+        Scene("result", result, state),
+        Scene("session", Flow(Stage.DONE), state),
+        Scene("history", Flow(Stage.DONE), state),
+    ]
+
+
+def _falling(state: State, findings: Findings, job: Job) -> State:
+    """Stop the clock in the middle of a drop."""
+    drop = findings.drops[job]
+    until = _LIVE_SHARE * drop.edges[-1].tick
+    section = {"run": job.run, "attempt": job.attempt, "state": "fired", "tick_hz": drop.tick_hz}
+    edges = tuple([*edge] for edge in drop.edges if edge.tick <= until)
+    return State(0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges)
+
+
+async def _picture(scene: Scene, session: Path, keys: Mapping[str, str]) -> str:
+    wire = Still(scene.state)
+    app = RigApp(Options(session=session), keys, wire)
+    app.flow = scene.flow
+    async with app.run_test(size=SIZE) as pilot:
+        while app.findings is None or not app.lamps.known:
+            wire.changed = True
+            await pilot.pause()
+        if scene.name == "history":
+            first = app.findings.jobs[0]
+            end = end_of(app.findings.drops[first], app.findings.scales[first].hz)
+            app.history.player = Player(0, 0.8 * end)
+            await app.go("history")
+        await pilot.pause(1.0)  # figures wait a moment from one drawing to the next
+        return portable(app.export_screenshot(title="chainrig"))
+
+
+def portable(svg: str) -> str:
+    """Take fonts from the reader's machine instead of from a server."""
+    svg = re.sub(r"@font-face\s*\{[^}]*\}", "", svg)
+    svg = re.sub(r"font-family:\s*(Fira Code|arial)[^;]*;", f"font-family: {_FONT};", svg)
+    svg = svg.replace("<svg ", '<svg xml:space="preserve" ', 1)  # or leading blanks are lost
+    # Names in it depend on what else this program drew before.
+    return re.sub(r"terminal-\d+-", "rig-", svg)

@@ -1,0 +1,153 @@
+"""What the plots show, as plain data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.report.numbers import expanded, value_of
+from rig.tui.findings import good
+from rig.tui.motion import motions, separation
+from rig.tui.widgets.figure import Picture, Series
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from rig.protocol.scene import Protocol, Run
+    from rig.tui.findings import Findings
+    from rig.tui.motion import Motion
+
+_MARKS = {"impact": ("•", "primary"), "free": ("+", "secondary")}
+_BEFORE_S = 0.02
+_POINTS = 300  # of one chain: more would fall on the same characters
+
+
+def chain_pictures(
+    protocol: Protocol | None,
+    run: Run | None,
+    edges: Sequence[Sequence[int]],
+    hz: float,
+    matches: Mapping[int, int] | None,
+) -> tuple[Picture | None, Picture | None]:
+    """Draw z(t) of each chain and Δz(t), with the model's curves; `None` for what is not there."""
+    if protocol is None or run is None or protocol.gates is None:
+        return None, None
+    found = motions(protocol, run, edges, hz, matches)
+    if not found:
+        return None, None
+    end = max((float(one.times[-1]) for one in found if one.times.size), default=0.0)
+    end = max(end, _expected_end(found)) + _BEFORE_S
+    series: list[Series] = []
+    for one in found:
+        times, heights = one.curve(end)
+        label = "model" if one is found[-1] else ""
+        series.append(Series("line", times * 1e3, heights * 1e2, "accent", label=label))
+    for one in reversed(found):  # the struck chain above the free one
+        mark, color = _MARKS[one.role]
+        thin = slice(None, None, 1 + one.times.size // _POINTS)
+        series.append(Series("dots", one.times[thin] * 1e3, one.heights[thin] * 1e2, color, mark,
+                             f"{one.role} side"))  # fmt: skip
+    chains = Picture("z (cm), t (ms)", tuple(series), (0.0, end * 1e3))
+    if len(found) < 2:
+        return chains, None
+    t, gaps, t_model, model = separation(found, end)
+    apart = Picture(
+        "Δz (cm), t (ms)",
+        (
+            Series("line", t_model * 1e3, model * 1e2, "accent", label="model"),
+            Series("dots", t * 1e3, gaps * 1e2, "success", "●", "measured"),
+        ),
+        (0.0, end * 1e3),
+    )
+    return chains, apart
+
+
+def _expected_end(found: Sequence[Motion]) -> float:
+    """When the model's last rod lands."""
+    ends = [float(one.model.time[-1]) for one in found if one.model is not None]
+    return max(ends, default=0.0)
+
+
+def incline_pictures(findings: Findings, hidden: int | None) -> list[Picture]:
+    """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing.
+
+    Parameters
+    ----------
+    hidden
+        A run whose numbers must not be seen yet.
+    """
+    found = []
+    runs = [run for run in findings.analysis["runs"] if run["run"] != hidden and good(run)]
+    summary = [] if hidden is not None else findings.analysis["summary"]
+    for name, scale, title in (
+        ("separation_m", 100.0, "Δz (cm), incline (°)"),
+        ("speed_m_s", 1.0, "V (m/s), incline (°)"),
+    ):
+        curve = findings.curves.get(name)
+        if curve is None:
+            continue
+        dots = [(r["incline_deg"], value_of(r.get(name))) for r in runs]
+        dots = [(x, y) for x, y in dots if y is not None]
+        means = [(s["incline_deg"], value_of(s.get(name)), expanded(s.get(name))) for s in summary]
+        means = [m for m in means if m[1] is not None]
+        found.append(
+            Picture(
+                title,
+                (
+                    Series("line", findings.curves["incline_deg"], _scaled(curve, scale), "accent",
+                           label="model"),
+                    Series("dots", [x for x, _ in dots], _scaled([y for _, y in dots], scale),
+                           "secondary", "·", "runs"),
+                    Series("bars", [x for x, *_ in means], _scaled([y for _, y, _ in means], scale),
+                           "primary", "●", "mean ± U",
+                           _scaled([u or 0.0 for *_, u in means], scale)),
+                ),
+            )
+        )  # fmt: skip
+    return found
+
+
+def control_picture(findings: Findings, hidden: int | None) -> Picture | None:
+    """Draw skew, or g, of every run in order, with the protocol's limits or the expected value."""
+    runs = [run for run in findings.analysis["runs"] if run["run"] != hidden]
+    name, scale, title = ("release_skew_s", 1e3, "release skew (ms), run")
+    if not findings.protocol.two_chains:
+        name, scale, title = "gravity_m_s2", 1.0, "g (m/s²), run"
+    points = [(run["run"], value_of(run.get(name)), good(run)) for run in runs]
+    points = [point for point in points if point[1] is not None]
+    if not points and findings.protocol.surface is not None and not findings.protocol.two_chains:
+        return None
+    ends = [0.5, len(findings.plan) + 0.5]
+    if name == "release_skew_s":
+        limit = findings.protocol.accept.release_skew * scale
+        lines = [Series("line", ends, [level, level], "warning", label=label)
+                 for level, label in ((limit, f"limit ±{limit:g}"), (-limit, ""))]  # fmt: skip
+        middle = Series("line", ends, [0.0, 0.0], "foreground")
+    else:
+        lines = []
+        g = findings.protocol.gravity.value
+        middle = Series("line", ends, [g, g], "accent", label="expected")
+    counted = [(x, y) for x, y, ok in points if ok]
+    void = [(x, y) for x, y, ok in points if not ok]
+    return Picture(
+        title,
+        (
+            middle,
+            *lines,
+            Series("dots", [x for x, _ in counted], _scaled([y for _, y in counted], scale),
+                   "primary", "●", "counts"),
+            Series("dots", [x for x, _ in void], _scaled([y for _, y in void], scale), "error", "×",
+                   "void"),
+        ),
+        (0.5, len(findings.plan) + 0.5),
+        x_ticks=_whole(len(findings.plan)),
+    )  # fmt: skip
+
+
+def _whole(count: int) -> list[float]:
+    """At most about eight whole numbers up to a count."""
+    step = next(step for step in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**9) if count <= 8 * step)
+    return [float(number) for number in range(max(1, step), count + 1, step)]
+
+
+def _scaled(values: Sequence[float | None], scale: float) -> list[float]:
+    return [float("nan") if value is None else value * scale for value in values]

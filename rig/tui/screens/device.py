@@ -1,0 +1,98 @@
+"""Is the rig well? Connection, firmware, clock, and every gate as a lamp."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from rig.report.numbers import fixed
+from rig.tui.screens.page import Page
+from rig.tui.widgets.lamps import LampBoard, named
+from rig.tui.widgets.text import Words
+from rig.tui.words import plain
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+
+    from rig.tui.model import Model
+
+
+class DevicePage(Page):
+    """What is connected, and what its gates see."""
+
+    NAME = "device"
+    SCOPED_CSS = False
+    DEFAULT_CSS = """
+    DevicePage #facts { height: auto; padding: 0 1 1 1; }
+    DevicePage #wave { height: auto; padding: 1 1 0 1; }
+    """
+
+    def compose(self) -> ComposeResult:
+        yield Words(id="facts")
+        yield LampBoard(id="lamps")
+        yield Words(id="wave")
+
+    def show(self, model: Model) -> None:
+        """Draw what holds now."""
+        self.query_one("#facts", Words).say_content(_facts(model))
+        self.query_one(LampBoard).show(model.protocol, model.lamps, model.now_s)
+        self.query_one("#wave", Words).say_content(_wave(model))
+
+
+def _facts(model: Model) -> Content:
+    device, link = model.state.section("device"), model.state.section("link")
+    statistics = model.state.section("statistics")
+    lines: list[tuple[str, str]] = []
+    state = {"up": "● up", "down": "✗ down: comes back by itself", "opening": "◌ opening",
+             "closed": "○ closed until a session is open"}  # fmt: skip
+    lines.append(("connection", state.get(str(link.get("state")), "unknown")))
+    if device:
+        who = [f"{name.replace('_', ' ')} {plain(value, 40)}" for name, value in device.items()
+               if name in {"board", "firmware", "version", "unique_id"}]  # fmt: skip
+        lines.append(("board", " · ".join(who) or "connected"))
+        if device.get("tick_hz"):
+            lines.append(("tick", f"{1e9 / float(device['tick_hz']):g} ns nominal"))
+    lines.append(("clock", _clock(model)))
+    if statistics:
+        trip = statistics.get("round_trip_s")
+        answer = "–" if trip is None else f"{float(trip) * 1e3:.1f} ms"
+        bad = int(statistics.get("rx_bad", 0)) + int(statistics.get("rx_unreadable", 0))
+        lines.append(
+            ("line", f"answers in {answer} · {statistics.get('rx_frames', 0)} frames, {bad} damaged"
+                     f" · {statistics.get('repeats', 0)} requests repeated")
+        )  # fmt: skip
+    return Content("\n").join(
+        Content.assemble((f"{name:11}", "bold $primary"), text) for name, text in lines
+    )
+
+
+def _clock(model: Model) -> str:
+    details = model.findings.clock.details if model.findings else {}
+    if "error_ppm" not in details or not details.get("samples"):
+        return "not compared yet: needs a second or two"
+    return (
+        f"off by {fixed(details['error_ppm'], 1)} ± {2 * details['u_ppm']:.1f} ppm, from "
+        f"{details['samples']} comparisons; times are corrected for it"
+    )
+
+
+def _wave(model: Model) -> Content:
+    gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
+    lamps = model.lamps
+    if not lamps.known:
+        return Content("No word from the gates yet.")
+    if lamps.alone is not None:
+        return Content.assemble(
+            ("☞ ", "bold $warning"), "you block ", (named(gates, lamps.alone), "bold")
+        )
+    if lamps.blocked:
+        return Content.assemble(
+            ("● ", "bold $warning"), f"{len(lamps.blocked)} beams are blocked: move what is in "
+            "their way, or align them"
+        )  # fmt: skip
+    left = [gate.channel for gate in gates if gate.channel not in lamps.waved]
+    if not left:
+        return Content.assemble(("✓ ", "bold $success"), "every gate has answered to your hand")
+    many = "" if len(left) == len(gates) else f" ({len(gates) - len(left)} of {len(gates)} seen)"
+    return Content(f"Wave a hand through each beam: the gate is named here{many}.")

@@ -1,0 +1,24 @@
+"""What all pages have in common."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Vertical
+
+if TYPE_CHECKING:
+    from rig.tui.model import Model
+
+
+class Page(Vertical):
+    """One page of the session.
+
+    Pages set `SCOPED_CSS` off where their rules ask how large the screen is.
+    """
+
+    DEFAULT_CSS = "Page { height: 1fr; }"
+    NAME = ""
+
+    def show(self, model: Model) -> None:
+        """Draw what holds now; called on the app's tick when something changed."""
+        raise NotImplementedError

@@ -1,0 +1,132 @@
+"""Pick a protocol, and see what follows from it or what is wrong with it at which line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Horizontal, VerticalScroll
+from textual.content import Content
+from textual.style import Style
+
+from rig.errors import InputError
+from rig.protocol import reader
+from rig.protocol.describe import describe
+from rig.protocol.measurable import check_measurable
+from rig.tui.flow import Stage
+from rig.tui.screens.page import Page
+from rig.tui.widgets.text import Words
+from rig.tui.words import plain
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from textual.app import ComposeResult
+
+    from rig.protocol.scene import Protocol
+    from rig.tui.model import Model
+
+
+class ProtocolPage(Page):
+    """Files left, the chosen one's scene and plan right."""
+
+    NAME = "protocol"
+    SCOPED_CSS = False
+    DEFAULT_CSS = """
+    ProtocolPage #files { width: 30; padding: 0 1; height: 1fr; border-right: solid $border; }
+    ProtocolPage VerticalScroll { width: 1fr; padding: 0 1; }
+    ProtocolPage #scene { width: 1fr; }
+    """
+
+    def __init__(self, files: tuple[Path, ...], session: Path | None) -> None:
+        super().__init__()
+        self.files = files
+        self.session = session
+        self.chosen = 0
+        self._read: tuple[Path, int] | None = None
+        self._protocol: Protocol | None = None
+        self._problem = ""
+
+    def compose(self) -> ComposeResult:
+        with Horizontal():
+            yield Words(id="files")
+            with VerticalScroll(can_focus=False):
+                yield Words(id="scene")
+
+    @property
+    def file(self) -> Path | None:
+        """The chosen file."""
+        return self.files[self.chosen] if self.files else None
+
+    @property
+    def usable(self) -> bool:
+        """Whether a session can be made with it."""
+        return self._protocol is not None and not self._problem
+
+    def move(self, by: int) -> None:
+        """Choose another file."""
+        if self.files:
+            self.chosen = (self.chosen + by) % len(self.files)
+            self.query_one(VerticalScroll).scroll_home(animate=False)
+
+    def show(self, model: Model) -> None:
+        """Draw the list, and the running session's protocol once there is one."""
+        running = model.flow.stage is not Stage.PROTOCOL and model.protocol is not None
+        self.query_one("#files", Words).display = not running
+        if running:
+            assert model.protocol is not None
+            self.query_one("#scene", Words).say_content(_described(model.protocol))
+            return
+        self._look()
+        rows = []
+        for at, file in enumerate(self.files):
+            mark = "▸ " if at == self.chosen else "  "
+            press = Style.from_meta({"@click": f"app.choose({at})"})
+            style = "bold $primary" if at == self.chosen else "$foreground"
+            rows.append(Content.assemble((mark + plain(file.stem, 25), style)).stylize(press))
+        if not rows:
+            rows = [Content("no protocol here: name one,\nrig tui PROTOCOL")]
+        self.query_one("#files", Words).say_content(Content("\n").join(rows))
+        if self._protocol is None or self._problem:
+            self.query_one("#scene", Words).say(
+                ("✗ this cannot be used\n\n", "bold $error"), self._problem
+            )
+            return
+        session = plain(self.session) if self.session else ""
+        into = Content.assemble(("→ ", "$primary"), f"session file: {session}\n\n")
+        self.query_one("#scene", Words).say_content(
+            Content.assemble(into if session else "", _described(self._protocol))
+        )
+
+    def _look(self) -> None:
+        """Read the chosen file again when it changed: it may be open in an editor beside this."""
+        file = self.file
+        if file is None:
+            self._problem = "no file"
+            return
+        try:
+            stamp = file, file.stat().st_mtime_ns
+        except OSError:
+            stamp = file, -1
+        if stamp == self._read:
+            return
+        self._read, self._protocol, self._problem = stamp, None, ""
+        try:
+            self._protocol = reader.read(file)
+            if self._protocol.gates is None:
+                self._problem = "this scene has no gates: nothing can be measured"
+            else:
+                check_measurable(self._protocol)
+        except InputError as error:
+            lines = [plain(problem, 300) for problem in error.problems]
+            self._problem = "\n".join(lines or [plain(error.message), plain(error.hint)])
+
+
+def _described(protocol: Protocol) -> Content:
+    lines = [plain(line, 200) for line in describe(protocol).splitlines()]
+    title, *rest = lines
+    parts = [Content.styled(title, "bold")]
+    parts += [
+        Content(line) if line.startswith(" ") else Content.styled(line, "bold $primary")
+        for line in rest
+    ]
+    return Content("\n").join(parts)

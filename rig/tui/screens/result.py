@@ -1,0 +1,125 @@
+"""The latest drop: verdict, numbers beside the model, edges, and both chains' way down."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from textual.containers import Horizontal
+from textual.content import Content
+
+from rig.analysis.student import coverage_factor
+from rig.analysis.summary import predicted_run
+from rig.report.columns import AUDIT
+from rig.report.numbers import fixed, plus_minus
+from rig.tui.plots import chain_pictures
+from rig.tui.screens.page import Page
+from rig.tui.widgets.banner import Banner
+from rig.tui.widgets.figure import Figure
+from rig.tui.widgets.text import Words
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from textual.app import ComposeResult
+
+    from rig.protocol.scene import Protocol, Run
+    from rig.tui.findings import Findings
+    from rig.tui.model import Model
+    from rig.tui.plan import Job
+    from rig.tui.widgets.figure import Picture
+    from rig.units import Quantity
+
+_ROWS = (
+    ("separation_m", "Δz corrected", 100.0, "cm"),
+    ("separation_raw_m", "Δz as it fell", 100.0, "cm"),
+    ("speed_m_s", "V", 1.0, "m/s"),
+    ("release_skew_s", "release skew", 1e3, "ms"),
+    ("gravity_m_s2", "g", 1.0, "m/s²"),
+)
+
+
+class ResultPage(Page):
+    """Everything one drop says."""
+
+    NAME = "result"
+    SCOPED_CSS = False
+    DEFAULT_CSS = """
+    ResultPage #numbers { height: auto; padding: 0 1; }
+    ResultPage #figures { height: 1fr; }
+    """
+
+    def compose(self) -> ComposeResult:
+        yield Banner(id="banner")
+        yield Words(id="numbers")
+        with Horizontal(id="figures"):
+            yield Figure(id="z")
+            yield Figure(id="dz")
+
+    def show(self, model: Model) -> None:
+        """Draw what holds now."""
+        self.query_one(Banner).show(model)
+        findings, job = model.findings, model.job
+        ready = findings is not None and job in findings.results and not model.blindfold
+        numbers = self.query_one("#numbers", Words)
+        numbers.display = ready
+        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
+        if not ready or findings is None or job is None:
+            z.show(None)
+            dz.show(None)
+            return
+        numbers.say_content(number_table(findings, job))
+        key = (findings.path, job, findings.scales[job].hz)
+        if z.wants(key):
+            first, second = drop_pictures(findings, job)
+            z.show(first, key)
+            dz.show(second, key)
+
+
+def drop_pictures(findings: Findings, job: Job) -> tuple[Picture | None, Picture | None]:
+    """Draw a recorded drop, with the rods as the analysis found them."""
+    matches = findings.results[job].matches or None
+    run, edges = findings.plan[job.run], findings.drops[job].edges
+    return chain_pictures(findings.protocol, run, edges, findings.scales[job].hz, matches)
+
+
+def number_table(findings: Findings, job: Job, *, wide: bool = True) -> Content:
+    """Write the numbers with U95; where there is room, the model's and the normalized error too."""
+    record = findings.record(job)
+    expected = expectations(findings.protocol, findings.plan[job.run])
+    head = f"{'':15}{'measured ± U95':>20}"
+    lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
+    for name, label, scale, unit in _ROWS:
+        if name not in record:
+            continue
+        line = f"{label:15}{plus_minus(record[name], scale):>20} {unit:4}"
+        model = expected.get(name)
+        if not wide:
+            pass
+        elif model is not None:
+            own = coverage_factor(math.inf) * model.u
+            told = {"value": model.value, "U95": own} if own else model.value
+            line += f"{plus_minus(told, scale):>16}"
+            line += f"   {fixed(_normalized(record[name], model), 2):>5}"
+        elif name == "release_skew_s":
+            limit = findings.protocol.accept.release_skew * 1e3
+            line += f"{f'limit ±{limit:g}':>16}"
+        lines.append(Content(line))
+    audit = record.get("edges", {})
+    counts = " · ".join(f"{kind} {audit.get(kind, 0)}" for kind in AUDIT)
+    lines.append(Content(f"{'edges':15}{counts}"))
+    return Content("\n").join(lines)
+
+
+def expectations(protocol: Protocol, run: Run) -> dict[str, Quantity]:
+    """Return what the model says of this run, by JSON name."""
+    if protocol.surface is None:
+        return {"gravity_m_s2": protocol.gravity}
+    separation, speed = predicted_run(protocol, run)
+    found = {"separation_m": separation, "speed_m_s": speed}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _normalized(measured: Mapping[str, float], model: Quantity) -> float | None:
+    width = math.hypot(measured["U95"], coverage_factor(math.inf) * model.u)
+    return (measured["value"] - model.value) / width if width > 0.0 else None

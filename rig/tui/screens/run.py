@@ -1,0 +1,151 @@
+"""The run in hand: what to hang where, the checklist, the countdown, and the fall itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.widgets import Digits
+
+from rig.tui.flow import Stage
+from rig.tui.plots import chain_pictures
+from rig.tui.screens.page import Page
+from rig.tui.widgets.figure import Figure
+from rig.tui.widgets.lamps import LampBoard, named
+from rig.tui.widgets.text import Words
+from rig.tui.words import duration, plain
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+
+    from rig.tui.model import Model
+
+_FALLING = (Stage.LIVE, Stage.JUDGING)
+_WAITING = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
+
+
+class RunPage(Page):
+    """Before and during one drop."""
+
+    NAME = "run"
+    SCOPED_CSS = False
+    DEFAULT_CSS = """
+    RunPage #left { width: 1fr; }
+    RunPage #right { width: 1fr; display: none; }
+    RunPage.-live #right, .-normal RunPage #right, .-wide RunPage #right { display: block; }
+    .-narrow RunPage.-live #left { display: none; }
+    RunPage #card { height: auto; padding: 0 1; }
+    RunPage #checks { height: auto; padding: 1 1; }
+    RunPage Digits { height: 3; padding: 0 2; color: $warning; display: none; }
+    RunPage.-count Digits { display: block; }
+    RunPage #lamps { margin: 1 0 0 0; }
+    .-low RunPage #checks { padding: 0 1; }
+    """
+
+    def compose(self) -> ComposeResult:
+        with Horizontal():
+            with Vertical(id="left"):
+                yield Words(id="card")
+                yield Digits("3", id="count")
+                yield Words(id="checks")
+                yield LampBoard(id="lamps")
+            with Vertical(id="right"):
+                yield Figure(id="z")
+                yield Figure(id="dz")
+
+    def show(self, model: Model) -> None:
+        """Draw what holds now."""
+        stage = model.stage
+        self.set_class(stage in _FALLING, "-live")
+        self.set_class(stage is Stage.COUNTDOWN and model.driving, "-count")
+        self.query_one("#card", Words).say_content(_card(model))
+        self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
+        checks = self.query_one("#checks", Words)
+        checks.say_content(_checks(model))
+        self.query_one(LampBoard).show(model.protocol, model.lamps, model.now_s)
+        self._plots(model)
+
+    def _plots(self, model: Model) -> None:
+        drop = model.state.section("drop")
+        hz = float(drop.get("tick_hz") or 1e6)
+        live = model.stage in _FALLING
+        edges = model.state.edges if live else ()
+        key = (model.job, model.run, len(edges), live)
+        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
+        if not z.wants(key):
+            return
+        first, second = chain_pictures(model.protocol, model.run, edges, hz, None)
+        z.show(first, key)
+        dz.show(second, key)
+
+
+def _card(model: Model) -> Content:
+    run, job, protocol = model.run, model.job, model.protocol
+    if job is None or run is None or protocol is None:
+        if model.state.runs and model.flow.stage is not Stage.PROTOCOL:
+            return Content("Every run of the plan is done with.")
+        return Content("No session is open: choose a protocol first.")
+    attempt = f" · attempt {job.attempt}" if job.attempt > 1 else ""
+    head = Content.assemble((f"RUN {job.run} of {len(model.state.runs)}{attempt}", "bold $primary"))
+    lines = [head]
+    if run.impact is None:
+        lines += [_fact("let fall", plain(run.free, 40))]
+    else:
+        lines += [_fact("impact side", plain(run.impact, 40))]
+        if run.free is not None:
+            lines += [_fact("free side", plain(run.free, 40))]
+        lines += [_fact("incline", f"{run.incline_deg:g}°")]
+    datum = "contact point" if protocol.surface is not None else "datum of the gates"
+    lines += [_fact("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {datum}")]
+    return Content("\n").join(lines)
+
+
+def _fact(name: str, value: str) -> Content:
+    return Content.assemble((f"{name:13}", "$foreground 70%"), (value, "bold"))
+
+
+def _checks(model: Model) -> Content:
+    stage = model.stage
+    if stage in _WAITING:
+        words = {
+            Stage.SETTLING: "the chains come to rest, clocks are compared …",
+            Stage.ARMING: "arming …",
+            Stage.COUNTDOWN: "ARMED. It falls when the count is over."
+            if model.driving
+            else "ARMED by another client. Keep clear.",
+            Stage.FIRING: "letting go …",
+        }
+        keys = "\nAny key stops, and nothing falls." if model.driving else ""
+        return Content.assemble((words[stage], "bold $warning"), keys)
+    if stage is Stage.LIVE:
+        return Content.styled(f"FALLING  {len(model.state.edges)} edges so far", "bold $primary")
+    if stage is Stage.JUDGING:
+        return Content.styled("reading the drop back and analysing it …", "bold $primary")
+    if model.job is None or model.run is None:
+        return Content("")
+    lamps = model.lamps
+    gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
+    blocked, restless = lamps.blocked, lamps.restless(model.now_s)
+    where = named(gates, blocked[0]) if blocked else ""
+    more = f" and {len(blocked) - 1} more" if len(blocked) > 1 else ""
+    lines = [
+        _check(model.connected and model.state.link == "up", "device connected", "no device"),
+        _check(lamps.known and not blocked, "every beam clear",
+               f"blocked: {where}{more}" if lamps.known else "no word from the gates"),
+        _check(lamps.known and not restless, "gates steady", "gates moving: let the chains rest"),
+        Content.assemble(("○ ", "bold"), "hung as above, at rest, hands away"),
+    ]  # fmt: skip
+    settle = duration(model.settle_s)
+    end = (
+        f"\nEnter arms: {settle} of rest, a count of three, then it falls."
+        if model.driving
+        else "\nWatching: c takes control when it is free."
+    )
+    return Content.assemble(Content("\n").join(lines), end)
+
+
+def _check(good: bool, yes: str, no: str) -> Content:
+    if good:
+        return Content.assemble(("✓ ", "bold $success"), yes)
+    return Content.assemble(("✗ ", "bold $error"), no)

@@ -1,0 +1,135 @@
+"""The session so far: the plan with its states, Fig. 3 growing, and the control chart."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from textual.containers import Grid, VerticalScroll
+from textual.content import Content
+
+from rig.report.numbers import fixed, plus_minus
+from rig.tui.plan import done, void_counts
+from rig.tui.plots import control_picture, incline_pictures
+from rig.tui.screens.page import Page
+from rig.tui.widgets.banner import LOOKS
+from rig.tui.widgets.figure import Figure
+from rig.tui.widgets.text import Words
+from rig.tui.words import duration, plain
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from textual.app import ComposeResult
+
+    from rig.tui.model import Model
+    from rig.tui.state import RunLine
+
+
+class SessionPage(Page):
+    """Plan, results against incline, control chart."""
+
+    NAME = "session"
+    SCOPED_CSS = False
+    DEFAULT_CSS = """
+    SessionPage #progress { height: auto; padding: 0 1; }
+    SessionPage #plan { height: auto; max-height: 8; padding: 0 1; }
+    .-wide SessionPage #plan { max-height: 24; }
+    SessionPage #figures { height: 1fr; grid-size: 2 2; grid-rows: 2fr 1fr; }
+    SessionPage #control { column-span: 2; }
+    .-low SessionPage #figures { grid-size: 2 1; grid-rows: 1fr; }
+    .-low SessionPage #control { column-span: 1; }
+    .-low SessionPage #plan { max-height: 5; }
+    """
+
+    def compose(self) -> ComposeResult:
+        yield Words(id="progress")
+        with VerticalScroll(id="plan", can_focus=False):
+            yield Words(id="lines")
+        with Grid(id="figures"):
+            yield Figure(id="separation")
+            yield Figure(id="speed")
+            yield Figure(id="control")
+
+    def show(self, model: Model) -> None:
+        """Draw what holds now."""
+        self.query_one("#progress", Words).say_content(_progress(model))
+        self.query_one("#lines", Words).say_content(_plan(model))
+        figures = [self.query_one(name, Figure) for name in ("#separation", "#speed", "#control")]
+        findings = model.findings
+        if findings is None:
+            for figure in figures:
+                figure.show(None)
+            return
+        hidden = model.job.run if model.blindfold and model.job else None
+        key = (findings.path, findings.reading, hidden)
+        if not any(figure.wants(key) for figure in figures):
+            return
+        pictures = incline_pictures(findings, hidden)
+        low = self.screen.has_class("-low")  # no room for both; Δz says more
+        figures[0].show(pictures[0] if pictures else None, key)
+        figures[1].show(pictures[1] if len(pictures) > 1 and not low else None, key)
+        figures[2].show(control_picture(findings, hidden), key)
+
+    def move(self, by: int) -> None:
+        """Scroll the plan."""
+        self.query_one("#plan", VerticalScroll).scroll_relative(y=by, animate=False)
+
+
+def _progress(model: Model) -> Content:
+    runs = model.state.runs
+    voids = void_counts(model.findings.voids if model.findings else (), runs)
+    over = sum(done(line, voids.get(line.run, 0)) for line in runs)
+    if not runs:
+        return Content("No session is open.")
+    width = 24
+    filled = round(width * over / len(runs))
+    pace = model.findings.pace_s if model.findings else None
+    left = (
+        f" · about {duration(pace * (len(runs) - over))} left" if pace and over < len(runs) else ""
+    )
+    session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
+    return Content.assemble(
+        ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
+        (f"  {over} of {len(runs)} runs", "bold"), f"{left}  ", (session, "$foreground 60%"),
+    )  # fmt: skip
+
+
+def _plan(model: Model) -> Content:
+    """One line an incline: a symbol a run, and the means so far."""
+    summary = {}
+    if model.findings is not None and not model.blindfold:
+        summary = {line["incline_deg"]: line for line in model.findings.analysis["summary"]}
+    ordered = sorted(model.state.runs, key=lambda line: line.incline_deg)
+    lines = []
+    for incline, group in groupby(ordered, key=lambda line: line.incline_deg):
+        lines.append(_incline(incline, list(group), summary.get(incline, {}), model))
+    if summary:
+        note = "means of drops analysed one by one; rig analyze adjusts all of them together"
+        lines.append(Content.styled(note, "$foreground 60%"))
+    return Content("\n").join(lines)
+
+
+def _incline(
+    incline: float, runs: Sequence[RunLine], mean: Mapping[str, Any], model: Model
+) -> Content:
+    marks: list[tuple[str, str]] = []
+    for line in runs:
+        hidden = model.blindfold and model.job is not None and line.run == model.job.run
+        symbol, colour = LOOKS.get("recorded" if hidden else line.state, ("?", "$foreground"))
+        now = model.job is not None and line.run == model.job.run
+        marks.append((symbol, f"{colour} reverse" if now else colour))
+    parts = []
+    for name, label, scale, unit in (
+        ("separation_m", "Δz", 100.0, "cm"), ("speed_m_s", "V", 1.0, "m/s"),
+        ("gravity_m_s2", "g", 1.0, "m/s²"),
+    ):  # fmt: skip
+        if name in mean:
+            parts.append(f"{label} {plus_minus(mean[name], scale)} {unit}")
+    error = mean.get("normalized_error")
+    if error is not None:
+        parts.append(f"Eₙ {fixed(error, 2)}")
+    head = f"{incline:5g}° " if runs[0].impact is not None else "drops  "
+    return Content.assemble((head, "bold"), *marks, "  ", "  ".join(parts))

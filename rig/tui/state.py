@@ -1,0 +1,120 @@
+"""The daemon's state as the screens see it: typed, and never changed under them.
+
+See rig/daemon/API.md for the sections; `rig.daemon.mirror` applies the changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+EMPTY: Mapping[str, Any] = MappingProxyType({})
+
+
+class RunLine(NamedTuple):
+    """Where one planned run stands."""
+
+    run: int
+    incline_deg: float
+    impact: str | None
+    free: str | None
+    attempt: int = 0
+    state: str = "planned"
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything the daemon says.
+
+    Attributes
+    ----------
+    n
+        Number of the last change in it; −1 before the first snapshot.
+    sections
+        By name, as they came, but for the two below.
+    runs
+        The plan, in order.
+    edges
+        Of the latest drop, as they came: tick, gate, state after it.
+    """
+
+    n: int = -1
+    sections: Mapping[str, Any] = field(default_factory=lambda: EMPTY)
+    runs: tuple[RunLine, ...] = ()
+    edges: tuple[Sequence[int], ...] = ()
+
+    @property
+    def known(self) -> bool:
+        """Whether there was a snapshot yet."""
+        return self.n >= 0
+
+    def section(self, name: str) -> Mapping[str, Any]:
+        """Return one section, empty where the daemon says null."""
+        found = self.sections.get(name)
+        return found if isinstance(found, dict) else EMPTY
+
+    @property
+    def phase(self) -> str:
+        """What the daemon does: ``idle``, ``armed``, ``recording``, ``storing`` or ``trouble``."""
+        return str(self.sections.get("phase", "idle"))
+
+    @property
+    def link(self) -> str:
+        """State of the port: ``closed``, ``opening``, ``up``, ``down``."""
+        return str(self.section("link").get("state", "closed"))
+
+    @property
+    def blocked(self) -> int | None:
+        """Mask of the gates that are blocked; `None` when nobody knows."""
+        mask = self.section("gates").get("blocked")
+        return None if mask is None else int(mask)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether no real chain falls here."""
+        return bool(
+            self.section("port").get("simulated") or self.section("session").get("simulated")
+        )
+
+    @property
+    def holder(self) -> str | None:
+        """Name of the client that has control."""
+        name = self.section("control").get("client")
+        return None if name is None else str(name)
+
+    def line(self, run: int) -> RunLine | None:
+        """Where a run stands; `None` when it is not planned."""
+        return next((line for line in self.runs if line.run == run), None)
+
+
+def typed(n: int, state: Mapping[str, Any]) -> State:
+    """Take the daemon's sections as they are now; what they become later changes nothing here.
+
+    Parameters
+    ----------
+    n
+        Number of the last change in them.
+    state
+        Sections by name. Entries of its lists are replaced by the mirror, never changed.
+    """
+    sections = {name: value for name, value in state.items() if name not in {"runs", "edges"}}
+    return State(
+        n, sections, tuple(map(_line, state.get("runs") or ())), tuple(state.get("edges") or ())
+    )
+
+
+def _line(run: Mapping[str, Any]) -> RunLine:
+    return RunLine(
+        run["run"],
+        float(run["incline_deg"]),
+        run["impact"],
+        run["free"],
+        run["attempt"],
+        run["state"],
+        tuple(run["reasons"] or ()),
+    )

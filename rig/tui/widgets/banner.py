@@ -1,0 +1,61 @@
+"""The verdict, large enough to be seen from the rig."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from rig.tui.widgets.text import Words
+from rig.tui.words import plain
+
+if TYPE_CHECKING:
+    from rig.tui.model import Model
+
+LOOKS = {
+    "accepted": ("✓", "$success"),
+    "marginal": ("~", "$warning"),
+    "void": ("✗", "$error"),
+    "rejected": ("⊘", "$error"),
+    "recorded": ("…", "$primary"),
+    "armed": ("!", "$warning"),
+    "fired": ("↓", "$primary"),
+    "interrupted": ("■", "$warning"),
+    "planned": ("·", "$foreground 60%"),
+}
+"""Symbol and colour of every state of a run."""
+
+
+class Banner(Words):
+    """Verdict and reasons of the latest drop."""
+
+    DEFAULT_CSS = "Banner { height: auto; padding: 0 1; margin: 0 0 1 0; }"
+
+    def show(self, model: Model) -> None:
+        """Draw what holds now."""
+        self.say_content(verdict_words(model))
+
+
+def verdict_words(model: Model) -> Content:
+    """Write the verdict; in blind mode only that there is one to be given."""
+    if model.job is None:
+        return Content("no drop yet")
+    run = f"run {model.job.run}, attempt {model.job.attempt}"
+    if model.blindfold:
+        return Content.assemble(
+            (" BLIND ", "bold $background on $accent"),
+            f"  {run} is recorded. Anything against it? Reject it now with a cause, or keep it:\n"
+            "  only then its numbers are shown.",
+        )
+    verdict, reasons = model.verdict
+    if not verdict:
+        return Content(f"{run}: not judged yet")
+    symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
+    lines = [
+        Content.assemble((f" {symbol} {verdict.upper()} ", f"bold $background on {colour}"),
+                         f"  {run}")
+    ]  # fmt: skip
+    lines += [Content.assemble("  ", (plain(reason, 200), "")) for reason in reasons[:4]]
+    if len(reasons) > 4:
+        lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))
+    return Content("\n").join(lines)

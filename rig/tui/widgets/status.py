@@ -1,0 +1,71 @@
+"""The top of every screen: what this is, whether it is simulated, and what is wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Vertical
+from textual.content import Content
+
+from rig.tui.model import alarm
+from rig.tui.widgets.text import Words
+from rig.tui.words import plain
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+
+    from rig.tui.model import Model
+
+_LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
+_NAMES = {
+    "protocol": "PROTOCOL", "device": "DEVICE", "run": "RUN", "result": "RESULT",
+    "session": "SESSION", "history": "HISTORY",
+}  # fmt: skip
+
+
+class Status(Vertical):
+    """One line, and below it what is wrong with what to do."""
+
+    DEFAULT_CSS = """
+    Status { dock: top; height: auto; }
+    Status #headline { height: 1; padding: 0 1; background: $panel; }
+    Status #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
+                    background: $error 20%; color: $foreground; }
+    """
+
+    def compose(self) -> ComposeResult:
+        yield Words(id="headline")
+        yield Words(id="alarm")
+
+    def show(self, model: Model, page: str, width: int) -> None:
+        """Draw what holds now."""
+        self.query_one("#headline", Words).say_content(headline(model, page, width - 2))
+        wrong = alarm(model)
+        box = self.query_one("#alarm", Words)
+        box.display = wrong is not None
+        if wrong is not None:
+            hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
+            box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
+
+
+def headline(model: Model, page: str, width: int) -> Content:
+    """One line of exactly `width`: page and title left, stamp and link right."""
+    link = _LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
+    if model.offline:
+        link = "file only"
+    right = [f"{plain(model.port, 24)}  {link}" if model.port else link]
+    stamp = " ▲ SIMULATED " if model.simulated else ""
+    blind = " BLIND " if model.flow.blind else ""
+    taken = len(right[0]) + len(stamp) + len(blind) + 4
+    name = _NAMES.get(page, "")
+    title = plain(model.state.section("session").get("title") or
+                  (model.protocol.title if model.protocol else "chainrig"))  # fmt: skip
+    room = max(0, width - taken - len(name))
+    if len(title) > room:
+        title = title[: max(0, room - 1)] + "…" if room else ""
+    gap = " " * max(1, width - taken + 1 - len(name) - len(title))
+    return Content.assemble(
+        (name, "bold $primary"), "  ", title, gap,
+        (stamp, "bold $background on $warning"), (blind, "bold $background on $accent"),
+        " ", right[0],
+    )  # fmt: skip

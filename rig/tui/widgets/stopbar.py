@@ -1,0 +1,118 @@
+"""The bottom of every screen: what can be done now, and STOP."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Vertical
+from textual.content import Content
+from textual.style import Style
+
+from rig.tui.actions import ACTIONS, OFFLINE, possible, shown_key
+from rig.tui.flow import BEFORE_RELEASE, Stage
+from rig.tui.widgets.text import Words
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from textual.app import ComposeResult
+
+    from rig.tui.model import Model
+
+_ALWAYS = ("help", "palette", "quit")
+_FIRST = ("go_on", "reject", "note", "again", "control", "blind")
+_GO_ON = {
+    Stage.PROTOCOL: "open session",
+    Stage.DEVICE: "to the first run",
+    Stage.PREPARE: "arm",
+    Stage.RESULT: "acknowledge",
+    Stage.DONE: "what is left",
+}
+_PAGES = tuple(action.name for action in ACTIONS if action.name.startswith("page_"))
+_HISTORY = ("play", "earlier", "later", "slower", "faster", "previous", "next")
+
+
+class StopBar(Vertical):
+    """Keys of this page, and the bar that stops everything, also by mouse."""
+
+    DEFAULT_CSS = """
+    StopBar { dock: bottom; height: 2; }
+    StopBar #hints { height: 1; padding: 0 1; background: $panel; color: $foreground; }
+    StopBar #stop { height: 1; padding: 0 1; background: $error 25%; color: $foreground; }
+    StopBar #stop.-hot { background: $error; color: $background; text-style: bold; }
+    """
+
+    def compose(self) -> ComposeResult:
+        yield Words(id="hints")
+        yield Words(id="stop")
+
+    def show(self, model: Model, page: str, keys: Mapping[str, str], width: int) -> None:
+        """Draw what holds now."""
+        self.query_one("#hints", Words).say_content(hints(model, page, keys, width - 2))
+        stop = self.query_one("#stop", Words)
+        hot = model.stage in {*BEFORE_RELEASE, Stage.LIVE}
+        stop.set_class(hot, "-hot")
+        key = shown_key(keys["stop"])
+        press = Style.from_meta({"@click": "app.do('stop')"})
+        stop.say_content(
+            Content.assemble(
+                (f" ■ STOP  {key} or Esc ", press),
+                f"  {_doing(model)}",
+            )
+        )
+
+
+def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Content:
+    """Write as many keys as fit, the most wanted first."""
+    names = [*_FIRST]
+    if page == "history":
+        names = [*_HISTORY]
+    if page == "device":
+        names.insert(1, "wave")
+    names += [*_ALWAYS, *_PAGES]
+    parts: list[Content] = []
+    used = 0
+    by_name = {action.name: action for action in ACTIONS}
+    for name in names:
+        action = by_name[name]
+        if model.offline and name not in OFFLINE:
+            continue
+        if not possible(action, model.flow.stage, driving=model.driving):
+            continue
+        label = _label(name, action.label, model)
+        text = f"{shown_key(keys[name])} {label}"
+        if used + len(text) + 2 > width:
+            break
+        used += len(text) + 2
+        press = Style.from_meta({"@click": f"app.do('{name}')"})
+        key, _, rest = text.partition(" ")
+        parts += [Content.styled(key, "bold $primary"), Content.assemble((f" {rest}  ", press))]
+    return Content.assemble(*parts)
+
+
+def _label(name: str, label: str, model: Model) -> str:
+    if name == "go_on":
+        if model.blindfold:
+            return "keep, show numbers"
+        return _GO_ON.get(model.flow.stage, label)
+    if name == "control":
+        return "give control back" if model.driving else "take control"
+    return label
+
+
+def _doing(model: Model) -> str:
+    words = {
+        Stage.SETTLING: "chains come to rest; any key stops",
+        Stage.ARMING: "arming; any key stops",
+        Stage.COUNTDOWN: "ARMED; any key stops" if model.driving else "ARMED by another client",
+        Stage.FIRING: "letting go",
+        Stage.LIVE: "FALLING, recording",
+        Stage.JUDGING: "reading and analysing the drop",
+    }
+    if model.offline:
+        return "a file is looked at: no rig is connected"
+    if not model.connected:
+        return "no daemon: nothing can be stopped from here"
+    holder = model.state.holder
+    watching = "" if model.driving or holder is None else f" · watching {holder[:24]}"
+    return words.get(model.stage, model.state.phase) + watching

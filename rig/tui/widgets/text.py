@@ -1,0 +1,36 @@
+"""Static text that is never parsed as markup and repainted only when it changed."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from textual.content import Content
+from textual.widgets import Static
+
+Part: TypeAlias = "str | tuple[str, str]"
+"""Text, or text with its style."""
+
+
+class Words(Static):
+    """Text on a page."""
+
+    DEFAULT_CSS = "Words { link-style: none; link-background: transparent; }"
+
+    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002
+        super().__init__(markup=False, id=id, classes=classes)
+        self._said: Content | None = None
+
+    @property
+    def said(self) -> str:
+        """What stands here."""
+        return self._said.plain if self._said is not None else ""
+
+    def say(self, *parts: Part) -> None:
+        """Show these parts, one after the other."""
+        self.say_content(Content.assemble(*parts))
+
+    def say_content(self, content: Content) -> None:
+        """Show content, unless it is there already."""
+        if self._said is None or not self._said.is_same(content):
+            self._said = content
+            self.update(content)

@@ -1,0 +1,194 @@
+"""The line to the daemon: found or started, kept, and taken up again when it is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from rig.daemon.aclient import AsyncClient
+from rig.daemon.lease import LEASE_S
+from rig.daemon.place import default_socket, prepare_folder
+from rig.errors import DeviceError, RigError
+from rig.tui.state import State, typed
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+    from pathlib import Path
+
+_AGAIN_S = 0.5
+_START_S = 5.0  # a daemon that was started has this long before another one is
+
+
+class Wire:
+    """One client of the daemon for as long as the screen is open.
+
+    Parameters
+    ----------
+    url
+        The port; empty to watch whatever daemon there is.
+    socket
+        Of the daemon; `None` for the usual one.
+    connected
+        Awaited each time the daemon was reached and its state is known.
+
+    Attributes
+    ----------
+    silence
+        Why the daemon is not heard; empty while it is.
+    daemon
+        The one that was started from here, if any.
+    """
+
+    def __init__(
+        self, url: str, socket: Path | None, connected: Callable[[], Awaitable[None]]
+    ) -> None:
+        self.url = url
+        self.path = default_socket() if socket is None else socket
+        self.name = f"rig tui {os.getpid()}"
+        self.silence = "looking for it"
+        self.changed = True
+        self._connected = connected
+        self._client: AsyncClient | None = None
+        self.daemon: subprocess.Popen[bytes] | None = None
+        self._had_control = False
+        self._wants_control = True
+        self._started_at = -_START_S
+        self._port = ""
+
+    @property
+    def up(self) -> bool:
+        """Whether the daemon is heard."""
+        return self._client is not None and not self._client.lost.is_set()
+
+    @property
+    def port(self) -> str:
+        """The port as the daemon names it, or as it was asked for."""
+        return self._port or self.url
+
+    @property
+    def state(self) -> State:
+        """What the daemon said last."""
+        if self._client is None:
+            return State()
+        mirror = self._client.mirror
+        return typed(mirror.n, mirror.state) if mirror.state else State()
+
+    @property
+    def driving(self) -> bool:
+        """Whether this client has control."""
+        if not self.up or self._client is None:
+            return False
+        control = self._client.mirror.state.get("control")
+        if control is None:
+            # On a busy machine control may lapse; if nobody takes it, it is ours when we speak.
+            return self._had_control
+        mine: bool = control["client"] == self.name
+        return mine
+
+    async def call(self, method: str, **params: Any) -> Any:
+        """Ask the daemon for anything in its interface.
+
+        Raises
+        ------
+        RigError
+            As the daemon raised it, or it is not there.
+        """
+        if self._client is None:
+            raise DeviceError(f"no daemon: {self.silence}", "it is tried again by itself")
+        return await self._client.call(method, **params)
+
+    async def take_control(self) -> None:
+        """Take control, now and whenever the daemon had to be reached again.
+
+        Raises
+        ------
+        RigError
+            Another client has it.
+        """
+        self._wants_control = True
+        await self.call("take_control")
+        self._had_control = True
+
+    async def release_control(self) -> None:
+        """Give control back, for good."""
+        self._wants_control = self._had_control = False
+        await self.call("release_control")
+
+    async def keep(self) -> None:
+        """Connect, and connect again, until cancelled."""
+        try:
+            while True:
+                try:
+                    await self._once()
+                except RigError as error:
+                    self.silence = " ".join(filter(None, [error.message, error.hint]))
+                self.changed = True
+                await asyncio.sleep(_AGAIN_S)
+        finally:
+            if self._client is not None:
+                await self._client.close()
+
+    async def _once(self) -> None:
+        """Stay connected as long as it goes."""
+        try:
+            client = await AsyncClient.connect(self.path, self.name)
+        except DeviceError as error:
+            self._start(error)
+            return
+        try:
+            await self._check(client)
+            client.changed = self._note
+            await client.subscribe()
+            self._client, self.silence = client, ""
+            if self._wants_control and client.mirror.state.get("control") is None:
+                with suppress(RigError):
+                    await self.take_control()
+            await self._connected()
+            while not client.lost.is_set():
+                client.renew()
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(client.lost.wait(), LEASE_S / 4)
+            self.silence = "it is gone"
+        finally:
+            self._had_control = False
+            await client.close()
+
+    async def _check(self, client: AsyncClient) -> None:
+        """See that it is the daemon of the port that was asked for."""
+        await client.subscribe()
+        self._port = str(client.mirror.state["port"]["url"])
+        if self.url and self._port != self.url:
+            raise DeviceError(
+                f"the daemon has {self._port}, not {self.url};",
+                "leave --port out to watch that one, or give --socket for a second daemon",
+            )
+
+    def _start(self, error: DeviceError) -> None:
+        """Start a daemon that outlives this screen."""
+        if not self.url:
+            raise error
+        now = asyncio.get_running_loop().time()
+        if now - self._started_at < _START_S:
+            return
+        self._started_at = now
+        if self.daemon is not None:
+            self.daemon.poll()  # buries the last one
+        prepare_folder(self.path.parent)
+        # What it has to say about its own end would otherwise be lost with the terminal.
+        with self.path.with_suffix(".log").open("ab") as log:
+            command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
+            self.daemon = subprocess.Popen(  # noqa: S603 - our own program
+                [*command, "--socket", str(self.path)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        self.silence = "started one, waiting for it"
+
+    def _note(self) -> None:
+        self.changed = True

@@ -1,0 +1,135 @@
+"""The serial ports of this computer, and why each may or may not be a board's. Opens none."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rig.errors import DeviceError
+from rig.usb.known import known
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from serial.tools.list_ports_common import ListPortInfo
+
+
+@dataclass(frozen=True, slots=True)
+class SerialPort:
+    """A serial port.
+
+    Attributes
+    ----------
+    path
+        Device path.
+    vid, pid, serial_number, manufacturer, product
+        What USB says of it; `None` where it says nothing.
+    kind
+        What the numbers stand for, empty when nobody knows.
+    skipped
+        Why it is no candidate; empty for a candidate.
+    """
+
+    path: str
+    vid: int | None = None
+    pid: int | None = None
+    serial_number: str | None = None
+    manufacturer: str | None = None
+    product: str | None = None
+    kind: str = ""
+    skipped: str = ""
+
+    @property
+    def candidate(self) -> bool:
+        """Whether it is a board's port, by its numbers."""
+        return not self.skipped
+
+
+def serial_ports() -> list[SerialPort]:
+    """List what is there, candidates first."""
+    # Imported when it is used: it looks through /sys, and few commands want that.
+    from serial.tools.list_ports import comports  # noqa: PLC0415
+
+    found = [described(info) for info in comports()]
+    return sorted(found, key=lambda port: (not port.candidate, port.path))
+
+
+def described(info: ListPortInfo) -> SerialPort:
+    """Say what a port is and whether it may be a board's."""
+    kind = None
+    if info.vid is None or info.pid is None:
+        skipped = "no USB device"
+    else:
+        kind = known(info.vid, info.pid)
+        if kind is None:
+            skipped = "no board's USB numbers: name it with --port if it is one"
+        elif not kind.board:
+            skipped = "a chip that boards and other instruments have: name it with --port"
+        else:
+            skipped = ""
+    return SerialPort(
+        path=info.device,
+        vid=info.vid,
+        pid=info.pid,
+        serial_number=info.serial_number,
+        manufacturer=info.manufacturer,
+        product=info.product,
+        kind=kind.name if kind else "",
+        skipped=skipped,
+    )
+
+
+def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> str | None:
+    """Find a board again, wherever it is plugged in now.
+
+    Parameters
+    ----------
+    serial_number
+        From `serial_number_at`.
+    ports
+        Where to look; by default at everything that is there.
+
+    Returns
+    -------
+    str or None
+        Its device path, `None` while it is not there.
+
+    Raises
+    ------
+    DeviceError
+        Several have this number, as some copies of boards do.
+    """
+    found = [
+        port.path
+        for port in (serial_ports() if ports is None else ports)
+        if port.serial_number == serial_number
+    ]
+    if len(found) > 1:
+        raise DeviceError(
+            f"{' and '.join(found)} have the same serial number {serial_number}",
+            "unplug the others, or name the port",
+        )
+    return found[0] if found else None
+
+
+def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> str | None:
+    """Give the serial number of what is plugged in at a port.
+
+    Parameters
+    ----------
+    path
+        Device path, or a link to one as in ``/dev/serial/by-id``.
+    ports
+        As in `path_of`.
+
+    Returns
+    -------
+    str or None
+        `None` when it has none (CH340 chips have none), and for URLs.
+    """
+    here = os.path.realpath(path)
+    for port in serial_ports() if ports is None else ports:
+        if os.path.realpath(port.path) == here:
+            return port.serial_number
+    return None

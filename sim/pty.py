@@ -1,0 +1,197 @@
+"""A virtual board behind a pseudo-terminal, in real time: ``python -m sim.pty``.
+
+Prints the path of the terminal's link on stdout; any program opens it like a board's port, as
+often as it likes. Lines on stdin do what hands do at a rig: ``reset``, ``pull SECONDS`` (the
+cable), ``block MASK`` (beams), ``stop 1``, ``stop 0``; the end of stdin ends it. The log gets a
+line of JSON for every drop as the board holds it, and for every change of phase or outputs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import pty
+import select
+import sys
+import time
+import tty
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.link.messages import Phase
+from sim.board import VirtualBoard
+from sim.line import LineFaults
+from sim.scene import set_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_TICK_S = 4e-3
+_CHUNK = 4096
+
+
+class Bench:
+    """The board, its cable and its log.
+
+    Parameters
+    ----------
+    board
+        Its time begins now.
+    link
+        Symbolic link to the terminal.
+    log
+        File for what happens.
+    faults
+        Of the line, towards the board and towards the host.
+    """
+
+    def __init__(
+        self, board: VirtualBoard, link: Path, log: Path, faults: tuple[LineFaults, LineFaults]
+    ) -> None:
+        self.board = board
+        self._link = link
+        self._log = log.open("a", encoding="utf-8", buffering=1)
+        self._to_board, self._to_host = faults
+        self._ends: tuple[int, int] | None = None
+        self._plug_at = 0.0
+        self._begun_ns = time.monotonic_ns()
+        self._seen: tuple[int, int] = (0, 0)
+        self.plug()
+
+    def plug(self) -> None:
+        """Put the cable in."""
+        far, near = pty.openpty()
+        tty.setraw(near)
+        os.set_blocking(far, False)
+        # Replaced, not removed and made: nobody finds it missing in between.
+        beside = self._link.with_suffix(".new")
+        beside.unlink(missing_ok=True)
+        beside.symlink_to(os.ttyname(near))
+        beside.replace(self._link)
+        self._ends = far, near
+
+    def pull(self) -> None:
+        """Take the cable out; the board goes on."""
+        if self._ends is not None:
+            self._link.unlink(missing_ok=True)
+            for end in self._ends:
+                os.close(end)
+            self._ends = None
+
+    def serve(self) -> None:
+        """Pass bytes and obey until stdin ends."""
+        self.board.reset(0)
+        words = b""
+        while True:
+            watched = [0] if self._ends is None else [0, self._ends[0]]
+            readable, _, _ = select.select(watched, [], [], _TICK_S)
+            if 0 in readable:
+                more = os.read(0, _CHUNK)
+                if not more:
+                    return
+                *lines, words = (words + more).split(b"\n")
+                for line in lines:
+                    self._obey(line.decode().split())
+            if self._ends is None and time.monotonic() >= self._plug_at:
+                self.plug()
+            self._pass_bytes()
+            self._note()
+
+    def close(self) -> None:
+        """Hang up."""
+        self.pull()
+        self._log.close()
+
+    def _obey(self, words: list[str]) -> None:
+        match words:
+            case ["reset"]:
+                self.board.reset(self._now_ns())
+            case ["pull", seconds]:
+                self.pull()
+                self._plug_at = time.monotonic() + float(seconds)
+            case ["block", mask]:
+                self.board.touch(int(mask, 0))
+            case ["stop", opened]:
+                self.board.stop(opened == "1")
+
+    def _now_ns(self) -> int:
+        now_ns = time.monotonic_ns() - self._begun_ns
+        self.board.advance(now_ns)
+        return now_ns
+
+    def _pass_bytes(self) -> None:
+        now_ns = self._now_ns()
+        data = self._to_host.damage(self.board.line.arrived(now_ns))
+        if self._ends is None:
+            return
+        far = self._ends[0]
+        with contextlib.suppress(BlockingIOError):
+            self.board.receive(now_ns, self._to_board.damage(os.read(far, _CHUNK)))
+        with contextlib.suppress(BlockingIOError):  # nobody reads: a UART would not wait either
+            while data:
+                data = data[os.write(far, data) :]
+
+    def _note(self) -> None:
+        inside = self.board._controller
+        seen = (int(inside.phase), self.board.outputs())
+        if seen == self._seen:
+            return
+        if inside.drop is not None and (inside.phase, self._seen[0]) == (
+            Phase.HOLDING,
+            Phase.RECORDING,
+        ):
+            self._write({"drop": _told(inside.drop.certificate()), "events": _events(inside.drop)})
+        self._seen = seen
+        self._write({"at_s": time.monotonic(), "phase": seen[0], "outputs": seen[1]})
+
+    def _write(self, what: dict[str, Any]) -> None:
+        self._log.write(json.dumps(what) + "\n")
+
+
+def _told(certificate: Any) -> dict[str, int]:
+    names = ("label", "fire_tick", "events", "crc32", "overflows")
+    return {name: getattr(certificate, name) for name in names}
+
+
+def _events(drop: Any) -> list[tuple[int, int]]:
+    found: list[tuple[int, int]] = []
+    while part := drop.part(len(found), 40).events:
+        found += [(event.tick, event.state) for event in part]
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run until stdin ends.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    parser = argparse.ArgumentParser(prog="python -m sim.pty", description=__doc__)
+    parser.add_argument("--protocol", required=True, help="the scene whose chains fall")
+    parser.add_argument("--seed", default="0")
+    parser.add_argument("--link", type=Path, required=True, help="symbolic link to the terminal")
+    parser.add_argument("--log", type=Path, required=True, help="file for what happens")
+    parser.add_argument("dial", nargs="*", metavar="NAME=VALUE", help="as in a sim:// URL")
+    options = parser.parse_args(arguments)
+    dials = dict(text.split("=", 1) for text in options.dial)
+    scene = set_scene("sim", {"protocol": options.protocol, "seed": options.seed} | dials)
+    line = scene.line()
+    faults = [LineFaults(line["corrupt"], line["lose"], seed=2 * scene.seed + n) for n in (0, 1)]
+    board = VirtualBoard(scene.lab, scene.seed, ppm=scene.dials.clock * 1e6)
+    bench = Bench(board, options.link, options.log, (faults[0], faults[1]))
+    try:
+        print(options.link, flush=True)
+        bench.serve()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        bench.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

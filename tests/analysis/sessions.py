@@ -1,0 +1,40 @@
+"""Whole sessions straight from the simulated lab, and what they teach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+
+from rig.analysis.drop import fit_drop
+from rig.analysis.fit import Fit
+from rig.analysis.learn import Lesson, learn
+from rig.analysis.session import Analysis, analyze
+from sim.dials import Dials
+from tests.analysis.drops import SCENES, Case, case
+
+MILD = Dials(skew_sd=1e-3)  # no drop is void for its skew
+
+
+@cache
+def cases(
+    runs: tuple[int, ...], dials: Dials = MILD, seed: int = 1, scene: str = "uniform"
+) -> list[Case]:
+    return [case(SCENES[scene], dials, seed=seed, run=run) for run in runs]
+
+
+def fits(drops: Iterable[Case]) -> list[Fit]:
+    """Each drop by itself."""
+    found = [fit_drop(one.protocol, one.run, one.drop, one.scale) for one in drops]
+    assert all(result.verdict == "accepted" for result, _ in found)
+    return [fit for _, fit in found if fit is not None]
+
+
+@cache
+def lesson(
+    runs: tuple[int, ...], dials: Dials = MILD, seed: int = 1, scene: str = "uniform"
+) -> Lesson:
+    return learn(fits(cases(runs, dials, seed, scene)))
+
+
+def analysis(drops: list[Case]) -> Analysis:
+    return analyze(drops[0].protocol, [one.drop for one in drops], lambda _: drops[0].scale)

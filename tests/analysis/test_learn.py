@@ -1,0 +1,245 @@
+"""What a session teaches: against all equations solved at once, and against the hidden truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.components import STATED
+from rig.analysis.learn import FEWEST
+from rig.analysis.lesson_json import lesson_json
+from rig.analysis.normal import STRAY, normal
+from rig.analysis.quantities import measurands
+from rig.analysis.refine import Budgets
+from rig.analysis.session import analyze
+from sim.dials import Dials
+from sim.lab import ChainLab
+from tests.analysis.drops import UNIFORM, true_value, with_dials, wrong_rods
+from tests.analysis.sessions import MILD, analysis, cases, lesson
+
+FOUR = (1, 2, 3, 4)
+EIGHT = tuple(range(1, 9))
+
+
+class Whole:
+    """All equations of all drops in one matrix, nothing eliminated, in prior units."""
+
+    def __init__(self, taught) -> None:
+        self.taught = taught
+        size = len(taught.shared)
+        self.columns = []
+        for drop in taught.drops:
+            place = np.empty(drop.x.size, dtype=int)
+            place[drop.common] = drop.here
+            place[drop.own] = size + np.arange(drop.own.size)
+            size += drop.own.size
+            self.columns.append(place)
+        self.data = np.zeros((size, size))
+        self.vector = np.zeros(size)
+        self.x = np.zeros(size)
+        self.group = np.empty(size, dtype=object)
+        for drop, place in zip(taught.drops, self.columns, strict=True):
+            sd = drop.model.unknowns.sd
+            found = normal(drop.model, drop.matches, drop.x, sd, cut=STRAY)
+            self.data[np.ix_(place, place)] += found.matrix
+            self.vector[place] += found.vector
+            self.x[place] = np.divide(drop.x, sd, out=np.zeros_like(sd), where=sd > 0)
+            for name, blocks in drop.model.unknowns.groups.items():
+                for block in blocks:
+                    self.group[place[block]] = name
+        self.inverse = np.linalg.inv(self.data + np.eye(size))
+
+
+def test_eliminating_drop_by_drop_is_solving_all_at_once():
+    taught = lesson(FOUR)
+    assert taught.settled
+    whole = Whole(taught)
+    size = len(taught.shared)
+    # Steps end when they are below 2 % of a standard uncertainty.
+    left = whole.inverse @ (whole.vector + whole.x) / np.sqrt(np.diag(whole.inverse))
+    assert np.abs(left).max() < 0.1
+    np.testing.assert_allclose(whole.inverse[:size, :size], taught.covariance, rtol=2e-2, atol=2e-4)
+    budgets = Budgets(taught)
+    for drop, place in zip(taught.drops, whole.columns, strict=True):
+        found = budgets.measured(drop)
+        for name, (value, gradient) in measurands(drop.model, drop.x).items():
+            full = np.zeros(whole.x.size)
+            full[place] = gradient * drop.model.unknowns.sd
+            influence = whole.inverse @ full
+            assert found[name].value == value
+            assert found[name].u == pytest.approx(math.sqrt(full @ influence), rel=2e-2)
+            for group in set(whole.group) - {"edges"}:
+                part = np.linalg.norm(influence[whole.group == group])
+                assert found[name].budget.get(group, 0.0) == pytest.approx(
+                    part, rel=5e-2, abs=1e-3 * found[name].u
+                )
+
+
+def test_a_session_s_budgets_add_up():
+    taught = lesson(EIGHT)
+    budgets = Budgets(taught)
+    for drop in taught.drops:
+        for measured in budgets.measured(drop).values():
+            squares = sum(part**2 for part in measured.budget.values())
+            assert squares == pytest.approx(measured.u**2, rel=1e-9)
+            assert math.hypot(*measured.shared) < measured.u
+
+
+# χ² of the members, at 1 in 10⁴ each side; what an estimate of a standard deviation may be off.
+CHANCE = {"gates": 2.2, "rods": 1.5, "beam": 2.2, "hang": 2.1, "impulse": 1.3, "jitter": 1.05}
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_how_much_everything_scatters_is_found_whatever_was_stated(factor):
+    dials = replace(
+        MILD, gate_sd=factor * 0.2e-3, rod_sd=factor * 0.3e-3, beam_sd=factor * 0.5e-3,
+        hang_sd=factor * 0.1e-3, impulse_sd=factor * 0.04, jitter_sd=factor * 2e-6,
+    )  # fmt: skip
+    components = lesson(EIGHT, dials, 2).components
+    # All at 60°, where α is 0.0689: only the sum of both parts shows.
+    found = asdict(components) | {"impulse": components.impulses(0.0689119616602868) / 0.0689}
+    true = {
+        "gates": dials.gate_sd / UNIFORM.gates.height_u,
+        "rods": dials.rod_sd / UNIFORM.chains["A"].position_u,
+        "beam": dials.beam_sd, "hang": dials.hang_sd, "jitter": dials.jitter_sd,
+        "impulse": dials.impulse_sd,
+    }  # fmt: skip
+    for name, chance in CHANCE.items():
+        assert true[name] / chance < found[name] < true[name] * chance, name
+    assert found["floor"] < 5e-6  # the simulation has no scatter of this kind
+
+
+def test_the_rod_maps_and_the_beams_are_the_rig_s():
+    """Each found within its own uncertainty, and the odd rods' places far better than stated."""
+    taught = lesson(EIGHT, MILD, 3)
+    lab = ChainLab(UNIFORM, MILD, 3)
+    u = np.sqrt(np.diag(taught.covariance)) * taught.sd
+    truth = {
+        f"{name} rods": body.offsets - np.array(body.spec.chain.heights)
+        for name, body in lab.bodies.items()
+    }
+    truth["beams"] = np.array([lab.heights[g.channel] - g.height for g in UNIFORM.gates.gates])
+    for name, true in truth.items():
+        block = taught.shared.blocks[name]
+        assert np.abs(taught.x[block] - true).max() < 4.0 * u[block].max(), name
+    a = taught.shared.blocks["A rods"]
+    error = np.diff((taught.x[a] - truth["A rods"])[::2])
+    assert np.sqrt(np.mean(error**2)) < 0.02e-3  # of 0.3 mm stated, whatever the level
+    block = taught.shared.blocks["A width"]
+    width = lab.bodies["A"].widths[0] - UNIFORM.chains["A"].widths[0]
+    assert abs(taught.x[block][0] - width) < 4.0 * u[block][0]
+
+
+def test_intervals_hold_the_truth_and_are_not_too_wide():
+    """Sessions on ten rigs: shares by the binomial, mean squares of error over u by χ²."""
+    ratios: dict[str, list[list[float]]] = {}
+    for seed in range(11, 21):
+        drops = cases(FOUR, MILD, seed)
+        for one, result in zip(drops, analysis(drops).runs, strict=True):
+            assert result.learned
+            assert not wrong_rods(result, one.truth)
+            for name, measured in result.quantities.items():
+                error = measured.value - true_value(one.truth, name)
+                by_rig = ratios.setdefault(name, [])
+                if len(by_rig) < seed - 10:
+                    by_rig.append([])
+                by_rig[-1].append(error / measured.u)
+    for name, found in ratios.items():
+        means = np.array([np.mean(np.square(rig)) for rig in found])
+        # The drops of one rig may share their error: ten independent values at the least, forty
+        # at the most. χ² of 10 below 1.26 or above 37.3 once in 2000 each.
+        assert 0.126 < means.mean() < 3.73, name
+    for name in ("speed_m_s", "release_skew_s"):  # hardly shared: χ² of 40
+        squares = np.square(ratios[name]).ravel()
+        assert 16.9 < squares.sum() < 76.1, name
+
+
+def test_what_the_edges_do_not_tell_is_said():
+    found = {one["name"]: one for one in lesson_json(lesson(EIGHT))["unknowns"]}
+    assert not any(found["clock"]["identified"])  # pings know it better than a chain that falls
+    assert all(found["A width"]["identified"])
+    assert "gravity" not in found  # given exactly
+    for one in found.values():
+        assert all(0.0 < u <= p * (1 + 1e-9) for u, p in zip(one["u"], one["prior_u"], strict=True))
+
+
+def test_nothing_stated_is_used_where_the_session_tells():
+    """Twice the stated scatter of beams and hanging gives the same results, but for little."""
+    one, other = (analysis(cases(EIGHT, MILD, seed)).runs for seed in (4, 4))
+    assert [r.quantities for r in one] == [r.quantities for r in other]
+    doubled = replace(UNIFORM, gates=replace(UNIFORM.gates, height_u=0.6e-3))
+    again = analyze(
+        doubled, [c.drop for c in cases(EIGHT, MILD, 4)], lambda _: cases(EIGHT, MILD, 4)[0].scale
+    ).runs
+    for before, after in zip(one, again, strict=True):
+        for name, measured in before.quantities.items():
+            assert abs(after.quantities[name].value - measured.value) < 0.5 * measured.u
+            assert after.quantities[name].u == pytest.approx(measured.u, rel=0.15)
+
+
+def test_the_least_sure_calibration_counts_for_all():
+    drops = cases(FOUR)
+    unsure = drops[0].scale._replace(u=1e-4)
+
+    def mixed(drop):
+        return drops[0].scale if drop.run == 4 else unsure
+
+    raw = [one.drop for one in drops]
+    found, expected = (analyze(UNIFORM, raw, scale).runs for scale in (mixed, lambda _: unsure))
+    for one, other in zip(found, expected, strict=True):
+        for name, measured in one.quantities.items():
+            assert abs(measured.value - other.quantities[name].value) < 0.05 * measured.u
+            assert measured.u == pytest.approx(other.quantities[name].u, rel=0.02)
+
+
+def test_few_drops_teach_nothing():
+    drops = cases(FOUR)
+    few = analysis(drops[: FEWEST - 1])
+    assert few.lesson is None
+    assert not any(result.learned for result in few.runs)
+    assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in drops[:3]]
+    assert "learned" not in few.json()
+
+
+def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
+    drops = cases(EIGHT)
+    alone = [one.analyze() for one in drops]
+    bad = drops[5].with_edges(drops[5].drop.edges[::3])
+    found = analysis([*drops[:5], bad, *drops[6:]])
+    for n, (result, single) in enumerate(zip(found.runs, alone, strict=True)):
+        if n == 5:
+            assert (result.verdict, result.learned) == ("void", False)
+        else:
+            assert (result.verdict, result.reasons) == (single.verdict, single.reasons)
+            assert result.learned
+    rejected = analyze(
+        UNIFORM,
+        [one.drop for one in drops],
+        lambda _: drops[0].scale,
+        {(3, 1): ("the door slammed",)},
+    )
+    assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 5
+    assert len(rejected.lesson.drops) == 7
+
+
+@pytest.mark.parametrize("scene", ["single", "fence"])
+def test_simpler_scenes_learn_too(scene):
+    dials = Dials() if scene == "single" else with_dials(
+        rod_sd=0.05e-3, gate_sd=0.1e-3, jitter_sd=2e-6, hang_sd=1e-3, delay_sd=1e-3
+    )  # fmt: skip
+    drops = cases(FOUR, dials, 5, scene)
+    found = analysis(drops)
+    assert found.lesson is not None
+    for one, result in zip(drops, found.runs, strict=True):
+        assert result.learned
+        for name, measured in result.quantities.items():
+            assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u
+            assert measured.u < one.analyze().quantities[name].u
+
+
+def test_stated_components_are_what_a_drop_by_itself_takes():
+    one = cases(FOUR)[0]
+    assert one.analyze() == one.analyze(STATED)

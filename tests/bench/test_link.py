@@ -1,0 +1,22 @@
+"""The benchmark of the link measures what it says; how fast that is belongs to ./run bench."""
+
+from __future__ import annotations
+
+from rig.bench import link
+from rig.link.messages import EVENTS_PER_FRAME
+from rig.link.transcript import Received, Transcript
+
+
+def test_the_stream_is_what_a_board_sends():
+    transcript = Transcript()
+    found = transcript.feed("rx", 0, b"".join(link.frames(3)))
+    assert all(isinstance(one, Received) for one in found)
+    assert [one.message.first for one in found] == [0, EVENTS_PER_FRAME, 2 * EVENTS_PER_FRAME]
+    assert transcript.bad_frames == transcript.unreadable == 0
+
+
+def test_every_edge_arrives_and_takes_its_time():
+    rate, latencies = link.delivered(20, 2e-3)
+    assert len(latencies) == 20
+    assert min(latencies) > 0.0
+    assert 0.0 < rate < EVENTS_PER_FRAME / 2e-3 * 1.1

@@ -1,0 +1,30 @@
+"""``rig analyze --budget``."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.cli.lab import rig
+
+
+def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
+    done = rig("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["run"], found["monte_carlo"]["trials"]) == (1, 40)
+    for name, one in found["budget"].items():
+        assert sum(line["share"] for line in one["lines"]) == pytest.approx(1.0)
+        assert one["U95"] == pytest.approx(one["k"] * one["u"])
+        trial = found["monte_carlo"]["quantities"][name]
+        # χ² of 39, once in 10⁴ each side.
+        assert 0.6 < trial["u"] / found["by_itself"][name]["u"] < 1.45
+    table = rig("analyze", finished.session, "--budget", 1, "--trials", 2)
+    assert "beam heights" in table.stdout
+
+
+def test_a_run_that_is_not_there_is_bad_input(finished):
+    done = rig("analyze", finished.session, "--budget", 99)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "run 99" in done.stderr

@@ -1,0 +1,232 @@
+"""Which clock a result stands on: said by every run, the same whenever it is computed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from rig.calibration import calibration
+from rig.daemon.station import Station
+from rig.link import messages as wire
+from rig.link.clock import SystemClock
+from rig.link.frames import Decoder
+from rig.link.hostwatch import HostWatch, Reading
+from rig.protocol import reader
+from rig.session.store import Session
+from tests.cli.test_replay import tamper
+
+PING, REFERENCE, STATUS = (wire.CODES[kind] for kind in (wire.Ping, wire.Reference, wire.Status))
+ARM, FIRE = wire.CODES[wire.Arm], wire.CODES[wire.Fire]
+CERTIFICATE, DISARMED = wire.CODES[wire.DropCertificate], wire.CODES[wire.Disarmed]
+S = 10**9
+
+
+@pytest.fixture
+def measure(call, tmp_path, fence):
+    """Run a fence on a simulated port and return its session and JSON."""
+
+    def measure(dials="", name="s", protocol=fence):
+        session = tmp_path / name
+        done = call("run", protocol, "--port", f"sim://{dials}", "--session", session, "--json")
+        assert done.code == 0, done.err
+        return session, json.loads(done.out)
+
+    return measure
+
+
+def test_every_result_says_its_calibration_and_says_it_again(measure, call):
+    session, found = measure()
+    said = found["calibration"]
+    assert said["source"] == "pings"
+    assert abs(said["rate_ppm"] + 1300.0) < 4.0 * said["u_ppm"] < 100.0
+    assert said["pings"] > 8
+    assert (said["epochs"], said["host_breaks"]) == (1, 0)
+    assert said["gravity"]["agrees"]
+    for run in found["runs"]:
+        assert run["calibration"]["source"] == "pings"
+        assert abs(run["calibration"]["rate_ppm"] + 1300.0) < 4.0 * run["calibration"]["u_ppm"]
+    for _ in range(2):
+        assert json.loads(call("analyze", session, "--json").out) == found
+    assert call("replay", session).out.splitlines()[-1] == "identical"
+    line = call("analyze", session).out.splitlines()[-1]
+    assert line.startswith("time scale: board −1")
+    assert line.endswith(f"from {said['pings']} clock samples by the host's clock")
+
+
+def test_a_long_session_stands_on_its_reference_and_on_what_the_protocol_says_of_it(
+    measure, call, tmp_path, fence
+):
+    text = fence.read_text("utf-8").replace("settle: 1 s", "settle: 30 s")
+    for name, stated in (("gps", ""), ("poor", "reference: 3 ppm\n")):
+        protocol = tmp_path / f"{name}.yaml"
+        protocol.write_text(text + stated, "utf-8")
+        session, found = measure("?reference=0.05ppm", name, protocol)
+        said = found["calibration"]
+        with Session.open(session, readonly=True) as opened:
+            pulses = len(opened.pulses())
+        assert said["source"] == ("reference" if name == "gps" else "pings"), "the better known"
+        assert said["pulses"] == pulses >= 5
+        assert all(run["calibration"]["source"] == said["source"] for run in found["runs"])
+        if name == "gps":
+            assert said["rate_ppm"] == pytest.approx(-1300.05, abs=0.02)
+            assert said["u_ppm"] == pytest.approx(0.1, rel=0.1)
+            assert said["clock_u_ppm"] == pytest.approx(0.1)
+        assert f"reference pulses: {pulses} identical" in call("replay", session).out
+        changed = session.with_name("changed")
+        changed.write_bytes(session.read_bytes())
+        tamper(changed, "UPDATE reference SET tick = tick + 9 WHERE id = 1")
+        assert "reference pulses" in call("replay", changed).out.splitlines()[-1]
+
+
+def test_a_drifting_clock_gives_each_run_its_own_rate(measure, tmp_path, fence):
+    text = fence.read_text("utf-8").replace("settle: 1 s", "settle: 60 s")
+    protocol = tmp_path / "long.yaml"
+    protocol.write_text(text.replace("repeats: 2", "repeats: 6"), "utf-8")
+    session, found = measure("?drift=600ppm&seed=2", "d", protocol)
+    rates = [run["calibration"]["rate_ppm"] for run in found["runs"]]
+    assert len(rates) == 6
+    for one, two in pairwise(rates):
+        assert two - one == pytest.approx(600.0 * 61.5 / 3600.0, abs=4.0)
+    assert found["calibration"]["wander_ppm_sqrt_h"] > 10.0
+    assert any("wanders" in note for note in found["calibration"]["notes"])
+    with Session.open(session, readonly=True) as opened:
+        clock = calibration(opened)
+        *_, last = drops = list(opened.drops())
+    fired = [clock.falls.when(drop) for drop in drops]
+    for run, when in zip(found["runs"], fired, strict=True):
+        true = -1300.0 + 600.0 * when / 3600.0
+        used = run["calibration"]
+        assert abs(used["rate_ppm"] - true) < 4.0 * used["u_ppm"] < 16.0
+    lost = clock.used(replace(last, attempt=7))  # nobody logged when
+    assert lost["rate_ppm"] == pytest.approx(found["calibration"]["rate_ppm"])
+    assert lost["u_ppm"] > 10.0
+
+
+def test_gravity_that_is_not_the_places_is_said(measure, call, tmp_path, fence):
+    text = fence.read_text("utf-8")
+    assert "gravity: 9.81" in text
+    session, _ = measure()
+    wrong = session.with_name("wrong")
+    wrong.write_bytes(session.read_bytes())
+    tamper(wrong, "UPDATE protocol SET text = replace(text, 'gravity: 9.81', 'gravity: 9.91')")
+    found = json.loads(call("analyze", wrong, "--json").out)
+    assert not found["calibration"]["gravity"]["agrees"]
+    assert found["calibration"]["gravity"]["normalized_error"] < -1.0
+    assert "the free chain falls with 9.8" in call("analyze", wrong).out.splitlines()[-1]
+
+
+def test_nothing_asks_for_the_time_from_arming_to_the_certificate(finished):
+    """Only what keeps the device armed, and what fires: by the bytes themselves."""
+    decoders = {"tx": Decoder(), "rx": Decoder()}
+    armed, during, idle = False, [], []
+    with Session.open(finished.session, readonly=True) as session:
+        for _, direction, data in session.byte_log():
+            for frame in decoders[direction].feed(data):
+                if frame.type == ARM:
+                    armed = True
+                if direction == "tx":
+                    (during if armed else idle).append(frame.type)
+                if frame.type in {CERTIFICATE, DISARMED}:
+                    armed = False
+    assert during.count(FIRE) == 4
+    assert set(during) <= {ARM, FIRE, STATUS}
+    assert {PING, REFERENCE} <= set(idle)
+
+
+def test_a_waiting_station_keeps_the_device_armed_without_clock_samples(tmp_path, fence):
+    protocol = reader.read(fence)
+    with (
+        Session.create(
+            tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
+        ) as session,
+        Station(session, f"sim://?protocol={fence}") as station,
+    ):
+        station.wait(2.0)
+        token = station.arm(1, 1, protocol)
+        before = len(session.pings())
+        station.wait(3.0)
+        assert len(session.pings()) == before > 3
+        station.fire(token)
+        station.collect(1, 1)
+        station.wait(1.0)
+        assert len(session.pings()) > before
+
+
+class Sleepy(SystemClock):
+    """A host in virtual time that can sleep: its monotonic clock misses that."""
+
+    def __init__(self, port):
+        self.true, self.slept_ns = port.clock, 0
+
+    def now_ns(self):
+        return self.true.now_ns() - self.slept_ns
+
+    def sleep(self, seconds):
+        self.true.sleep(seconds)
+
+    def read(self):
+        true = self.true.now_ns()
+        return Reading(true - self.slept_ns, true, 10**18 + true)
+
+    def suspend(self, seconds):
+        self.true.sleep(seconds)
+        self.slept_ns += round(seconds * S)
+
+
+@pytest.mark.parametrize("seconds", [0.3, 5.0, 1000.0])
+def test_a_host_that_sleeps_between_samples_is_noticed(tmp_path, fence, monkeypatch, seconds):
+    protocol, hosts = reader.read(fence), []
+
+    def port_clock(port):
+        hosts.append(Sleepy(port))
+        return hosts[0]
+
+    monkeypatch.setattr("rig.daemon.station.port_clock", port_clock)
+    monkeypatch.setattr("rig.daemon.station.HostWatch", lambda: HostWatch(hosts[0].read))
+    with Session.create(
+        tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
+    ) as session:
+        with Station(session, f"sim://?protocol={fence}") as station:
+            station.wait(60.0)
+            hosts[0].suspend(seconds)
+            station.wait(60.0)
+        (found,) = session.host_breaks()
+        assert (found.slept_ns, found.stepped_ns) == (round(seconds * S), 0)
+        clock = calibration(session)
+    assert clock.said["host_breaks"] == 1
+    assert clock.said["epochs"] == 2
+    assert abs(clock.said["rate_ppm"] + 1300.0) < 4.0 * clock.said["u_ppm"] < 8.0
+    assert any("the host slept" in note for note in clock.said["notes"])
+
+
+def test_a_real_host_is_believed_no_further_than_its_quartz(tmp_path, fence):
+    """The same samples, said to be from a real port: 50 ppm/√3 for the computer's clock."""
+    protocol, scales = reader.read(fence), {}
+    for simulated in (True, False):
+        with Session.create(
+            tmp_path / f"{simulated}", protocol.text, "f", simulated=simulated, origin="x"
+        ) as session:
+            with Station(session, f"sim://?protocol={fence}") as station:
+                station.wait(60.0)
+            scales[simulated] = calibration(session).device
+    assert scales[True].u < 2e-6
+    assert scales[False].u == pytest.approx(50e-6 / 3**0.5, rel=0.01)
+    assert scales[False].hz == scales[True].hz
+
+
+def test_imported_edges_are_on_the_scale_that_was_stated(call, tmp_path, measure, fence):
+    session, _ = measure()
+    assert call("export", session, "--csv", tmp_path / "csv").code == 0
+    edges, again = tmp_path / "csv" / "edges.csv", tmp_path / "imported"
+    done = call("import", edges, "--protocol", fence, "--session", again, "--simulated",
+                "--clock-uncertainty", "20 ppm")  # fmt: skip
+    assert done.code == 0, done.err
+    found = json.loads(call("analyze", again, "--json").out)
+    stated = {"source": "stated", "rate_ppm": 0.0, "u_ppm": pytest.approx(20.0)}
+    assert all(run["calibration"] == stated for run in found["runs"])
+    assert {name: found["calibration"][name] for name in stated} == stated
+    line = call("analyze", again).out.splitlines()[-1]
+    assert line == "time scale: as the file gives it, ± 40 ppm (95 %)"

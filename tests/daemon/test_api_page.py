@@ -1,0 +1,42 @@
+"""API.md says what there is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from unittest.mock import Mock
+
+from rig.daemon import rpc
+from rig.daemon.faults import from_data
+from rig.daemon.hub import Hub
+from rig.daemon.lease import LEASE_S
+from rig.daemon.service import Service
+
+PAGE = (Path(__file__).parents[2] / "rig/daemon/API.md").read_text("utf-8")
+
+
+def rows(heading):
+    table = PAGE.partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    return re.findall(r"^\| `(\w+)`", table, re.MULTILINE)
+
+
+def test_every_method_is_on_the_page():
+    assert rows("Methods") == list(Service(Mock(), Mock())._methods)
+
+
+def test_every_section_is_on_the_page():
+    assert sorted(rows("State")) == sorted(Hub().snapshot()["state"])
+
+
+def test_every_kind_of_error_is_on_the_page():
+    kinds = re.search(r"^\| `kind` \| (.*) \|$", PAGE, re.MULTILINE).group(1)
+    for kind in re.findall(r"`(\w+)`", kinds):
+        data = {"kind": kind, "message": "m", "reason": "BUSY", "detail": 0}
+        assert type(from_data(data)).__name__ == kind
+
+
+def test_the_page_has_the_numbers():
+    assert f"Version {rpc.API}." in PAGE
+    assert f"not heard for {LEASE_S:g} s" in PAGE
+    assert rpc.REQUEST_LIMIT == 64 << 10
+    assert rpc.MESSAGE_LIMIT == 16 << 20

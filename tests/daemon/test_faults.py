@@ -1,0 +1,61 @@
+"""Kills, pulls and resets at random moments; `rig bench faults` does it hundreds of times."""
+
+from __future__ import annotations
+
+import resource
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from rig.bench.faults import KINDS, NOISE, disturbed
+from rig.bench.invariants import broken
+from rig.errors import SessionError
+from rig.link.messages import Phase
+from rig.session.store import Session
+
+
+def test_nothing_is_lost_whatever_dies():
+    with ThreadPoolExecutor(len(KINDS) + 1) as pool:
+        noise = pool.submit(disturbed, "daemon", 0, 5, runs=2, dials=NOISE)
+        made = [pool.submit(disturbed, kind, 2, 7, runs=2, longest_s=5.0) for kind in KINDS]
+        for tally in (noise.result(), *(one.result() for one in made)):
+            assert tally.broken == []
+            assert tally.longest_on_s < 0.25
+        assert [one.result().disturbed for one in made] == [2] * len(KINDS)
+
+
+def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(stand, client):
+    one = client("one")
+    one.take_control()
+    one.open_session(str(stand.protocol), str(stand.session))
+    one.fire(one.arm(1, 1))
+    full = stand.session.with_name("session-wal").stat().st_size
+    resource.prlimit(stand.daemon.pid, resource.RLIMIT_FSIZE, (full, resource.RLIM_INFINITY))
+    with pytest.raises(SessionError):
+        one.collect(1, 1)
+    state = one.call("subscribe")["state"]
+    assert state["phase"] == "trouble"
+    assert state["error"]["kind"] == "SessionError"
+    assert list(stand.happened())[-1]["phase"] == Phase.HOLDING
+    with Session.open(stand.session, readonly=True) as session:
+        assert session.drop(1, 1) is None, "it is readable, and does not claim to have the drop"
+    no_limit = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    resource.prlimit(stand.daemon.pid, resource.RLIMIT_FSIZE, no_limit)
+    stand.await_phase(Phase.IDLE)  # by itself, as soon as there is room
+    assert one.collect(1, 1).faults == ()
+    one.close()
+    assert stand.run() == 0, stand.told
+    assert broken(stand.session, stand.happened(), stand.runs) == []
+
+
+@pytest.mark.parametrize("content", [b"", b"not a session", b"SQLite format 3\0" + bytes(84)])
+def test_a_torn_or_foreign_file_does_not_block_the_next_session(stand, client, content):
+    one = client("one")
+    one.take_control()
+    foreign = stand.folder / "foreign"
+    foreign.write_bytes(content)
+    with pytest.raises(SessionError):
+        one.open_session(str(stand.protocol), str(foreign))
+    assert foreign.read_bytes() == content
+    one.open_session(str(stand.protocol), str(stand.session))
+    assert one.arm(1, 1)

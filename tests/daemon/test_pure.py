@@ -1,0 +1,184 @@
+"""Framing, errors as data, control, the hub and its mirror: what needs neither port nor clock."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.daemon import rpc
+from rig.daemon.faults import ControlError, StoppedError, VersionError, from_data, to_data
+from rig.daemon.hub import EDGES_LIMIT, Hub
+from rig.daemon.lease import LEASE_S, Lease
+from rig.daemon.mirror import Mirror
+from rig.errors import (
+    DeviceError,
+    DeviceTimeoutError,
+    DomainError,
+    InputError,
+    RigError,
+    SessionError,
+)
+from rig.link.messages import DisarmReason, Reason
+from rig.link.refusals import DeviceRefusedError
+
+ERRORS = [
+    RigError("something"),
+    InputError("a typo", "line 3"),
+    SessionError("the disk is full", "free some space"),
+    DeviceError("connection lost", "check the cable"),
+    DeviceTimeoutError("silent"),
+    DeviceRefusedError(Reason.GATE_BLOCKED, 0b101),
+    DeviceRefusedError(Reason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
+    ControlError("taken"),
+    StoppedError("stopped"),
+    VersionError("old"),
+]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_an_error_comes_out_as_it_went_in(error):
+    line = rpc.failure(7, error)
+    with pytest.raises(type(error)) as again:
+        rpc.result_of(json.loads(line))
+    assert type(again.value) is type(error)
+    assert str(again.value) == str(error)
+    assert again.value.exit_code == error.exit_code
+    for name in ("reason", "detail", "disarmed"):
+        assert getattr(again.value, name, None) == getattr(error, name, None)
+
+
+def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():
+    again = from_data(to_data(DomainError("Eq. 13 is singular")))
+    assert type(again) is InputError
+
+
+def test_an_error_of_a_kind_only_the_daemon_knows_is_an_error_all_the_same():
+    again = from_data({"kind": "NewerError", "message": "m", "hint": "h", "exit_code": 3})
+    assert (type(again), str(again), again.exit_code) == (RigError, "m\n  hint: h", 3)
+
+
+@given(st.binary(max_size=200))
+def test_any_line_is_a_request_or_is_refused_with_a_code(line):
+    with contextlib.suppress(rpc.RpcError):
+        assert rpc.read_request(line).method is not None
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        (b"{", rpc.PARSE),
+        (b"[" * 5000, rpc.PARSE),
+        (b"[]", rpc.INVALID),
+        (b'{"jsonrpc":"1.0","id":1,"method":"a"}', rpc.INVALID),
+        (b'{"jsonrpc":"2.0","id":true,"method":"a"}', rpc.INVALID),
+        (b'{"jsonrpc":"2.0","id":1,"method":2}', rpc.INVALID),
+        (b'{"jsonrpc":"2.0","id":1,"method":"a","params":[1]}', rpc.BAD_PARAMS),
+    ],
+)
+def test_what_is_no_request_gets_its_code(line, code):
+    with pytest.raises(rpc.RpcError) as refused:
+        rpc.read_request(line)
+    assert refused.value.code == code
+
+
+def test_a_request_is_read_as_it_was_written():
+    line = rpc.request("arm", {"run": 1, "attempt": 2}, 5)
+    assert rpc.read_request(line) == rpc.Request("arm", {"run": 1, "attempt": 2}, 5)
+    assert rpc.read_request(rpc.request("renew", {}, None)).id is None
+    assert line.count(b"\n") == 1
+
+
+class Time:
+    """A clock that is set by hand."""
+
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_one_client_has_control_until_it_is_not_heard():
+    time = Time()
+    lease = Lease(time)
+    lease.take("one", "rig run 1")
+    with pytest.raises(ControlError, match="rig run 1 has control"):
+        lease.take("two", "tui 2")
+    with pytest.raises(ControlError, match="rig run 1 has it"):
+        lease.require("two")
+    time.now = LEASE_S - 0.1
+    lease.heard("two")  # says nothing of the first
+    lease.heard("one")
+    time.now += LEASE_S - 0.1
+    lease.require("one")
+    time.now += 0.2
+    assert lease.holder is None
+    lease.heard("one")  # nobody took it meanwhile
+    assert lease.holder == "one"
+    time.now += LEASE_S
+    lease.take("two", "tui 2")
+    lease.heard("one")
+    assert lease.holder == "two"
+    assert not lease.release("one")
+    assert lease.release("two")
+    assert lease.holder is None
+
+
+def test_a_mirror_shows_what_the_hub_shows_whenever_it_is_looked_at():
+    """Random changes, taken at random moments, by one who joins at a random moment."""
+    for seed in range(20):
+        chance, hub, mirror = random.Random(seed), Hub(), None
+        hub.plan({"run": n, "state": "planned"} for n in range(5))
+        for _ in range(200):
+            match chance.randrange(6):
+                case 0:
+                    hub.set(gates={"blocked": chance.randrange(3)}, clients=chance.randrange(3))
+                case 1:
+                    hub.run(chance.randrange(7), state=chance.choice(["armed", "fired"]))
+                case 2:
+                    hub.edges((chance.randrange(99), 1, 0) for _ in range(chance.randrange(3)))
+                case 3 if chance.random() < 0.3:
+                    hub.replace_edges([(chance.randrange(9), 0, 1)])
+                case 4 if chance.random() < 0.1:
+                    hub.plan({"run": n, "state": "planned"} for n in range(chance.randrange(5)))
+                case _:
+                    change = hub.take()
+                    if mirror is None:
+                        mirror = Mirror()
+                        mirror.snapshot(json.loads(json.dumps(hub.snapshot())))
+                    elif change is not None:
+                        mirror.change(json.loads(json.dumps(change)))
+                    assert mirror.n == hub.snapshot()["n"]
+                    assert json.loads(json.dumps(hub.snapshot()["state"])) == mirror.state
+
+
+def test_a_change_that_changes_nothing_is_none():
+    hub, told = Hub(), []
+    hub.changed = lambda: told.append(1)
+    hub.set(clients=0)
+    hub.edges(())
+    hub.run(7, state="armed")
+    assert hub.take() is None
+    assert not told
+    hub.set(clients=1)
+    hub.set(clients=2)
+    assert told == [1], "once is enough until somebody has taken it"
+    assert hub.take() == {"n": 1, "set": {"clients": 2}}
+
+
+def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
+    hub = Hub()
+    for first in range(0, 2 * EDGES_LIMIT, 1 << 12):
+        hub.edges((tick, 0, 1) for tick in range(first, first + (1 << 12)))
+    assert len(hub.snapshot()["state"]["edges"]) == EDGES_LIMIT
+
+
+def test_a_mirror_does_not_swallow_a_gap():
+    mirror = Mirror()
+    mirror.snapshot({"n": 3, "state": {"edges": []}})
+    with pytest.raises(ValueError, match="change 5 behind 3"):
+        mirror.change({"n": 5})

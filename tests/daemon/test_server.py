@@ -1,0 +1,290 @@
+"""The door: who comes in, what is said there, and what a client that does not read costs."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import socket
+import stat
+import subprocess
+import sys
+
+import pytest
+
+from rig.bench.stand import Stand
+from rig.daemon import rpc
+from rig.daemon.aclient import AsyncClient
+from rig.daemon.client import Client
+from rig.daemon.faults import VersionError
+from rig.daemon.place import default_socket, prepare_folder
+from rig.daemon.server import Server, notify_systemd
+from rig.errors import DeviceError, InputError, RigError
+
+_SECTIONS = {
+    "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
+    "runs", "control", "clients", "error",
+}  # fmt: skip
+
+
+@pytest.fixture
+def door(tmp_path):
+    """Run a test inside the daemon's own loop: a daemon whose simulated port is still closed."""
+
+    def within(test, *, tcp=False):
+        async def run():
+            path = tmp_path / "door" / "rig.sock"
+            server, ready = Server("sim://", path, tcp=tcp), asyncio.Event()
+            serving = asyncio.get_running_loop().create_task(server.run(ready.set))
+            await asyncio.wait_for(ready.wait(), 5.0)
+            try:
+                await asyncio.wait_for(test(server, path), 20.0)
+            finally:
+                server.end()
+                await serving
+            assert not path.exists()
+
+        asyncio.run(run())
+
+    return within
+
+
+async def told(path, *lines):
+    """Send lines and return what comes back until the daemon hangs up, or for each line."""
+    reader, writer = await asyncio.open_unix_connection(path)
+    writer.write(b"".join(lines))
+    answers = []
+    with contextlib.suppress(ConnectionResetError):
+        for _ in lines:
+            answers.append(json.loads(await reader.readline() or b"null"))  # noqa: PERF401
+    answers += [None] * (len(lines) - len(answers))
+    writer.close()
+    return answers
+
+
+HELLO = rpc.request("hello", {"api": rpc.API, "client": "t"}, 1)
+
+
+def test_only_the_user_may_come_near(door):
+    async def test(server, path):
+        assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+    door(test)
+
+
+def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
+    tmp_path.chmod(0o755)
+    with pytest.raises(InputError, match="open to other users"):
+        prepare_folder(tmp_path)
+    with pytest.raises(InputError, match="open to other users"):
+        Client(tmp_path / "rig.sock", "t")
+
+
+def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
+    tmp_path.chmod(0o700)
+    monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
+    with pytest.raises(InputError, match="belongs to somebody else"):
+        prepare_folder(tmp_path)
+
+
+def test_another_user_is_not_served(door, monkeypatch):
+    async def test(server, path):
+        uid = os.getuid()
+        monkeypatch.setattr("rig.daemon.server.peer_uid", lambda _: uid + 1)
+        assert await told(path, HELLO) == [None]
+
+    door(test)
+
+
+def test_a_client_of_another_version_is_told_so_and_sent_away(door):
+    async def test(server, path):
+        skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
+        answer, end = await told(path, skewed, HELLO)
+        with pytest.raises(VersionError, match="version 2 of the daemon's interface"):
+            rpc.result_of(answer)
+        assert end is None
+
+    door(test)
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        (b"what?\n", rpc.PARSE),
+        (rpc.request("dance", {}, 2), rpc.NO_METHOD),
+        (rpc.request("arm", {"run": 1}, 2), rpc.BAD_PARAMS),
+        (rpc.request("fire", {"token": "x"}, 2), rpc.BAD_PARAMS),
+        (rpc.request("wait", {"seconds": -1}, 2), rpc.BAD_PARAMS),
+        (rpc.request("wait", {"seconds": float("nan")}, 2), rpc.BAD_PARAMS),
+        (rpc.request("subscribe", {"to": "all"}, 2), rpc.BAD_PARAMS),
+        (rpc.request("log_state", {"run": 1, "attempt": 1, "state": "fine", "reasons": []}, 2),
+         rpc.BAD_PARAMS),
+    ],
+)  # fmt: skip
+def test_nonsense_gets_its_code_and_the_next_request_its_answer(door, line, code):
+    async def test(server, path):
+        _, nonsense, answer = await told(path, HELLO, line, rpc.request("renew", {}, 3))
+        assert nonsense["error"]["code"] == code
+        assert answer["result"] == {}
+
+    door(test)
+
+
+def test_hello_comes_first(door):
+    async def test(server, path):
+        answer, end = await told(path, rpc.request("subscribe", {}, 1), HELLO)
+        assert answer["error"]["code"] == rpc.INVALID
+        assert end is None
+
+    door(test)
+
+
+def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
+    async def test(server, path):
+        reader, writer = await asyncio.open_unix_connection(path)
+        writer.write(HELLO + b"x" * (2 * rpc.REQUEST_LIMIT))
+        await reader.readline()
+        assert await reader.read() == b""
+        writer.close()
+        assert (await told(path, HELLO))[0]["result"]["api"] == rpc.API
+
+    door(test)
+
+
+def test_a_snapshot_has_every_section_that_is_promised(door):
+    async def test(server, path):
+        client = await AsyncClient.connect(path, "tui")
+        await client.subscribe()
+        assert set(client.mirror.state) == _SECTIONS
+        assert client.mirror.state["port"] == {"url": "sim://", "simulated": True}
+        assert client.mirror.state["clients"] == 1
+        await client.close()
+
+    door(test)
+
+
+def test_two_mirrors_follow_what_happens(door):
+    async def test(server, path):
+        clients = [await AsyncClient.connect(path, f"tui {n}") for n in range(2)]
+        await clients[0].subscribe()
+        server.hub.edges([(1, 0, 1)])
+        await clients[1].subscribe()
+        server.hub.edges([(2, 0, 0)])
+        await clients[0].call("take_control")
+        for client in clients:
+            while client.mirror.state["control"] is None:
+                changed = asyncio.Event()
+                client.changed = changed.set
+                await changed.wait()
+            assert client.mirror.state["edges"] == [[1, 0, 1], [2, 0, 0]]
+            assert client.mirror.state["control"] == {"client": "tui 0"}
+            await client.close()
+
+    door(test)
+
+
+def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_does(door):
+    async def test(server, path):
+        slow = socket.socket(socket.AF_UNIX)
+        slow.connect(str(path))
+        slow.sendall(HELLO + rpc.request("subscribe", {}, 2))
+        slow.setblocking(False)
+        while not any(one.subscribed for one in server.connections):
+            await asyncio.sleep(0)
+        (stuck,) = server.connections
+        quick = await AsyncClient.connect(path, "quick")
+        await quick.subscribe()
+        for number in range(400):
+            server.hub.set(error={"message": f"{number} " + "x" * 2000})
+            server.spread()
+            assert stuck.waiting() < 100_000
+            while not str((quick.mirror.state["error"] or {}).get("message")).startswith(
+                f"{number} "
+            ):
+                await asyncio.sleep(0)  # the other one is not slowed down
+        assert stuck.behind
+        data = b""
+        loop = asyncio.get_running_loop()
+        while b'"method":"snapshot"' not in data or not data.endswith(b"\n"):
+            data += await loop.sock_recv(slow, 1 << 20)
+        methods = [json.loads(line).get("method") for line in data.splitlines()]
+        last = json.loads(data.splitlines()[methods.index("snapshot")])["params"]
+        assert last["state"]["error"]["message"].startswith("399 ")
+        assert methods.count("change") < 400
+        slow.close()
+        await quick.close()
+
+    door(test)
+
+
+def test_over_tcp_the_token_is_asked_for(door):
+    async def test(server, path):
+        file = path.with_suffix(".tcp")
+        assert stat.S_IMODE(file.stat().st_mode) == 0o600
+        port = json.loads(file.read_text())["port"]
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(HELLO)
+        assert json.loads(await reader.readline())["error"]["message"] == "wrong token"
+        assert await reader.read() == b""
+        writer.close()
+        client = await AsyncClient.connect(path, "tui")
+        await client.subscribe()
+        await client.close()
+        blocking = await asyncio.to_thread(Client, path, "script")
+        assert await asyncio.to_thread(blocking.call, "renew") == {}
+        blocking.close()
+
+    door(test, tcp=True)
+
+
+def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
+    with Stand(runs=1) as stand:
+        stand.start_daemon()
+        first = stand.daemon
+        with pytest.raises(DeviceError, match="another daemon answers"):
+            stand.start_daemon()
+        stand.kill(stand.daemon)
+        stand.kill(first)
+        assert stand.socket.exists()
+        stand.start_daemon()
+        stand.client().close()
+
+
+def test_no_daemon_is_said_so(tmp_path):
+    tmp_path.chmod(0o700)
+    with pytest.raises(RigError, match="no daemon at"):
+        Client(tmp_path / "rig.sock", "t")
+    with pytest.raises(RigError, match="no daemon at"):
+        asyncio.run(AsyncClient.connect(tmp_path / "rig.sock", "t"))
+
+
+def test_the_usual_place(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/7")
+    assert str(default_socket()) == "/run/user/7/chainrig/rig.sock"
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert default_socket() == tmp_path / ".cache/chainrig/rig.sock"
+
+
+def test_systemd_is_told_when_it_asks(monkeypatch, tmp_path):
+    notify_systemd()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as there:
+        there.bind(str(tmp_path / "notify"))
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        notify_systemd()
+        assert there.recv(99) == b"READY=1"
+
+
+def test_a_run_without_a_daemon_does_not_load_asyncio(tmp_path):
+    program = (
+        "import sys; from rig.daemon.connecting import connect; "
+        "from rig.daemon.interrupts import Interrupts; "
+        "connect('sim://', print, Interrupts()); print('asyncio' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True,
+        env=os.environ | {"XDG_RUNTIME_DIR": str(tmp_path)},
+    )  # fmt: skip
+    assert done.stdout == "False\n"

@@ -1,0 +1,212 @@
+"""Facts as they are gathered from a computer and a board, and the command as a whole."""
+
+from __future__ import annotations
+
+import os
+import pty
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from rig.cli import main
+from rig.doctor.board import look_at_board
+from rig.doctor.computer import look_at_disk, look_at_port, look_at_session
+from rig.doctor.facts import Owner
+from rig.link.client import Device
+from rig.link.messages import Phase, pack_label
+from rig.session.store import Session
+from sim.controller import Controller
+from tests.flash.pty_board import PtyBoard
+from tests.selftest.benches import LoopedBoard, Wire, port_of
+
+MAINS = [(0.0005 + n * 0.01 + half * 0.004, 6, not half) for n in range(99) for half in (0, 1)]
+
+
+@pytest.fixture
+def terminal():
+    ends = pty.openpty()
+    yield os.ttyname(ends[1])
+    for end in ends:
+        os.close(end)
+
+
+@pytest.fixture
+def proc(tmp_path):
+    """A /proc with one process that holds a port."""
+
+    def make(pid, name, words, *paths):
+        folder = tmp_path / "proc" / str(pid)
+        (folder / "fd").mkdir(parents=True)
+        (folder / "comm").write_text(f"{name}\n")
+        (folder / "cmdline").write_bytes(b"\0".join(words) + b"\0")
+        for number, path in enumerate(paths):
+            (folder / "fd" / str(number)).symlink_to(path)
+        return tmp_path / "proc"
+
+    return make
+
+
+def test_who_has_a_port_open(terminal, proc):
+    proc(7, "sleep", [b"sleep"], "/dev/null")
+    folder = proc(4711, "screen", [b"screen", terminal.encode()], "/dev/null", terminal)
+    facts = look_at_port(terminal, folder)
+    assert facts.exists
+    assert facts.usable
+    assert [(owner.pid, owner.command) for owner in facts.owners] == [(4711, f"screen {terminal}")]
+    assert not facts.modem_manager
+
+
+def test_modem_manager_and_what_udev_tells_it(terminal, proc, tmp_path):
+    folder = proc(9, "ModemManager", [b"/usr/sbin/ModemManager"])
+    udev = tmp_path / "udev"
+    udev.mkdir()
+    facts = look_at_port(terminal, folder, udev)
+    assert facts.modem_manager
+    assert not facts.left_alone
+    number = Path(terminal).stat().st_rdev
+    account = udev / f"c{os.major(number)}:{os.minor(number)}"
+    account.write_text("E:ID_BUS=usb\nE:ID_MM_DEVICE_IGNORE=1\n")
+    assert look_at_port(terminal, folder, udev).left_alone
+
+
+def test_a_port_that_is_not_there(tmp_path):
+    facts = look_at_port(str(tmp_path / "ttyACM0"))
+    assert (facts.exists, facts.usable, facts.group, facts.owners) == (False, False, "", ())
+
+
+def test_room_where_a_session_will_be(tmp_path):
+    facts = look_at_disk(tmp_path / "not" / "yet")
+    assert facts.folder == str(tmp_path)
+    assert facts.free > 0
+
+
+def test_a_session(tmp_path):
+    path = tmp_path / "s.session"
+    Session.create(path, "x", "x.yaml", simulated=True, origin="x").close()
+    assert look_at_session(str(path)).whole
+    connection = sqlite3.connect(path)
+    connection.execute("DROP TRIGGER meta_no_delete")
+    connection.execute("DELETE FROM meta WHERE key = 'simulated'")
+    connection.commit()
+    connection.execute("VACUUM")
+    connection.close()
+    facts = look_at_session(str(path))
+    assert not facts.whole
+    assert facts.first_trouble.startswith("whether it is simulated")
+
+
+# -- a board
+
+
+def lab(*changes):
+    wire = Wire()
+    wire.changes = list(changes)
+    return wire
+
+
+def test_quiet_gates_are_recorded_and_nothing_is_driven():
+    board = LoopedBoard(lab())
+    port = port_of(board)
+    facts = look_at_board(port, port.clock)
+    assert facts.edges == ()
+    assert facts.held is None
+    assert len(facts.pings) > 30
+    assert board.outputs() == 0
+    assert Device(port, port.clock).status().phase is Phase.IDLE
+
+
+def test_edges_of_a_flickering_gate_are_seen():
+    port = port_of(LoopedBoard(lab(*MAINS)))
+    facts = look_at_board(port, port.clock)
+    assert {edge.channel for edge in facts.edges} == {6}
+    assert len(facts.edges) == len(MAINS)
+
+
+def test_a_blocked_gate_is_left_out(monkeypatch):
+    class Stuck(Controller):
+        def _status(self):
+            self.gates |= 2
+            return super()._status()
+
+    monkeypatch.setattr("sim.board.Controller", Stuck)
+    port = port_of(LoopedBoard(lab()))
+    facts = look_at_board(port, port.clock)
+    assert facts.states.stuck == 2
+    assert facts.edges == ()
+
+
+def test_an_open_stop_leaves_a_glance():
+    board = LoopedBoard(lab())
+    board.stop(True)
+    port = port_of(board)
+    facts = look_at_board(port, port.clock)
+    assert facts.edges is None
+    assert "emergency stop" in facts.unwatched
+
+
+def test_a_drop_of_a_session_is_not_touched():
+    port = port_of(LoopedBoard(lab()))
+    device = Device(port, port.clock)
+    device.connect()
+    label = pack_label(3, 1)
+    order = {"gates": 8, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
+    device.fire(device.arm(label=label, **order))
+    device.collect(label)
+    facts = look_at_board(port, port.clock)
+    assert facts.held == (3, 1)
+    assert facts.edges is None
+    assert device.status().label == label
+
+
+# -- the command
+
+
+@pytest.fixture
+def doctor(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+
+    def call(*arguments):
+        code = main(["doctor", *map(str, arguments)])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+def test_a_board_at_a_terminal(doctor):
+    with PtyBoard() as there:
+        code, out, err = doctor("--port", there.path)
+    assert code == 0, out
+    assert f"permission for {there.path}: given" in out
+    assert "flickering gates: none within 1 s" in out
+    assert err == ""
+
+
+def test_nobody_at_a_port(doctor, terminal):
+    code, out, err = doctor("--port", terminal)
+    assert code == 4
+    assert "board: the device did not answer Identify\n  do: " in out
+    assert err == "1 thing to do\n"
+
+
+def test_a_port_that_somebody_uses_is_not_opened(doctor, terminal, monkeypatch):
+    def fail(url):
+        raise AssertionError(f"{url} was opened")
+
+    monkeypatch.setattr("rig.commands.doctor.open_port", fail)
+    monkeypatch.setattr("rig.doctor.computer._owners", lambda *_: [Owner(5, "screen")])
+    code, out, _ = doctor("--port", terminal)
+    assert code == 4
+    assert "screen (process 5)" in out
+    assert "board: not asked" in out
+
+
+def test_without_a_port_nothing_is_opened_and_a_damaged_session_is_said(doctor, tmp_path):
+    (tmp_path / "s").write_text("no session")
+    code, out, _ = doctor("--session", tmp_path / "s")
+    assert code == 4
+    assert "not a session: there is nothing of a session in it\n  do: " in out
+    assert doctor()[0] == 0
+    assert doctor("--session", tmp_path / "none")[0] == 4

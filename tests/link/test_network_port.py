@@ -1,0 +1,109 @@
+"""Ports at another computer, and pyserial's other URLs."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import pytest
+from serial import SerialException
+
+from rig.errors import DeviceError, DeviceTimeoutError
+from rig.link.client import Device
+from rig.link.port import open_port, port_clock
+from sim.board import VirtualBoard
+from tests.link.bench import LABEL, ScriptedLab, falling_rods
+from tests.link.talk import arm
+from tests.link.tcp_bridge import TcpBridge
+
+
+@pytest.fixture
+def bridge():
+    board = VirtualBoard(ScriptedLab(changes=falling_rods()), seed=1)
+    with TcpBridge(board) as bridge:
+        yield bridge
+
+
+def connected(url, tap=None):
+    port = open_port(url)
+    device = Device(port, port_clock(port), tap)
+    device.connect(boot_wait_s=0.5)
+    return port, device
+
+
+def test_a_drop_comes_whole_over_tcp_and_outlives_a_reconnect(bridge):
+    chunks = []
+    port, device = connected(bridge.url, lambda *chunk: chunks.append(chunk))
+    device.fire(arm(device))
+    drop = device.collect(LABEL)
+    port.close()
+    assert drop.faults == ()
+    assert len(drop.edges) == len(falling_rods())
+    received = [data for direction, _, data in chunks if direction == "rx"]
+    assert sum(map(len, received)) / len(received) > 8  # not byte by byte
+    port, again = connected(bridge.url)
+    assert again.fetch(LABEL) == drop
+    port.close()
+
+
+def test_what_has_arrived_is_counted_and_nothing_is_waited_for(bridge):
+    port, _ = connected(bridge.url)
+    assert port.in_waiting == 0
+    begun = time.monotonic()
+    assert port.read(1) == b""
+    assert time.monotonic() - begun < 1.0
+    port.close()
+    with pytest.raises(OSError):
+        assert port.in_waiting
+
+
+def test_a_connection_that_ends_is_said(bridge):
+    port, device = connected(bridge.url)
+    bridge.end()
+    with pytest.raises(DeviceError, match=r"socket disconnected|reset by peer|Broken pipe"):
+        device.status()
+    port.close()
+
+
+def test_nothing_listens():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        number = free.getsockname()[1]
+    with pytest.raises(DeviceError, match=f":{number}: nothing listens there") as caught:
+        open_port(f"socket://127.0.0.1:{number}")
+    assert "HOST:PORT" in caught.value.hint
+
+
+@pytest.mark.parametrize("url", ["socket://lab", "socket://127.0.0.1:99999", "socket://"])
+def test_what_is_no_address(url):
+    with pytest.raises(DeviceError, match=f"cannot open {url}: ") as caught:
+        open_port(url)
+    assert "HOST:PORT" in caught.value.hint
+
+
+def test_no_such_computer(monkeypatch):
+    def nobody(*_args, **_kwargs):
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr("socket.create_connection", nobody)
+    with pytest.raises(DeviceError, match="there is no computer of that name"):
+        open_port("socket://nowhere.invalid:7000")
+
+
+def test_a_program_that_does_not_speak_rfc_2217(monkeypatch):
+    said = "Remote does not seem to support RFC2217"
+
+    def fail(_port):
+        raise SerialException(said)
+
+    monkeypatch.setattr("serial.rfc2217.Serial.open", fail)
+    with pytest.raises(DeviceError, match=f"cannot open rfc2217://lab:7: {said}") as caught:
+        open_port("rfc2217://lab:7")
+    assert "firewall" in caught.value.hint
+
+
+def test_an_echo_is_no_board():
+    port = open_port("loop://")
+    with pytest.raises(DeviceTimeoutError, match="did not answer"):
+        Device(port, port_clock(port), tries=2).connect(boot_wait_s=0)
+    port.close()

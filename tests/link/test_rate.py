@@ -1,0 +1,142 @@
+"""The tick rate against the truth over many seeds, and against independent least squares."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from rig.link.rate import tick_rate
+from rig.records import Ping
+from tests.link.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
+
+TRIALS = 300
+FEWEST = int(binom.ppf(0.001, TRIALS, 0.95))  # of intervals that hold 95 %
+
+
+def errors(delay, trials=TRIALS, span=60.0, **clock):
+    """Error and standard uncertainty of the mean rate, ppm, and samples left out."""
+    found = []
+    for seed in range(trials):
+        board = Clock(seed, last=int(span) + 10, **clock)
+        pings = compared(board, seed, span, delay=delay)
+        rate = tick_rate(pings, HZ)
+        true = board.mean(pings[-1].host_recv_ns * 1e-9, pings[0].host_recv_ns * 1e-9)
+        found.append((ppm(rate.hz, true), rate.u_hz / HZ * 1e6, rate.outliers))
+    return np.array(found).T
+
+
+@pytest.mark.parametrize(
+    "delay", [exponential(), heavy(), stalled()], ids=["exponential", "heavy", "stalls"]
+)
+def test_after_a_minute_the_rate_is_known_to_5_ppm_and_its_uncertainty_is_true(delay):
+    error, u, _ = errors(delay)
+    assert np.abs(error).max() <= 5.0
+    assert u.max() <= 5.0
+    assert (np.abs(error) <= 1.96 * u).sum() >= FEWEST
+    assert u.mean() < 1.6 * error.std(), "nor is it far too careful"
+
+
+def test_stalls_cost_next_to_nothing():
+    plain, _, _ = errors(exponential(), 100)
+    error, _, _ = errors(stalled(0.05, 0.05), 100)
+    assert error.std() < 1.15 * plain.std()
+
+
+@pytest.mark.parametrize("walk", [0.0, 20.0, 300.0])
+def test_what_no_delay_explains_is_left_out_also_while_the_rate_wanders(walk):
+    rng = random.Random(3)
+    for seed in range(5):
+        board = Clock(seed, walk=walk, last=700)
+        pings = compared(board, seed, 600.0)
+        odd = rng.sample(range(10, len(pings) - 10), 5)
+        for n in odd:  # on fast trips, where nothing excuses it
+            ping = pings[n]
+            fast = ping._replace(host_recv_ns=ping.host_send_ns + 500_000)
+            pings[n] = fast._replace(tick=(board.tick(ping.host_send_ns * 1e-9) + 30_000) % 2**32)
+        rate = tick_rate(pings, HZ)
+        assert 5 <= rate.outliers <= 7
+        hz, u_hz = rate.at(300.0)
+        assert abs(ppm(hz, board.rate(300.0))) < 4.0 * u_hz / HZ * 1e6
+
+
+def test_a_straight_line_is_numpys_and_scipys():
+    """Equal trips have equal weights, and then it is the plain regression."""
+    board = Clock(1, last=100)
+    at = np.sort(np.random.default_rng(5).uniform(0.0, 60.0, 80))
+    noise = np.random.default_rng(6).uniform(-2e-4, 2e-4, 80)
+    pings = [
+        Ping(round(t * 1e9), round(t * 1e9) + 1_000_000, board.tick(t + 5e-4 + e))
+        for t, e in zip(at, noise, strict=True)
+    ]
+    middles = np.array([(p.host_send_ns + p.host_recv_ns) / 2e9 for p in pings])
+    ticks = np.unwrap([float(p.tick) for p in pings], period=2.0**32)
+    (slope, _), covariance = np.polyfit(middles, ticks - ticks[0], 1, cov=True)
+    rate = tick_rate(pings, HZ)
+    assert abs(rate.hz - slope) < 0.02 * np.sqrt(covariance[0, 0])
+    # Two readings of prior scatter (a quarter of the trip) are mixed into that of 80.
+    assert rate.u_hz == pytest.approx(np.sqrt(covariance[0, 0]), rel=0.05)
+    from scipy.stats import linregress
+
+    assert abs(rate.hz - linregress(middles, ticks).slope) < 0.05 * rate.u_hz
+
+
+def test_unequal_weights_are_those_of_weighted_least_squares():
+    """Two epochs, one slope: `scipy.linalg.lstsq` on whitened rows, with trips that differ."""
+    from scipy.linalg import lstsq
+
+    board = Clock(2, last=200)
+    one = compared(board, 1, 40.0)
+    two = [p._replace(tick=(p.tick + 999) % 2**32) for p in compared(board, 2, 40.0, begin=60.0)]
+    rate = tick_rate([*one, *two], HZ, [50 * 10**9])
+    rows, right = [], []
+    for number, pings in enumerate((one, two)):
+        trips = np.array([p.host_recv_ns - p.host_send_ns for p in pings]) * 1e-9
+        sigma = np.hypot((trips - trips.min()) / 2, trips.min() / 4)
+        ticks = np.unwrap([float(p.tick) for p in pings], period=2.0**32)
+        for p, s, tick in zip(pings, sigma, ticks - ticks[0], strict=True):
+            middle = (p.host_send_ns + p.host_recv_ns) / 2e9
+            rows.append(np.array([middle, number == 0, number == 1]) / s)
+            right.append((tick - HZ * middle) / s)
+    slope = lstsq(np.array(rows), np.array(right))[0][0]
+    assert rate.outliers == 0
+    assert abs(rate.hz - HZ - slope) < 0.05 * rate.u_hz
+
+
+SAMPLES = compared(Clock(4, last=100), 4, 50.0)
+RATE = tick_rate(SAMPLES, HZ)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    shift=st.integers(-(10**16), 10**17),
+    offset=st.integers(0, 2**32 - 1),
+    order=st.randoms(use_true_random=False),
+)
+def test_neither_hour_nor_count_nor_order_matters(shift, offset, order):
+    """Host clocks begin anywhere, counters too, and a file may be sorted as it likes."""
+    moved = [
+        Ping(p.host_send_ns + shift, p.host_recv_ns + shift, (p.tick + offset) % 2**32)
+        for p in SAMPLES
+    ]
+    order.shuffle(moved)
+    rate = tick_rate(moved, HZ)
+    assert (rate.n, rate.outliers) == (RATE.n, RATE.outliers)
+    assert abs(rate.hz - RATE.hz) < 1e-3 * RATE.u_hz
+    assert rate.u_hz == pytest.approx(RATE.u_hz, rel=1e-3)
+
+
+def test_twice_as_slow_a_board_is_a_scale():
+    """With all ticks halved the relative rate stays."""
+    halved = []
+    wide, last = SAMPLES[0].tick, SAMPLES[0].tick
+    for p in SAMPLES:
+        wide += (p.tick - last) % 2**32
+        last = p.tick
+        halved.append(p._replace(tick=wide // 2 % 2**32))
+    rate = tick_rate(halved, HZ // 2)
+    assert rate.hz / (HZ // 2) == pytest.approx(RATE.hz / HZ, abs=1e-9)

@@ -1,0 +1,113 @@
+"""The 1 Hz reference: seconds from pulses, whatever becomes of single ones."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.link import messages as wire
+from rig.link.epochs import epochs
+from rig.link.frames import Frame, encode
+from rig.link.rate import ping_rate, pulse_rate
+from rig.link.transcript import Transcript
+from rig.records import Ping, Pulse
+from tests.link.clocks import HZ, Clock, compared, ppm, seconds
+
+
+def measured(clock, pulses, pings=None):
+    samples = epochs(pings or compared(clock, 1, 120.0), HZ)
+    return pulse_rate(samples, pulses, ping_rate(samples))
+
+
+@pytest.mark.parametrize("every", [1, 7, 10])
+def test_a_minute_of_pulses_gives_the_rate_to_parts_in_a_thousand_million(every):
+    """Worst case: a tick lost at both ends, 2/(16e6·50) = 2.5 parts in 10⁹."""
+    for seed in range(20):
+        clock = Clock(seed, last=200)
+        pulses = seconds(clock, 10, 61)[::every]
+        rate = measured(clock, pulses, compared(clock, seed, 120.0))
+        assert rate.n == len(pulses)
+        assert abs(ppm(rate.hz, -1300e-6)) < 2.6e-3
+        assert abs(ppm(rate.hz, -1300e-6)) < 4.0 * rate.u_hz / HZ * 1e6 < 0.02
+
+
+def test_the_error_of_the_reference_is_that_of_the_rate():
+    clock = Clock(1, last=200)
+    rate = measured(clock, seconds(clock, 10, 60, ppm=0.5))
+    assert ppm(rate.hz, -1300e-6) == pytest.approx(-0.5, abs=5e-3)
+
+
+def test_the_count_may_wrap_and_the_same_pulse_be_told_twice():
+    clock = Clock(2, last=200)
+    pulses = seconds(clock, 10, 60, number=65_510)
+    again = [p._replace(host_send_ns=p.host_send_ns + 10**8, host_recv_ns=p.host_recv_ns + 10**8)
+             for p in pulses]  # fmt: skip
+    rate = measured(clock, pulses + again)
+    assert rate.n == 60
+    assert abs(ppm(rate.hz, -1300e-6)) < 3e-3
+
+
+def test_a_missed_pulse_and_one_too_many_begin_new_stretches():
+    clock = Clock(3, last=200)
+    pulses = seconds(clock, 10, 60)
+    missed = [p if n < 30 else p._replace(number=p.number - 1) for n, p in enumerate(pulses)]
+    surplus = [p if n < 30 else p._replace(number=p.number + 1) for n, p in enumerate(pulses)]
+    for wrong in (missed, surplus):
+        rate = measured(clock, wrong)
+        assert rate.n == 60
+        assert rate.span_s == pytest.approx(58.0, abs=0.1)
+        assert abs(ppm(rate.hz, -1300e-6)) < 5e-3
+
+
+def test_a_reference_that_was_taken_away_says_nothing_more():
+    clock = Clock(4, last=200)
+    pulses = seconds(clock, 10, 20)
+    last = pulses[-1]
+    stale = [
+        last._replace(host_send_ns=last.host_send_ns + n * 10**9 + 10**9,
+                      host_recv_ns=last.host_recv_ns + n * 10**9 + 10**9)
+        for n in range(1, 60)
+    ]  # fmt: skip
+    rate = measured(clock, pulses + stale)
+    assert (rate.n, rate.span_s) == (20, pytest.approx(19.0, abs=0.1))
+
+
+def test_noise_on_the_input_is_no_reference():
+    """Pulses at ten times the rate agree with no count of seconds."""
+    clock = Clock(5, last=200)
+    pulses = [p._replace(number=10 * p.number) for p in seconds(clock, 10, 60)]
+    rate = measured(clock, pulses)
+    assert (rate.n, rate.hz) == (0, HZ)
+
+
+def test_a_restart_of_the_board_begins_a_new_stretch():
+    one, two = Clock(6, last=200), Clock(7, last=200)
+    pings = compared(one, 1, 60.0) + compared(two, 2, 60.0, begin=70.0)
+    pulses = seconds(one, 5, 50) + seconds(two, 75, 50)
+    rate = measured(one, pulses, pings)
+    assert rate.n == 100
+    assert rate.span_s == pytest.approx(98.0, abs=0.1)
+    assert abs(ppm(rate.hz, -1300e-6)) < 5e-3
+
+
+def talk(*parts):
+    """Feed messages in turn; requests have seq 1, 2, …."""
+    transcript, found, seq = Transcript(), [], 0
+    for n, (direction, message, new) in enumerate(parts):
+        code, payload = wire.pack(message)
+        seq += direction == "tx" and new
+        numbers = (seq, 0) if direction == "tx" else (n + 1, seq)
+        frame = Frame(code, *numbers, payload)
+        records = transcript.feed(direction, 1000 * n, encode(frame))
+        found += [record for record in records if isinstance(record, Ping | Pulse)]
+    return found
+
+
+def test_pulses_come_out_of_the_bytes_and_repeats_do_not():
+    ask, answer = wire.Reference(), wire.ReferencePulse(12, 6_500_000)
+    assert talk(("tx", ask, True), ("rx", answer, True)) == [Pulse(0, 1000, 12, 6_500_000)]
+    assert talk(("tx", ask, True), ("tx", ask, False), ("rx", answer, True)) == []
+    # What is not wired has no pulse.
+    assert talk(("tx", ask, True), ("rx", wire.ReferencePulse(0, 0), True)) == []
+    ping, pong = wire.Ping(), wire.Pong(77)
+    both = talk(("tx", ping, True), ("rx", pong, True), ("tx", ask, True), ("rx", answer, True))
+    assert both == [Ping(0, 1000, 77), Pulse(2000, 3000, 12, 6_500_000)]

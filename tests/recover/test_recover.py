@@ -1,0 +1,369 @@
+"""What `rig recover` says of damaged sessions, and what it saves of them."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rig.cli import main
+from rig.errors import SessionError
+from rig.recover.drops import Fate
+from rig.recover.examine import describe, examine
+from rig.recover.pages import read_pages
+from rig.recover.rows import find_rows
+from rig.recover.save import save
+from rig.replay import replay
+from rig.session.store import Session
+
+ROOT = Path(__file__).parents[2]
+RUN = """
+import sys
+import rig.cli
+sys.exit(rig.cli.main(["run", "protocols/picket-fence.yaml", "--port", "sim://", "--seed", "1",
+                       "--yes", "--session", sys.argv[1]]))
+"""
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """Make a session of ten drops, in an interpreter of its own."""
+    path = tmp_path_factory.mktemp("sound") / "fence.session"
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, path], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode in {0, 3}, done.stderr
+    return path
+
+
+@pytest.fixture
+def copy(sound, tmp_path):
+    return Path(shutil.copy(sound, tmp_path / "copy.session"))
+
+
+def content(path):
+    """Everything raw that a session has."""
+    with Session.open(path, readonly=True) as session:
+        return {
+            "bytes": list(session.byte_log()),
+            "pings": session.pings(),
+            "drops": list(session.drops()),
+            "states": session.states(),
+            "identities": session.identities(),
+            "protocol": (session.protocol_source, session.protocol_text),
+            "simulated": session.simulated,
+            "origin": session.meta["origin"],
+        }
+
+
+@pytest.fixture(scope="module")
+def truth(sound):
+    return content(sound)
+
+
+def saved(path, folder, **options):
+    """Save what is left; give its content and what was said to be missing."""
+    new = folder / "new.session"
+    missing = save(examine(path), new, **options)
+    return content(new), missing
+
+
+def test_a_sound_session_is_whole_and_stays_as_it_is(copy, truth, tmp_path, capsys):
+    before = copy.read_bytes()
+    assert main(["recover", str(copy)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "everything is whole"
+    assert sum(line.endswith(str(Fate.CONFIRMED)) for line in lines) == len(truth["drops"])
+    assert copy.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == [copy.name]
+    again, missing = saved(copy, tmp_path)
+    assert missing == []
+    assert again == truth
+
+
+@pytest.mark.parametrize("part", [n / 12 for n in range(1, 12)])
+def test_a_torn_file_gives_what_is_before_the_tear(part, copy, truth, tmp_path):
+    size = round(copy.stat().st_size * part)
+    copy.write_bytes(copy.read_bytes()[:size])
+    found = examine(copy)
+    assert not found.whole
+    assert any("the file is torn" in what for what in found.damage)
+    again, missing = saved(copy, tmp_path, protocol=str(ROOT / "protocols/picket-fence.yaml"))
+    assert again["simulated"]
+    known = {(drop.run, drop.attempt): drop for drop in truth["drops"]}
+    by_key = {(one.drop.run, one.drop.attempt): one for one in found.drops}
+    for drop in again["drops"]:
+        key = drop.run, drop.attempt
+        if by_key[key].fate is Fate.PARTIAL:
+            assert drop.faults
+            assert any(what.startswith(f"run {key[0]}, attempt {key[1]}: ") for what in missing)
+        else:
+            assert drop == known[key]
+    assert set(again["bytes"]) <= set(truth["bytes"])
+    assert set(again["states"]) <= set(truth["states"]) or missing
+
+
+def test_the_further_the_tear_the_more_is_saved(copy, truth, tmp_path):
+    whole = copy.read_bytes()
+    counts = []
+    for pages in range(6, len(whole) // 4096 + 1, 5):
+        copy.write_bytes(whole[: pages * 4096])
+        fates = [one.fate for one in examine(copy).drops]
+        counts.append(sum(fate is not Fate.PARTIAL for fate in fates))
+    assert counts == sorted(counts)
+    assert 0 < counts[-2] <= counts[-1] == len(truth["drops"])
+
+
+def test_edges_that_are_lost_come_again_from_the_bytes(copy, truth, tmp_path):
+    connection = sqlite3.connect(copy)
+    connection.execute("DROP TRIGGER edge_no_delete")
+    connection.execute('DELETE FROM edge WHERE "drop" = 2 AND idx > 3')
+    connection.execute('DELETE FROM edge WHERE "drop" = 3')
+    connection.execute("DROP TRIGGER edge_no_update")
+    connection.execute('UPDATE edge SET tick = tick + 64 WHERE "drop" = 4 AND idx = 5')
+    connection.commit()
+    connection.execute("VACUUM")  # nothing of it is left in a free page
+    connection.close()
+    fates = [one.fate for one in examine(copy).drops]
+    assert fates[:5] == [Fate.CONFIRMED, *[Fate.RESTORED] * 3, Fate.CONFIRMED]
+    again, missing = saved(copy, tmp_path)
+    assert again == truth
+    assert missing == []
+    with Session.open(tmp_path / "new.session", readonly=True) as session:
+        assert replay(session).lines[-1] == "identical"
+
+
+def test_a_drop_that_is_lost_whole_comes_again_from_the_bytes(copy, truth, tmp_path):
+    connection = sqlite3.connect(copy)
+    for table, column in (("edge", '"drop"'), ("drop", "id")):
+        connection.execute(f"DROP TRIGGER {table}_no_delete")
+        connection.execute(f'DELETE FROM "{table}" WHERE {column} = 5')
+    connection.commit()
+    connection.execute("VACUUM")
+    connection.close()
+    found = examine(copy)
+    assert "1 drops" in found.lost
+    again, _ = saved(copy, tmp_path)
+    key = lambda drop: (drop.run, drop.attempt)  # noqa: E731
+    assert sorted(again["drops"], key=key) == sorted(truth["drops"], key=key)
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_no_flipped_bit_changes_a_drop_unnoticed(seed, copy, truth, tmp_path):
+    chance = random.Random(seed)
+    data = bytearray(copy.read_bytes())
+    for _ in range(chance.choice([1, 1, 3, 30])):
+        data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+    copy.write_bytes(data)
+    found = examine(copy)
+    assert describe(found)
+    known = {(drop.run, drop.attempt): drop for drop in truth["drops"]}
+    sure = {Fate.CONFIRMED, Fate.RESTORED}
+    for one in found.drops:
+        if one.fate in sure:
+            assert one.drop == known[one.drop.run, one.drop.attempt]
+    again, _ = saved(copy, tmp_path, protocol=str(ROOT / "protocols/picket-fence.yaml"))
+    assert len(again["drops"]) >= len(truth["drops"]) - 2
+
+
+def test_a_page_of_zeros(copy, truth, tmp_path):
+    whole = copy.read_bytes()
+    for number in range(1, len(whole) // 4096, 7):
+        copy.write_bytes(whole[: number * 4096] + bytes(4096) + whole[(number + 1) * 4096 :])
+        assert len(describe(examine(copy))) > 5
+
+
+def test_without_its_first_page_the_rest_is_read(copy, truth, tmp_path):
+    copy.write_bytes(bytes(4096) + copy.read_bytes()[4096:])
+    found = examine(copy)
+    assert found.damage
+    again, _ = saved(copy, tmp_path)
+    assert again["drops"] == truth["drops"]
+
+
+# -- the log beside the file
+
+
+WRITE = """
+import os, sys
+from rig.link.messages import Status
+from rig.records import Drop, Edge
+from rig.session.schema import RunState
+from rig.session.store import Session
+session = Session.create(sys.argv[1], "protocol: 1", "p.yaml", simulated=False, origin="x")
+for run in range(1, 30):
+    edges = tuple(Edge(1000 * n, n % 3, n % 2 == 0) for n in range(50))
+    session.add_drop(Drop(run, 1, 16_000_000, edges), provenance="import")
+    session.add_state(run, 1, RunState.RECORDED, run)
+    session.commit()
+print("ready", flush=True)
+if sys.argv[2] == "die":
+    os._exit(9)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """Leave a session as a killed process does."""
+    path = tmp_path / "killed.session"
+    subprocess.run([sys.executable, "-c", WRITE, path, "die"], cwd=ROOT, check=False)
+    log = path.with_name("killed.session-wal")
+    assert log.stat().st_size > 4096
+    return path, log
+
+
+def test_what_is_in_the_log_only_is_read_and_left_there(killed):
+    path, log = killed
+    before = path.read_bytes(), log.read_bytes()
+    found = examine(path)
+    assert found.whole
+    assert [one.drop.run for one in found.drops] == list(range(1, 30))
+    assert any("commits are in the log beside it" in line for line in describe(found))
+    assert (path.read_bytes(), log.read_bytes()) == before
+
+
+def test_without_its_log_a_session_is_poorer_and_says_what_to_look_for(killed):
+    path, log = killed
+    log.unlink()
+    found = examine(path)
+    assert found.whole
+    assert found.drops == []
+    assert "-wal" in describe(found)[-1]
+
+
+@pytest.mark.parametrize("part", [0.1, 0.4, 0.77, 0.99])
+def test_a_torn_log_counts_up_to_its_last_whole_commit(part, killed):
+    path, log = killed
+    log.write_bytes(log.read_bytes()[: round(log.stat().st_size * part)])
+    found = examine(path)
+    assert not found.foreign
+    runs = [one.drop.run for one in found.drops]
+    assert runs == list(range(1, len(runs) + 1))
+    connection = sqlite3.connect(path)  # SQLite is the judge of what was committed
+    assert connection.execute('SELECT count(*) FROM "drop"').fetchone() == (len(runs),)
+    connection.close()
+
+
+def test_a_damaged_log_counts_up_to_the_damage(killed):
+    path, log = killed
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 1
+    pages = read_pages(path.read_bytes(), bytes(data))
+    assert 0 < len(find_rows(pages).drop) < 29
+
+
+def test_a_session_that_is_being_written(tmp_path):
+    path = tmp_path / "live.session"
+    command = [sys.executable, "-c", WRITE, path, "wait"]
+    with subprocess.Popen(command, cwd=ROOT, stdin=-1, stdout=-1, text=True) as writer:
+        assert writer.stdout.readline() == "ready\n"
+        found = examine(path)
+        said = describe(found)
+        writer.stdin.close()
+    assert found.whole
+    assert len(found.drops) == 29
+    assert any(f"being written by process {writer.pid}" in line for line in said)
+
+
+def test_a_lock_that_a_dead_process_left_says_nothing(copy):
+    copy.with_name(copy.name + ".lock").write_text("4711\n")
+    assert examine(copy).snapshot.writer == ""
+
+
+# -- what is no session
+
+
+def database(path):
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE TABLE t (a, b)")
+    connection.execute("INSERT INTO t VALUES (1, 2)")
+    connection.commit()
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (database, "it is another program's SQLite database"),
+        (lambda path: path.touch(), "it is empty"),
+        (lambda path: path.write_text("protocol: 1\n" * 999), "nothing of a session in it"),
+        (lambda path: path.write_bytes(random.Random(1).randbytes(50_000)), "nothing of a session"),
+        (lambda path: path.write_bytes(b"SQLite format 3\0"), "nothing of a session"),
+    ],
+)
+def test_what_is_no_session(make, says, tmp_path, capsys):
+    path = tmp_path / "thing"
+    make(path)
+    assert main(["recover", str(path)]) == 2
+    assert f"not a session: {says}" in capsys.readouterr().out or says in str(examine(path).foreign)
+    assert main(["recover", str(path), "-o", str(tmp_path / "new")]) == 2
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("name", ["nothing.session", "."])
+def test_what_cannot_be_read(name, tmp_path):
+    with pytest.raises(SessionError):
+        examine(tmp_path / name)
+
+
+def test_a_session_of_a_newer_rig_is_left_alone(copy):
+    connection = sqlite3.connect(copy)
+    connection.execute("PRAGMA user_version = 99")
+    connection.close()
+    assert "newer rig" in examine(copy).foreign
+
+
+def test_a_file_that_may_only_be_read(copy, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)  # root may write everything
+    assert any("may not be written" in line for line in describe(examine(copy)))
+
+
+# -- what must be given, and what is guessed
+
+
+def without(path, *keys):
+    connection = sqlite3.connect(path)
+    connection.execute("DROP TRIGGER meta_no_delete")
+    connection.execute("DROP TRIGGER protocol_no_delete")
+    connection.execute("DROP TRIGGER identity_no_delete")
+    if "identity" in keys:
+        connection.execute("DELETE FROM identity")
+    if "protocol" in keys:
+        connection.execute("DELETE FROM protocol")
+    connection.execute("DELETE FROM meta WHERE key = 'simulated'")
+    connection.commit()
+    connection.execute("VACUUM")
+    connection.close()
+
+
+def test_a_lost_protocol_must_be_given(copy, truth, tmp_path):
+    without(copy, "protocol")
+    with pytest.raises(SessionError, match="has lost its protocol file") as caught:
+        save(examine(copy), tmp_path / "new")
+    assert "--protocol" in caught.value.hint
+    again, missing = saved(copy, tmp_path, protocol=str(ROOT / "protocols/picket-fence.yaml"))
+    assert again["protocol"] == truth["protocol"]
+    assert "the protocol file" in missing
+
+
+def test_simulated_data_stay_stamped(copy, tmp_path):
+    without(copy)
+    assert saved(copy, tmp_path)[0]["simulated"]
+
+
+def test_what_may_be_simulated_is_stamped_so(copy, tmp_path):
+    without(copy, "identity")
+    again, missing = saved(copy, tmp_path)
+    assert again["simulated"]
+    assert any("stamped as simulated" in what for what in missing)
+
+
+def test_the_new_file_must_be_new(copy):
+    with pytest.raises(SessionError, match="already exists"):
+        save(examine(copy), copy)

@@ -1,0 +1,43 @@
+"""Boards on a bench for ``rig selftest``, with a wire from the sync output to a gate."""
+
+from __future__ import annotations
+
+from rig.selftest.run import selftest
+from rig.selftest.stage import Options
+from sim.board import VirtualBoard
+from sim.serial_port import SimulatedSerial
+
+GATE = 3
+
+
+class Wire:
+    """The lab of a board at which only a wire changes anything."""
+
+    def __init__(self, gate: int | None = GATE, late_s: float = 0.0) -> None:
+        self.changes = [] if gate is None else [(late_s, gate, True)]
+
+    def rest(self, label: int) -> int:
+        return 0
+
+    def drop(self, label: int) -> list[tuple[float, int, bool]]:
+        return self.changes
+
+
+class LoopedBoard(VirtualBoard):
+    """Its wire falls back when the recording ends."""
+
+    def _close(self):
+        super()._close()
+        self.touch(0)
+
+
+def outcomes(port, loopback=GATE, drops=5, release=True):
+    """Test a board; give its outcomes by the name of the check."""
+    found = list(selftest(port, port.clock, Options(loopback, drops, release)))
+    assert len({outcome.name for outcome in found}) == len(found)
+    return {outcome.name: outcome for outcome in found}
+
+
+def port_of(board, **line):
+    """Plug a board in."""
+    return SimulatedSerial("test", board=board, timeout=0.02, **line)

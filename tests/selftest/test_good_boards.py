@@ -1,0 +1,137 @@
+"""A board that is in order passes, and no release is driven unless that is allowed."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.cli import main
+from rig.errors import DeviceError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.messages import Phase, pack_label
+from rig.selftest.run import CHECKS
+from rig.selftest.verdicts import Verdict
+from tests.firmware.core_board import CoreBoard
+from tests.flash.pty_board import PtyBoard
+from tests.selftest.benches import GATE, LoopedBoard, Wire, outcomes, port_of
+
+HANDS = {"GATE_BLOCKED", "GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
+FENCE = "sim://?protocol=protocols/picket-fence.yaml"
+
+
+@pytest.fixture
+def rig(capsys):
+    def call(*arguments):
+        code = main(["selftest", *arguments])
+        out, err = capsys.readouterr()
+        return code, out.splitlines(), err
+
+    return call
+
+
+class Watched(LoopedBoard):
+    """Remembers whether a release was ever on."""
+
+    driven = 0
+
+    def advance(self, until_ns):
+        super().advance(until_ns)
+        self.driven |= self.outputs()
+
+
+def failed(found):
+    return [str(outcome) for outcome in found.values() if outcome.verdict is Verdict.FAILED]
+
+
+@pytest.mark.parametrize("streams", [False, True])
+@pytest.mark.parametrize("ppm", [-3000.0, 0.0, 3000.0])
+def test_a_good_board_passes(ppm, streams):
+    board = Watched(Wire(), seed=2, ppm=ppm, streams=streams)
+    found = outcomes(port_of(board))
+    assert failed(found) == []
+    assert {n for n, o in found.items() if o.verdict is Verdict.NOT_POSSIBLE} == HANDS
+    assert board.driven == 1
+    assert list(found) == [check.name for check in CHECKS]
+
+
+def test_without_leave_no_release_is_driven():
+    board = Watched(Wire())
+    found = outcomes(port_of(board), release=False)
+    assert failed(found) == []
+    assert board.driven == 0
+    assert "--release" in found["COOLING"].why
+
+
+@pytest.mark.parametrize("streams", [False, True])
+def test_the_core_passes(streams):
+    assert failed(outcomes(port_of(CoreBoard(Wire(), streams=streams)))) == []
+
+
+def test_the_latency_is_measured():
+    found = outcomes(port_of(LoopedBoard(Wire(late_s=2e-6))))
+    assert found["sync output to gate"].why.startswith("5 drops, latency +2.000 µs, scatter 0.000")
+
+
+def test_what_is_not_wired_is_not_possible_and_no_failure(rig):
+    code, lines, err = rig("--port", FENCE)
+    assert code == 0, lines
+    assert len(lines) == len(CHECKS)
+    assert lines[0].startswith("handshake: ok (virtual, sim, id ")
+    assert any(line.startswith("sync output to gate: not possible here: ") for line in lines)
+    assert not any(": failed" in line for line in lines)
+    assert err == ""
+
+
+def test_a_wire_that_is_not_there_fails(rig):
+    code, lines, err = rig("--port", FENCE, "--loopback", "2", "--drops", "1")
+    assert code == 4
+    assert [line for line in lines if ": failed" in line] == [
+        "sync output to gate: failed: FIRE made no edge at gate 2: is the wire in place?"
+    ]
+    assert err == "1 check failed\n"
+
+
+def test_behind_a_terminal_in_real_time(rig):
+    with PtyBoard() as there:
+        code, lines, _ = rig("--port", there.path)
+    assert code == 0, lines
+
+
+def test_a_drop_of_a_session_is_left_alone():
+    port = port_of(LoopedBoard(Wire()))
+    device = Device(port, port.clock)
+    device.connect()
+    label = pack_label(7, 2)
+    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
+    device.fire(device.arm(label=label, **order))
+    drop = device.collect(label)
+    found = outcomes(port)
+    assert failed(found) == []
+    assert found["BUSY"].why.startswith("the board holds a drop (run 7, attempt 2)")
+    assert found["every message"].verdict is Verdict.NOT_POSSIBLE
+    assert found["VERSION"].verdict is Verdict.OK
+    again = Device(port, port.clock)
+    again.connect(boot_wait_s=0)
+    assert again.fetch(label) == drop
+    with pytest.raises(DeviceError, match="still holds the drop of run 7"):
+        again.arm(label=label, **order)  # no ABORT made it free to be discarded
+
+
+def test_a_drop_that_an_earlier_test_left_is_cleared_away():
+    port = port_of(LoopedBoard(Wire()))
+    device = Device(port, port.clock)
+    device.connect()
+    label = pack_label(wire.TEST_RUN, 9)
+    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
+    device.fire(device.arm(label=label, **order))
+    device.collect(label)
+    assert failed(outcomes(port)) == []
+    assert device.status().phase is Phase.IDLE
+
+
+def test_an_open_stop_makes_arming_impossible():
+    board = LoopedBoard(Wire())
+    board.stop(True)
+    found = outcomes(port_of(board))
+    assert failed(found) == []
+    assert found["ARM and ABORT"].why == "the emergency stop is open: close it"

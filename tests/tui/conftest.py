@@ -1,0 +1,46 @@
+"""A bench for each test."""
+
+from __future__ import annotations
+
+import shutil
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.tui.lab import Lab, short_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_FENCE = """\
+protocol: 1
+title: TITLE
+chains:
+  fence: {rods: 8, length: 350 mm, diameter: 25 mm, position_uncertainty: 0.1 mm}
+drop: 400 mm ± 2 mm
+gravity: 9.81 m/s^2
+gates:
+  free: [{channel: 0, height: 50 mm}, {channel: 1, height: 350 mm}]
+  height_uncertainty: 0.3 mm
+plan: {repeats: 3, settle: 1 s}
+accept: {missed_edges: 15 %}
+"""
+
+
+@pytest.fixture
+def lab() -> Iterator[Lab]:
+    """A quickly analysed scene before a daemon that runs."""
+    folder = short_folder()
+    protocol = folder / "fence.yaml"
+    protocol.write_text(_FENCE.replace("TITLE", "A short fence"), "utf-8")
+    bench = Lab(folder, protocol)
+    bench.start()
+    yield bench
+    bench.stop()
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def fence() -> str:
+    """The scene's text; TITLE stands for its title."""
+    return _FENCE

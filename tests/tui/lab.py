@@ -1,0 +1,140 @@
+"""A daemon with a simulated rig, and an operator's hands on the screen."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.tui.actions import ACTIONS
+from rig.tui.app import Options, RigApp
+from rig.tui.flow import Stage
+from tests.cli.lab import ROOT
+from tests.tui.screen import text_of
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+
+    from textual.pilot import Pilot
+
+KEYS = {action.name: action.keys for action in ACTIONS}
+PATIENCE_S = 60.0
+
+
+@dataclass
+class Operator:
+    """Somebody at the keys."""
+
+    app: RigApp
+    pilot: Pilot[None]
+
+    async def press(self, *keys: str) -> None:
+        await self.pilot.press(*keys)
+
+    async def until(self, true: Callable[[], object]) -> None:
+        """Wait for something to become true on the screen or behind it."""
+        end = time.monotonic() + PATIENCE_S
+        while not true():
+            assert time.monotonic() < end, f"{self.app.flow}\n{text_of(self.app)}"
+            await self.pilot.pause(0.02)
+
+    async def at(self, stage: Stage) -> None:
+        await self.until(lambda: self.app.flow.stage is stage)
+
+    async def sees(self, *texts: str) -> None:
+        """Wait until all of these stand on the screen, however lines are broken."""
+        await self.until(lambda: all(text in flat(self.app) for text in texts))
+
+
+def flat(app: RigApp) -> str:
+    return re.sub(r"\s+", " ", text_of(app))
+
+
+@dataclass
+class Lab:
+    """One bench with its daemon."""
+
+    folder: Path
+    protocol: Path
+    url: str = "sim://?seed=3"
+    daemons: list[subprocess.Popen[bytes]] = field(default_factory=list)
+
+    @property
+    def socket(self) -> Path:
+        return self.folder / "rig.sock"
+
+    @property
+    def session(self) -> Path:
+        return self.folder / "test.session"
+
+    def start(self) -> None:
+        """Start the daemon, and wait until it says that it is there."""
+        command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
+        daemon = subprocess.Popen(
+            [*command, "--socket", str(self.socket)], cwd=ROOT, stderr=subprocess.PIPE
+        )
+        self.daemons.append(daemon)
+        assert daemon.stderr is not None
+        assert daemon.stderr.readline().startswith(b"rig daemon: sim://")
+
+    def kill(self) -> None:
+        """Kill it as a crash would."""
+        daemon = self.daemons[-1]
+        daemon.kill()
+        daemon.wait()
+
+    def stop(self) -> None:
+        for daemon in self.daemons:
+            with suppress(ProcessLookupError):
+                os.kill(daemon.pid, signal.SIGTERM)
+            daemon.wait(30)
+            if daemon.stderr is not None:
+                daemon.stderr.close()
+
+    @asynccontextmanager
+    async def operator(
+        self, size: tuple[int, int] = (80, 24), countdown_s: float = 0.2, name: str = ""
+    ) -> AsyncIterator[Operator]:
+        """Sit down at a screen."""
+        options = Options(
+            (self.protocol,), self.url, self.session, socket=self.socket, countdown_s=countdown_s
+        )
+        app = RigApp(options, KEYS)
+        if name and app.wire:
+            app.wire.name = name
+        async with app.run_test(size=size) as pilot:
+            yield Operator(app, pilot)
+            if app.wire and app.wire.daemon:
+                self.daemons.append(app.wire.daemon)
+
+    @asynccontextmanager
+    async def ready(
+        self, size: tuple[int, int] = (80, 24), countdown_s: float = 0.2
+    ) -> AsyncIterator[Operator]:
+        """Sit down with the first run prepared."""
+        async with self.operator(size, countdown_s) as operator:
+            await operator.until(lambda: operator.app.wire and operator.app.wire.driving)
+            await operator.press("enter")
+            await operator.at(Stage.DEVICE)
+            await operator.until(lambda: operator.app.findings and operator.app.lamps.known)
+            await operator.press("enter")
+            await operator.at(Stage.PREPARE)
+            yield operator
+
+
+def short_folder() -> Path:
+    """Make a folder with a name that a socket's address has room for."""
+    return Path(tempfile.mkdtemp(prefix="rig-"))
+
+
+def run(work: Any) -> Any:
+    return asyncio.run(work)

@@ -1,0 +1,21 @@
+"""The screen of an app under test as text."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from textual.app import App
+
+
+def text_of(app: App[object]) -> str:
+    """Write what stands on the screen, one line a row, without blanks at the ends."""
+    width, height = app.size
+    console = Console(width=width, height=height, file=io.StringIO(), record=True,
+                      force_terminal=True, legacy_windows=False)  # fmt: skip
+    stack = app._background_screens
+    console.print(app.screen._compositor.render_update(full=True, screen_stack=stack))
+    return "\n".join(line.rstrip() for line in console.export_text().splitlines())

@@ -1,0 +1,85 @@
+"""The table of actions and the operator's own keys."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from rig.errors import InputError
+from rig.tui.actions import ACTIONS, BY_NAME, possible, shown_key
+from rig.tui.flow import Stage
+from rig.tui.keys import combined, read_keys
+from rig.tui.words import LONGEST, duration, plain
+
+
+def test_every_key_has_one_meaning():
+    keys = Counter(key for action in ACTIONS for key in action.keys.split(","))
+    assert max(keys.values()) == 1
+    assert len(BY_NAME) == len(ACTIONS)
+
+
+def test_stop_is_possible_always():
+    for stage in Stage:
+        for driving in (True, False):
+            assert possible(BY_NAME["stop"], stage, driving=driving)
+
+
+def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
+    file = tmp_path / "keys.toml"
+    file.write_text('reject = "r,f5"\nnote = "x"\n', "utf-8")
+    keys = read_keys(file)
+    assert (keys["reject"], keys["note"]) == ("r,f5", "x")
+    assert keys["go_on"] == BY_NAME["go_on"].keys
+
+
+def test_f9_always_stops():
+    assert combined({"stop": "f12"}, "k")["stop"] == "f12,f9"
+    with pytest.raises(InputError, match="f9 is the key of stop"):
+        combined({"note": "f9"}, "k")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('fly = "x"', "fly: no such action"),
+        ("note = 3", "note: a key or several"),
+        ('note = "escape"', "escape always means STOP"),
+        ('note = "k"\nreject = "k"', "reject: k is the key of note"),
+        ('note = "x"', "reject has no key left"),
+        ("note", "keys.toml: "),
+    ],
+)
+def test_a_wrong_key_file_says_what_is_wrong(tmp_path, text, said):
+    file = tmp_path / "keys.toml"
+    file.write_text(text, "utf-8")
+    with pytest.raises(InputError) as caught:
+        read_keys(file)
+    assert said in str(caught.value)
+
+
+def test_a_key_file_that_was_named_must_be_there(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        read_keys(tmp_path / "none.toml")
+
+
+def test_without_a_file_the_keys_are_the_tables(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert read_keys() == {action.name: action.keys for action in ACTIONS}
+
+
+def test_keys_are_written_as_they_stand_on_a_keyboard():
+    assert [shown_key(keys) for keys in ("f9", "ctrl+p", "x", "question_mark,f1", "enter")] == [
+        "F9", "Ctrl-P", "x", "?", "Enter"
+    ]  # fmt: skip
+
+
+def test_text_from_outside_is_one_harmless_line():
+    nasty = "a\x1b[31m[/red]\n\x07b\u202ec\ud800"
+    assert plain(nasty) == "a�[31m[/red] �b�c�"
+    assert len(plain("x" * 10**6)) == LONGEST
+    assert plain("x" * LONGEST) == "x" * LONGEST
+
+
+def test_durations():
+    assert [duration(s) for s in (3, 61, 3660)] == ["3 s", "1 min 01 s", "1 h 01 min"]

@@ -1,0 +1,188 @@
+"""The operator's flow: whatever happens in whatever order, nothing falls that should not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.tui.flow import (
+    BEFORE_RELEASE,
+    Again,
+    Answered,
+    Arm,
+    Closed,
+    Collect,
+    Fire,
+    Flow,
+    Found,
+    GoOn,
+    Judge,
+    Judged,
+    Log,
+    Lost,
+    Note,
+    Opened,
+    Refused,
+    Reject,
+    Stage,
+    Stop,
+    Stopped,
+    Tick,
+    Wait,
+    step,
+)
+from rig.tui.plan import Job
+
+JOB = Job(1, 1)
+NEXT = Job(2, 1)
+
+
+def ticketed(flow, event):
+    """Give an answer that has no ticket the current one."""
+    if isinstance(event, (Answered, Judged, Refused)) and event.ticket < 0:
+        return event._replace(ticket=flow.ticket)
+    return event
+
+
+def through(flow, *events):
+    """Take events in turn."""
+    effects = []
+    for event in events:
+        flow, wanted = step(flow, ticketed(flow, event))
+        effects += wanted
+    return flow, effects
+
+
+DONE = Answered(-1)
+TO_RESULT = (
+    Opened(), GoOn(JOB), GoOn(JOB, 5.0), DONE, Answered(-1, 99), Tick(3.1), DONE, DONE,
+    Judged(-1, "accepted", ()),
+)  # fmt: skip
+
+
+def test_a_run_goes_from_the_protocol_to_its_verdict():
+    flow, effects = through(Flow(), *TO_RESULT)
+    assert flow.stage is Stage.RESULT
+    assert effects == [
+        Wait(5.0), Arm(JOB), Fire(99), Collect(JOB), Judge(JOB), Log(JOB, "accepted", ())
+    ]  # fmt: skip
+
+
+def test_a_run_takes_two_keys():
+    flow, _ = through(Flow(), *TO_RESULT, DONE)
+    flow, effects = through(flow, GoOn(NEXT), GoOn(NEXT, 5.0))
+    assert effects == [Wait(5.0)]
+    assert flow.job == NEXT
+
+
+def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
+    flow, _ = through(Flow(), *TO_RESULT)
+    assert step(flow, GoOn(NEXT))[0].stage is Stage.RESULT
+    flow, _ = through(flow, DONE, Tick(1e9), Opened(), Found(NEXT))
+    assert flow.stage is Stage.RESULT
+    assert step(flow, GoOn(NEXT))[0].stage is Stage.PREPARE
+    assert step(flow, GoOn(None))[0].stage is Stage.DONE
+
+
+def test_blind_a_drop_is_judged_before_its_numbers_are_shown():
+    flow, _ = through(Flow(blind=True), *TO_RESULT, DONE)
+    assert not flow.shown
+    kept, effects = through(flow, GoOn(NEXT))
+    assert (kept.stage, kept.shown, effects) == (Stage.RESULT, True, [])
+    rejected, effects = through(flow, Reject(" a cough "))
+    assert rejected.shown
+    assert effects == [Log(JOB, "rejected", ("a cough",))]
+    noted, effects = through(flow, Note("warm"))
+    assert not noted.shown
+    assert effects == [Log(JOB, "accepted", ("note: warm",))]
+
+
+def test_no_cause_no_rejection():
+    flow, _ = through(Flow(), *TO_RESULT, DONE)
+    assert step(flow, Reject("  ")) == (flow, ())
+
+
+def test_arming_that_comes_after_stop_is_undone():
+    flow, _ = through(Flow(), *TO_RESULT[:4])
+    assert flow.stage is Stage.ARMING
+    late = flow.ticket
+    flow, effects = through(flow, Stopped(), Answered(late, 99))
+    assert flow.stage is Stage.PREPARE
+    assert effects == [Stop(), Stop()]
+
+
+@pytest.mark.parametrize("stage", list(Stage))
+def test_stop_is_carried_out_at_every_stage(stage):
+    flow, effects = step(Flow(stage=stage, job=JOB), Stopped())
+    assert effects == (Stop(),)
+    assert flow.stage is (Stage.PREPARE if stage in BEFORE_RELEASE else stage)
+
+
+@pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
+def test_what_fails_says_why_and_can_be_tried_again(stage):
+    flow, _ = through(Flow(stage=stage, job=JOB), Refused(-1, "a gate is blocked\nclear it"))
+    assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
+    flow, _ = through(flow, GoOn(JOB))
+    assert flow.trouble == ""
+
+
+def test_a_drop_that_nobody_judged_is_judged():
+    flow, effects = through(Flow(stage=Stage.PREPARE, job=NEXT), Found(JOB))
+    assert effects == [Judge(JOB)]
+    assert flow.job == JOB
+
+
+tickets = st.integers(-1, 12)
+jobs = st.builds(Job, st.integers(1, 3), st.integers(1, 3))
+events = st.one_of(
+    st.just(Opened()), st.just(Closed()), st.just(Stopped()), st.builds(GoOn, st.none() | jobs),
+    st.builds(Answered, tickets, st.none() | st.integers(0, 5)),
+    st.builds(Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
+    st.builds(Refused, tickets, st.just("no")), st.builds(Tick, st.floats(0.0, 2.0)),
+    st.just(Lost("gone")), st.builds(Found, jobs), st.builds(Reject, st.just("x")),
+    st.builds(Note, st.just("y")), st.builds(Again, jobs),
+)  # fmt: skip
+
+
+@given(st.lists(events, max_size=60), st.booleans())
+def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening, blind):
+    flow = Flow(blind=blind)
+    armed, waited = None, 0.0
+    for event in happening:
+        before = flow
+        flow, effects = step(flow, ticketed(flow, event))
+        if isinstance(event, (Stopped, Lost)):
+            armed = None
+        if flow.stage is Stage.COUNTDOWN and before.stage is not Stage.COUNTDOWN:
+            armed, waited = event.token or 0, 0.0
+        if before.stage is Stage.COUNTDOWN and isinstance(event, Tick):
+            waited += event.seconds
+        for effect in effects:
+            if isinstance(effect, Fire):
+                assert effect.token == armed
+                assert waited >= flow.countdown_s - 1e-9
+                armed = None
+        if isinstance(event, Stopped):
+            assert Stop() in effects
+            assert flow.stage not in BEFORE_RELEASE
+        assert flow.ticket >= before.ticket
+
+
+@given(st.lists(events, max_size=40))
+def test_blind_numbers_are_shown_only_by_a_decision(happening):
+    flow = Flow(blind=True)
+    for event in happening:
+        before = flow
+        flow, _ = step(flow, ticketed(flow, event))
+        if before.stage is Stage.RESULT and not before.shown and flow.stage is Stage.RESULT:
+            assert not flow.shown or isinstance(event, (GoOn, Reject))
+
+
+def test_the_countdown_is_as_long_as_it_was_set():
+    flow = replace(Flow(stage=Stage.ARMING, job=JOB), countdown_s=0.5)
+    flow, effects = through(flow, Answered(0, 7), Tick(0.4))
+    assert effects == []
+    assert step(flow, Tick(0.11))[1] == (Fire(7),)

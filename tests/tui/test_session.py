@@ -1,0 +1,157 @@
+"""A session driven by keys, against the daemon with a simulated rig."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.session.schema import RunState
+from rig.session.store import Session
+from rig.tui.flow import Stage
+from rig.tui.plan import Job
+from tests.cli.lab import assert_whole, log_of, short
+from tests.tui.lab import run
+from tests.tui.screen import text_of
+
+
+def test_a_whole_session_takes_two_keys_a_run(lab):
+    lab.protocol.write_text(short(), "utf-8")
+
+    async def work():
+        async with lab.ready() as op:
+            await op.sees("RUN 1 of 4", "impact side A", "free side B", "incline 40°", "180 mm")
+            for number in range(1, 5):
+                await op.until(lambda: op.app.flow.stage is Stage.PREPARE)
+                await op.press("enter")
+                await op.at(Stage.RESULT)
+                await op.sees(f"run {number}, attempt 1", "Δz corrected", "limit ±5", "SIMULATED")
+                await op.until(lambda: op.app.flow.logged)
+                await op.press("enter")
+            await op.at(Stage.DONE)
+            await op.sees("4 of 4 runs", "40° ✓✓", "60° ✓✓", "release skew")
+            await op.press("z")
+            await op.at(Stage.PROTOCOL)
+
+    run(work())
+    assert_whole(lab.session, 4)
+
+
+@pytest.mark.parametrize("key", ["f9", "escape", "k"])
+def test_any_key_before_the_release_stops_and_nothing_falls(lab, key):
+    async def work():
+        async with lab.ready(countdown_s=600.0) as op:
+            await op.press("enter")
+            await op.at(Stage.COUNTDOWN)
+            await op.sees("ARMED", "Any key stops")
+            await op.press(key)
+            await op.until(lambda: op.app.state.line(1).state == "interrupted")
+            await op.sees("stopped: nothing fell", "RUN 1 of 3 · attempt 2")
+
+    run(work())
+    states = [state for entries in log_of(lab.session).values() for _, state in entries]
+    assert states == [RunState.ARMED, RunState.INTERRUPTED]
+
+
+@pytest.mark.parametrize("page", ["1", "2", "3", "4", "5", "6", "question_mark", "ctrl+p"])
+def test_stop_works_on_every_page_and_in_every_dialog(lab, page):
+    async def work():
+        async with lab.ready(countdown_s=600.0) as op:
+            called = []
+            real = op.app.wire.call
+
+            async def call(method, **params):
+                called.append(method)
+                return await real(method, **params)
+
+            op.app.wire.call = call
+            await op.press(page)
+            await op.press("f9")
+            await op.until(lambda: "stop" in called)
+
+    run(work())
+
+
+def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
+    async def work():
+        async with lab.ready() as op:
+            await op.press("enter")
+            await op.at(Stage.RESULT)
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("n", *"[/b] hm", "enter")
+            await op.sees("note: [/b] hm")
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("x", "escape")
+            assert op.app.flow.verdict == "accepted"
+            await op.press("x", *"draught", "enter")
+            await op.sees("REJECTED", "draught")
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("enter")
+            await op.at(Stage.PREPARE)
+            await op.sees("RUN 2 of 3")
+
+    run(work())
+    with Session.open(lab.session, readonly=True) as session:
+        told = [(entry.state, entry.reasons) for entry in session.states()][-3:]
+    assert told == [
+        (RunState.ACCEPTED, ()),
+        (RunState.ACCEPTED, ("note: [/b] hm",)),
+        (RunState.REJECTED, ("draught",)),
+    ]
+
+
+def test_blind_numbers_come_after_the_decision(lab):
+    async def work():
+        async with lab.ready() as op:
+            await op.press("b", "enter")
+            await op.at(Stage.RESULT)
+            await op.sees("BLIND", "Anything against it?")
+            for page in "56":
+                await op.press(page)
+                await op.until(lambda: op.app.page != "result")
+                assert "± 0" not in text_of(op.app)
+            await op.press("4")
+            assert "g  " not in text_of(op.app)
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("enter")
+            await op.sees("ACCEPTED", "m/s²")
+
+    run(work())
+
+
+def test_a_second_screen_watches_and_can_only_stop(lab):
+    async def work():
+        async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
+            await other.until(lambda: other.app.findings)
+            assert not other.app.wire.driving
+            await op.press("enter")
+            await op.at(Stage.COUNTDOWN)
+            await other.sees("ARMED by another client", "watching rig tui")
+            await other.press("k", "enter")
+            await other.sees("this screen only watches")
+            assert op.app.flow.stage is Stage.COUNTDOWN
+            await other.press("f9")
+            await op.until(lambda: op.app.state.line(1).state == "interrupted")
+            await op.press("k", "c")
+            await other.until(lambda: other.app.state.holder is None)
+            await other.press("c")
+            await other.until(lambda: other.app.wire.driving)
+
+    run(work())
+
+
+def test_leaving_does_not_stop_what_falls(lab):
+    lab.stop()
+    lab.daemons.clear()
+    lab.url += "&pace=1"
+    lab.start()
+
+    async def work():
+        async with lab.ready() as op:
+            await op.press("enter")
+            await op.at(Stage.LIVE)
+        async with lab.operator() as again:
+            await again.until(lambda: again.app.flow.job == Job(1, 1))
+            await again.at(Stage.RESULT)
+            await again.sees("ACCEPTED")
+
+    run(work())
+    assert log_of(lab.session)[1][-1][1] is RunState.ACCEPTED

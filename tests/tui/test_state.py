@@ -1,0 +1,115 @@
+"""What the screens are told: typed, and not changed under them."""
+
+from __future__ import annotations
+
+import copy
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.daemon.mirror import Mirror
+from rig.tui.flow import Flow, Stage
+from rig.tui.gates import Lamps
+from rig.tui.model import Model, alarm
+from rig.tui.plan import Job, again, next_job, unjudged, void_counts
+from rig.tui.state import RunLine, State, typed
+
+RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
+       "reasons": []}  # fmt: skip
+STATE = {
+    "phase": "idle", "link": {"state": "up", "error": None, "retry_s": None},
+    "port": {"url": "sim://", "simulated": True}, "gates": {"blocked": 5, "age_s": 0.0},
+    "drop": None, "session": None, "control": None, "error": None,
+    "runs": [RUN, RUN | {"run": 2, "impact": "B", "free": "A"}], "edges": [[1, 2, 1]],
+}  # fmt: skip
+
+changes = st.fixed_dictionaries(
+    {},
+    optional={
+        "set": st.fixed_dictionaries(
+            {}, optional={"phase": st.sampled_from(["idle", "armed"]),
+                          "gates": st.none() | st.just({"blocked": 9})}
+        ),
+        "runs": st.lists(st.builds(lambda n, s: RUN | {"run": n, "state": s}, st.integers(1, 2),
+                                   st.sampled_from(["armed", "void"])), max_size=2),
+        "edges": st.lists(st.just([1, 2, 1])),
+    },
+)  # fmt: skip
+
+
+@given(st.lists(changes, max_size=8))
+def test_a_state_once_taken_never_changes(steps):
+    mirror = Mirror()
+    mirror.snapshot(copy.deepcopy({"n": 7, "state": STATE}))
+    taken = []
+    for n, change in enumerate(steps, start=8):
+        state = typed(mirror.n, mirror.state)
+        taken.append((state, copy.deepcopy(state)))
+        mirror.change({"n": n} | change)
+    assert all(state == as_it_was for state, as_it_was in taken)
+
+
+def test_what_the_daemon_does_not_know_is_not_known():
+    state = typed(0, STATE | {"gates": None, "runs": None, "edges": None})
+    assert state.blocked is None
+    assert (state.runs, state.edges, state.holder) == ((), (), None)
+    assert (State().known, state.known) == (False, True)
+
+
+def lines(*states):
+    return [RunLine(n, 0.0, "A", "B", 1, state) for n, state in enumerate(states, start=1)]
+
+
+def test_the_next_run_is_the_runners():
+    runs = lines("accepted", "marginal", "rejected", "void", "planned")
+    assert next_job(runs, {4: 1}) == Job(4, 2)
+    assert next_job(runs, {4: 3}) == Job(5, 2)
+    assert next_job(lines("accepted"), {}) is None
+    assert next_job(lines("interrupted", "planned"), {}) == Job(1, 2)
+    assert again(runs, 1) == Job(1, 2)
+    assert unjudged(lines("accepted", "recorded")) == Job(2, 1)
+    assert void_counts({Job(1, 1), Job(1, 2)}, lines("void")) == {1: 2}
+
+
+def test_lamps_count_name_and_judge_steadiness():
+    lamps = Lamps.of((0, 3)).seen(0b0000, 0.0).seen(0b1000, 1.0)
+    assert lamps.alone == 3
+    assert not lamps.ready(1.1)
+    lamps = lamps.seen(0, 1.2)
+    assert lamps.waved == {3}
+    assert not lamps.ready(1.3)
+    assert lamps.ready(2.3)
+    assert [lamp.edges for lamp in lamps.lamps] == [0, 2]
+    assert lamps.counted((0, 0, 0, 0), 5.0).lamps[0].flickers(5.0)
+    assert not lamps.seen(None, 3.0).ready(9.0)
+    assert lamps.reset().waved == frozenset()
+
+
+def test_a_lamp_that_is_blocked_from_the_beginning_has_not_changed():
+    lamps = Lamps.of((2,)).seen(0b100, 0.0)
+    assert (lamps.lamps[0].edges, lamps.blocked) == (0, (2,))
+
+
+def _model(state=None, **more):
+    return Model(typed(0, STATE | (state or {})), Flow(), Lamps(), connected=True, **more)
+
+
+def test_what_is_wrong_is_said_with_what_to_do():
+    assert alarm(_model()) is None
+    gone = alarm(Model(State(), Flow(), Lamps(), silence="it is gone"))
+    assert "it is gone" in gone.message
+    assert "supply" in gone.hint
+    lost = alarm(
+        _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
+    )
+    assert "[unplugged" in lost.message
+    assert "cable" in lost.hint
+    failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
+    assert failed == ("disk full", "make room")
+
+
+def test_a_watcher_sees_where_the_drop_is():
+    for drop, stage in (("armed", Stage.COUNTDOWN), ("fired", Stage.LIVE)):
+        watched = _model({"drop": {"run": 1, "attempt": 1, "state": drop}})
+        assert watched.stage is stage
+    assert _model({"drop": {"state": "armed"}}, driving=True).stage is Stage.PROTOCOL

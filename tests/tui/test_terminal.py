@@ -1,0 +1,104 @@
+"""A whole ABBA session by keys alone in a real terminal."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.cli.lab import ROOT, assert_whole, short
+from tests.tui.lab import short_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+PATIENCE_S = 90.0
+_NEEDS_TMUX = pytest.mark.skipif(
+    shutil.which("tmux") is None and not os.environ.get("CI"), reason="tmux is not installed"
+)
+
+
+class Terminal:
+    """One tmux server with one window."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.socket = folder / "tmux"
+
+    def tmux(self, *arguments: str) -> str:
+        done = subprocess.run(
+            ["tmux", "-S", str(self.socket), "-f", "/dev/null", *arguments],
+            capture_output=True, text=True, check=True, timeout=20,
+        )  # fmt: skip
+        return done.stdout
+
+    def start(self, *command: str) -> None:
+        self.tmux("new-session", "-d", "-x", "100", "-y", "30", "-c", str(ROOT), *command)
+
+    def screen(self) -> str:
+        return re.sub(r"\s+", " ", self.tmux("capture-pane", "-p"))
+
+    def press(self, *keys: str) -> None:
+        self.tmux("send-keys", *keys)
+
+    def sees(self, *texts: str) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while not all(text in self.screen() for text in texts):
+            assert time.monotonic() < end, f"no {texts}:\n{self.tmux('capture-pane', '-p')}"
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    folder = short_folder()
+    found = Terminal(folder)
+    yield found
+    subprocess.run(["tmux", "-S", str(found.socket), "kill-server"], check=False)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@_NEEDS_TMUX
+@pytest.mark.parametrize("url", ["sim://?seed=3", "emu://?seed=3"])
+def test_an_abba_session_by_keys_alone(terminal, url):
+    if url.startswith("emu"):
+        pytest.importorskip("rig_emulator.stand")
+    protocol, session = terminal.folder / "abba.yaml", terminal.folder / "abba.session"
+    protocol.write_text(short("[40 deg]", 4), "utf-8")
+    terminal.start(
+        sys.executable, "-m", "rig", "tui", str(protocol), "--port", url, "--session",
+        str(session), "--socket", str(terminal.folder / "rig.sock"),
+    )  # fmt: skip
+    terminal.sees("PROTOCOL", "Enter open session", "SIMULATED")
+    terminal.press("Enter")
+    terminal.sees("DEVICE", "Enter to the first run", "clear")
+    terminal.press("Enter")
+    for number, chain in enumerate("ABBA", start=1):
+        terminal.sees(f"RUN {number} of 4", f"impact side {chain}", "✓ gates steady", "Enter arm")
+        terminal.press("Enter")
+        terminal.sees(f"run {number}, attempt 1", "release skew", "Enter acknowledge")
+        terminal.press("Enter")
+    terminal.sees("4 of 4 runs", "✓✓✓✓")
+    terminal.press("z")
+    terminal.sees("Enter open session")
+    pid = _daemon_of(terminal.folder)
+    terminal.press("q")
+    os.kill(pid, 0)  # it is there without the screen
+    os.kill(pid, signal.SIGTERM)
+    assert_whole(session, 4)
+
+
+def _daemon_of(folder: Path) -> int:
+    from rig.daemon.client import Client
+
+    client = Client(folder / "rig.sock", "a test")
+    try:
+        return int(client.daemon["pid"])
+    finally:
+        client.close()

@@ -1,0 +1,42 @@
+"""Text from outside on the screen: no markup, no control characters, no endless lines."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.tui.flow import Flow, Stage
+from rig.tui.gates import Lamps
+from rig.tui.model import Model
+from rig.tui.plan import Job
+from rig.tui.state import typed
+from rig.tui.widgets.banner import verdict_words
+from rig.tui.widgets.status import headline
+from rig.tui.widgets.stopbar import hints
+from tests.tui.lab import KEYS
+
+NASTY = ["[red]x[/", "[/]", "\x1b[2J\x07\x9b31m", "x" * 10_000, "[@click=app.exit]a", "a\nb\u202ec"]
+
+
+def model(text):
+    state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
+             "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
+    flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(text,))
+    return Model(typed(0, state), flow, Lamps(), connected=True, job=Job(1, 1), port=text)
+
+
+@pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))
+def test_what_comes_from_outside_is_shown_as_text(text):
+    shown = [headline(model(text), "run", 78), verdict_words(model(text))]
+    for content in shown:
+        assert not any(ord(letter) < 32 and letter != "\n" for letter in content.plain)
+        assert not any("\x7f" <= letter <= "\x9f" for letter in content.plain)
+        assert len(content.plain) < 500
+    if text.isprintable() and len(text) < 20:
+        assert all(text in content.plain for content in shown)
+    assert len(shown[0].plain) == 78
+    assert "▲ SIMULATED" in shown[0].plain
+
+
+@pytest.mark.parametrize("width", [20, 40, 78, 198])
+def test_keys_fit_their_line(width):
+    assert len(hints(model("x"), "result", KEYS, width).plain) <= width

@@ -1,0 +1,148 @@
+"""Which ports are candidates, finding a board again, and that nothing is opened unasked."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from serial.tools.list_ports_common import ListPortInfo
+
+from rig.cli import main
+from rig.errors import DeviceError
+from rig.usb import udev
+from rig.usb.known import KNOWN
+from rig.usb.listing import path_of, serial_number_at, serial_ports
+from tests.flash.pty_board import PtyBoard
+
+PACKAGING = Path(__file__).parents[2] / "packaging"
+
+
+def info(path, vid=None, pid=None, serial_number=None, product=None):
+    found = ListPortInfo(path)
+    found.vid, found.pid = vid, pid
+    found.serial_number, found.product = serial_number, product
+    return found
+
+
+@pytest.fixture
+def plugged(monkeypatch):
+    def plug(*infos):
+        monkeypatch.setattr("serial.tools.list_ports.comports", lambda: list(infos))
+
+    plug(
+        info("/dev/ttyS0"),
+        info("/dev/ttyUSB0", 0x1A86, 0x7523, product="USB Serial"),
+        info("/dev/ttyUSB1", 0x1234, 0x5678, "X1", "Oscilloscope"),
+        info("/dev/ttyACM3", 0x2341, 0x0042, "85430", "Mega"),
+    )
+    return plug
+
+
+@pytest.fixture
+def never(monkeypatch):
+    def fail(url):
+        raise AssertionError(f"{url} was opened")
+
+    monkeypatch.setattr("rig.commands.ports.open_port", fail)
+
+
+def test_candidates_come_first_and_the_others_say_why_not(plugged, never, capsys):
+    assert main(["ports"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == [
+        *("/dev/ttyACM3", "/dev/ttyS0", "/dev/ttyUSB0", "/dev/ttyUSB1")
+    ]
+    assert lines[0].endswith("serial number 85430  Mega  Arduino Mega 2560  a candidate")
+    assert lines[1].endswith("skipped: no USB device")
+    assert "CH340  skipped: a chip that boards and other instruments have" in lines[2]
+    assert "skipped: no board's USB numbers" in lines[3]
+
+
+def test_json_has_everything(plugged, never, capsys):
+    assert main(["ports", "--json"]) == 0
+    first, *rest = json.loads(capsys.readouterr().out)["ports"]
+    assert first == {
+        "path": "/dev/ttyACM3",
+        "vid": 0x2341,
+        "pid": 0x0042,
+        "serial_number": "85430",
+        "manufacturer": None,
+        "product": "Mega",
+        "kind": "Arduino Mega 2560",
+        "skipped": "",
+        "candidate": True,
+        "identity": None,
+        "trouble": None,
+    }
+    assert not any(port["candidate"] for port in rest)
+
+
+def test_nothing_there_is_said(plugged, never, capsys):
+    plugged()
+    assert main(["ports"]) == 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "no board found" in err
+
+
+def test_only_candidates_are_asked_who_they_are(plugged, monkeypatch, capsys):
+    opened = []
+
+    def refuse(url):
+        opened.append(url)
+        raise DeviceError(f"cannot open {url}: busy", "close it")
+
+    monkeypatch.setattr("rig.commands.ports.open_port", refuse)
+    assert main(["ports", "--identify"]) == 0
+    assert opened == ["/dev/ttyACM3"]
+    assert "cannot open /dev/ttyACM3: busy" in capsys.readouterr().out
+    assert main(["ports", "--identify", "/dev/ttyUSB0"]) == 0
+    assert opened == ["/dev/ttyACM3", "/dev/ttyUSB0"]
+
+
+def test_a_port_that_is_named_says_who_is_there(plugged, capsys):
+    with PtyBoard(board="Arduino Uno") as there:
+        assert main(["ports", "--identify", there.path]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith(f"{there.path}  Arduino Uno, sim, id ")
+
+
+def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
+    assert serial_number_at("/dev/ttyACM3") == "85430"
+    link = tmp_path / "by-id"
+    link.symlink_to("/dev/ttyACM3")
+    assert serial_number_at(str(link)) == "85430"
+    assert serial_number_at("/dev/ttyUSB0") is None
+    assert serial_number_at("sim://") is None
+    plugged(info("/dev/ttyACM3", 0x2341, 0x43, "other"))
+    assert path_of("85430") is None
+    plugged(info("/dev/ttyACM3", 0x2341, 0x43, "other"), info("/dev/ttyACM9", 1, 2, "85430"))
+    assert path_of("85430") == "/dev/ttyACM9"
+
+
+def test_copies_that_share_a_number_are_not_confused(plugged):
+    plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
+    with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
+        path_of("0001")
+
+
+def test_this_computer_can_be_looked_at():
+    assert all(port.path for port in serial_ports())
+
+
+def test_no_kind_is_listed_twice():
+    numbers = [(kind.vid, kind.pid) for kind in KNOWN]
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_the_udev_rule_is_up_to_date():
+    assert (PACKAGING / "60-chainrig.rules").read_text("ascii") == udev.rule()
+
+
+@pytest.mark.parametrize("kind", KNOWN, ids=str)
+def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(kind):
+    match = f'ATTRS{{idVendor}}=="{kind.vid:04x}", ATTRS{{idProduct}}=="{kind.pid:04x}", '
+    lines = [line for line in udev.rule().splitlines() if match in line]
+    assert sum(line.startswith('SUBSYSTEM=="tty"') and "uaccess" in line for line in lines) == 1
+    assert sum(line.endswith('ENV{ID_MM_DEVICE_IGNORE}="1"') for line in lines) == kind.board
