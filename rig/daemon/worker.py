@@ -197,7 +197,7 @@ class Worker:
         station = self.desk.station
         armed = station is not None and station.armed is not None
         with self._guard:
-            reason, stops = self._stop, self._stops
+            reason, stops = self._stop, [*self._stops]  # one that comes from here on is not lost
         if reason:
             self._drain(StoppedError(reason))
         elif armed and not self._held:
