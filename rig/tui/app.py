@@ -192,8 +192,8 @@ class RigApp(App[None]):
     def _draw(self) -> None:
         model, width = self.model, self.size.width
         base = self.screen_stack[0]
-        if not base.query(Status):
-            return
+        if not base.query("Status #alarm") or not base.query("StopBar #stop"):
+            return  # on its way in, or out
         base.query_one(Status).show(model, self.page, width)
         base.query_one(StopBar).show(model, self.page, self.keys, width)
         page = self._pages.get(self.page)
