@@ -30,8 +30,6 @@
 
 #else
 
-#include "board_avr.h"
-
 #define RELEASE_0 _BV(PE3) /* D5 */
 #define RELEASE_1 _BV(PE5) /* D3 */
 #define SYNC _BV(PE4)      /* D2 */
@@ -39,6 +37,11 @@
 #define STOP _BV(PA2)      /* D24, closed to ground when all is well */
 #define REFERENCE _BV(PL0) /* D49, ICP4 */
 #define SENSE _BV(PL1)     /* D48, ICP5 */
+#define RELEASE_PORT PORTE /* SYNC is on it too */
+#define STOP_PORT PINA
+#define LED_PORT PORTA
+
+#include "board_avr.h"
 
 static const char board_type[] PROGMEM = "Arduino Mega 2560";
 static const char board_channels[] PROGMEM =
@@ -72,58 +75,11 @@ static inline void board_watch(uint16_t gates)
     PCICR = gates ? _BV(PCIE0) | _BV(PCIE2) : 0;
 }
 
-static inline uint8_t outputs(uint8_t release, bool sync)
-{
-    uint8_t bits = sync ? SYNC : 0;
-    if (release & 1)
-        bits |= RELEASE_0;
-    if (release & 2)
-        bits |= RELEASE_1;
-    return bits;
-}
-
-static inline void board_outputs(uint8_t release, bool sync)
-{
-    PORTE = (uint8_t)((PORTE & (uint8_t)~(RELEASE_0 | RELEASE_1 | SYNC)) | outputs(release, sync));
-}
-
-/* From the port write to the stamp, in cycles. */
-#define FIRE_LATENCY 0
-
-static inline uint16_t board_fire(uint8_t release)
-{
-    uint8_t port = (uint8_t)(PORTE | outputs(release, true));
-    uint16_t count;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        PORTE = port;
-        count = TCNT5;
-    }
-    return (uint16_t)(count - FIRE_LATENCY);
-}
-
-static inline bool board_stopped(void)
-{
-    return PINA & STOP;
-}
-
-static inline void board_led(bool on)
-{
-    if (on)
-        PORTA |= LED;
-    else
-        PORTA &= (uint8_t)~LED;
-}
-
 static inline bool board_reference(uint16_t *count)
 {
-    if (!(TIFR4 & _BV(ICF4)))
+    if (!caught(&TIFR4, _BV(ICF4), &ICR4, count))
         return false;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        *count = (uint16_t)(ICR4 + reference_offset);
-    }
-    TIFR4 = _BV(ICF4);
+    *count = (uint16_t)(*count + reference_offset);
     return true;
 }
 
@@ -136,14 +92,7 @@ static inline void board_sense_begin(void)
 
 static inline bool board_sensed(uint16_t *count)
 {
-    if (!(TIFR5 & _BV(ICF5)))
-        return false;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        *count = ICR5;
-    }
-    TIFR5 = _BV(ICF5);
-    return true;
+    return caught(&TIFR5, _BV(ICF5), &ICR5, count);
 }
 
 #endif

@@ -30,14 +30,17 @@
 
 #else
 
-#include "board_avr.h"
-
 #define REFERENCE _BV(PB0) /* D8, ICP1 */
 #define RELEASE_0 _BV(PB1) /* D9 */
 #define RELEASE_1 _BV(PB2) /* D10 */
 #define SYNC _BV(PB3)      /* D11 */
 #define STOP _BV(PB4)      /* D12, closed to ground when all is well */
 #define LED _BV(PB5)       /* D13 */
+#define RELEASE_PORT PORTB /* SYNC is on it too */
+#define STOP_PORT PINB
+#define LED_PORT PORTB
+
+#include "board_avr.h"
 
 static const char board_type[] PROGMEM = "Arduino Uno";
 static const char board_channels[] PROGMEM = "D2 D3 D4 D5 D6 D7 A0 A1 A2 A3 A4 A5";
@@ -69,59 +72,9 @@ static inline void board_watch(uint16_t gates)
     PCICR = gates ? _BV(PCIE1) | _BV(PCIE2) : 0;
 }
 
-static inline uint8_t outputs(uint8_t release, bool sync)
-{
-    uint8_t bits = sync ? SYNC : 0;
-    if (release & 1)
-        bits |= RELEASE_0;
-    if (release & 2)
-        bits |= RELEASE_1;
-    return bits;
-}
-
-static inline void board_outputs(uint8_t release, bool sync)
-{
-    PORTB = (uint8_t)((PORTB & (uint8_t)~(RELEASE_0 | RELEASE_1 | SYNC)) | outputs(release, sync));
-}
-
-/* From the port write to the stamp, in cycles. */
-#define FIRE_LATENCY 0
-
-static inline uint16_t board_fire(uint8_t release)
-{
-    uint8_t port = (uint8_t)(PORTB | outputs(release, true));
-    uint16_t count;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        PORTB = port;
-        count = TCNT1;
-    }
-    return (uint16_t)(count - FIRE_LATENCY);
-}
-
-static inline bool board_stopped(void)
-{
-    return PINB & STOP;
-}
-
-static inline void board_led(bool on)
-{
-    if (on)
-        PORTB |= LED;
-    else
-        PORTB &= (uint8_t)~LED;
-}
-
 static inline bool board_reference(uint16_t *count)
 {
-    if (!(TIFR1 & _BV(ICF1)))
-        return false;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        *count = ICR1;
-    }
-    TIFR1 = _BV(ICF1);
-    return true;
+    return caught(&TIFR1, _BV(ICF1), &ICR1, count);
 }
 
 /* The one input-capture pin takes the reference: no release sense. */

@@ -1,5 +1,5 @@
 /* What both AVR boards share of the core's board interface; each board's own `board.h` names its
- * timer and pins and includes this. */
+ * timer, ports and pins, and then includes this. */
 #ifndef BOARD_AVR_H
 #define BOARD_AVR_H
 
@@ -106,6 +106,62 @@ static inline uint16_t board_entries_lost(void)
         lost = entries_lost;
     }
     return lost;
+}
+
+/* The outputs, all on one port, from the board's names of its pins. */
+static inline uint8_t outputs(uint8_t release, bool sync)
+{
+    uint8_t bits = sync ? SYNC : 0;
+    if (release & 1)
+        bits |= RELEASE_0;
+    if (release & 2)
+        bits |= RELEASE_1;
+    return bits;
+}
+
+static inline void board_outputs(uint8_t release, bool sync)
+{
+    RELEASE_PORT = (uint8_t)((RELEASE_PORT & (uint8_t)~(RELEASE_0 | RELEASE_1 | SYNC)) |
+                             outputs(release, sync));
+}
+
+static inline uint16_t board_fire(uint8_t release)
+{
+    uint8_t port = (uint8_t)(RELEASE_PORT | outputs(release, true));
+    uint16_t count;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        RELEASE_PORT = port;
+        count = BOARD_COUNTER;
+    }
+    return count;
+}
+
+static inline bool board_stopped(void)
+{
+    return STOP_PORT & STOP;
+}
+
+static inline void board_led(bool on)
+{
+    if (on)
+        LED_PORT |= LED;
+    else
+        LED_PORT &= (uint8_t)~LED;
+}
+
+/* What an input-capture pin has caught, if its flag says so. */
+static inline bool caught(volatile uint8_t *flags, uint8_t flag, volatile uint16_t *capture,
+                          uint16_t *count)
+{
+    if (!(*flags & flag))
+        return false;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        *count = *capture;
+    }
+    *flags = flag;
+    return true;
 }
 
 /* The line is polled: an interrupt for each byte would be one more that can delay a stamp. */
