@@ -6,17 +6,20 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rig.analysis.drop import TimeScale
 from rig.link.epochs import RESONATOR_TOLERANCE, Epochs, epochs
 from rig.link.hosttime import HostTime, one_axis
 from rig.link.rate import ping_rate, pulse_rate
+from rig.link.samples import samples
 from rig.protocol import reader
-from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.link.rate import TickRate
+    from rig.link.samples import Samples
     from rig.records import Drop
     from rig.session.reading import Reader
 
@@ -148,8 +151,31 @@ class Calibration:
         return min(choice, key=lambda one: one[1].u)
 
 
+class Calibrator:
+    """Calibrates one session again and again while it grows, and reads only what is new of it."""
+
+    def __init__(self) -> None:
+        self._pings = samples(())
+
+    def look(self, session: Reader) -> Calibration:
+        """Calibrate the session's clock from everything it recorded until now.
+
+        Parameters
+        ----------
+        session
+            Always the same one, however it was opened.
+        """
+        more = samples(session.pings(after=len(self._pings)))
+        self._pings = np.concatenate([self._pings, more])
+        return _calibration(session, self._pings)
+
+
 def calibration(session: Reader) -> Calibration:
     """Calibrate a session's clock from everything it recorded."""
+    return Calibrator().look(session)
+
+
+def _calibration(session: Reader, pings: Samples) -> Calibration:
     identities = session.identities()
     nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
     u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
@@ -159,9 +185,9 @@ def calibration(session: Reader) -> Calibration:
         details = {"source": words, "relative_u": u}
         return Calibration(None, words, details, given | {"notes": []}, u)
     breaks = session.host_breaks()
-    axis = one_axis(session.pings(), [ns for ns, _ in identities], breaks)
-    samples = epochs(axis.pings, nominal, axis.cuts_ns)
-    by_host = Source("pings", ping_rate(samples), 0.0 if session.simulated else HOST_U)
+    axis = one_axis(pings, [ns for ns, _ in identities], breaks)
+    found = epochs(axis.pings, nominal, axis.cuts_ns)
+    by_host = Source("pings", ping_rate(found), 0.0 if session.simulated else HOST_U)
     sources = [by_host] if by_host.rate.n else []
     if pulses := session.pulses():
         reference_u = reader.parse(session.protocol_text, session.protocol_source).reference_u
@@ -172,13 +198,13 @@ def calibration(session: Reader) -> Calibration:
             for pulse in pulses
             for shift in axis.shifts(pulse.host_send_ns)
         ]
-        rate = pulse_rate(samples, shifted, by_host.rate)
+        rate = pulse_rate(found, shifted, by_host.rate)
         if rate.n:
             sources.append(Source("reference", rate, reference_u))
     sources.sort(key=lambda source: source.mean().u)
     scale = sources[0].mean() if sources else TimeScale(nominal, _UNKNOWN)
     said: dict[str, Any] = _said(sources, scale, nominal) | {
-        "epochs": len(samples.pings),
+        "epochs": len(found.pings),
         "host_breaks": len(breaks),
         "notes": _notes(sources, len(breaks)),
     }
@@ -199,16 +225,8 @@ def calibration(session: Reader) -> Calibration:
         said,
         u,
         tuple(sources),
-        Falls(samples, scale.hz, axis, _fired(session)),
+        Falls(found, scale.hz, axis, session.fired_ns()),
     )
-
-
-def _fired(session: Reader) -> dict[tuple[int, int], int]:
-    return {
-        (entry.run, entry.attempt): entry.host_ns
-        for entry in session.states()
-        if entry.state is RunState.FIRED
-    }
 
 
 def _said(sources: list[Source], scale: TimeScale, nominal: int) -> dict[str, Any]:

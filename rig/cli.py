@@ -127,6 +127,20 @@ def _parser() -> argparse.ArgumentParser:
 
     _protocol(command("check", "say what a protocol's scene has and what follows from it"))
 
+    design = command("design", "predict what a gate layout will tell, and propose better heights")
+    _protocol(design)
+    design.add_argument("--repeats", type=_count, metavar="N", help="drops at each incline")
+    design.add_argument(
+        "--learned", metavar="SESSION", help="scatter as an earlier session of the rig taught it"
+    )
+    design.add_argument("--lowest", metavar="H", help='of a beam, as "20 mm" (default: as now)')
+    design.add_argument("--highest", metavar="H", help="of a beam (default: as now)")
+    design.add_argument("--spacing", metavar="D", help="of two beams of a side (default 10 mm)")
+    design.add_argument(
+        "--no-search", action="store_true", help="only what the protocol's own heights tell"
+    )
+    _json(design)
+
     predict = command("predict", "say what the model expects")
     predict.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="the protocol file (YAML)")
     predict.add_argument(
@@ -140,9 +154,17 @@ def _parser() -> argparse.ArgumentParser:
     _sweep(command("sweep", "map the model's Δz and V over a grid of parameters"))
 
     imported = command("import", "make a session from the edges of another timer", "import_edges")
-    imported.add_argument("events", metavar="EVENTS.csv", help="columns run,channel,time_s,state")
+    imported.add_argument(
+        "events",
+        metavar="EVENTS.csv",
+        help="columns run,channel,time_s,state, or a "
+        "data logger's table of times, with or without states",
+    )
     imported.add_argument("--protocol", required=True, metavar="FILE", help="what was dropped")
     imported.add_argument("--session", required=True, metavar="FILE", help="the new session")
+    imported.add_argument(
+        "--channel", type=int, metavar="N", help="of the gate that a data logger's times are of"
+    )
     imported.add_argument(
         "--clock-uncertainty",
         metavar="U",
@@ -161,7 +183,18 @@ def _parser() -> argparse.ArgumentParser:
     analyze.add_argument(
         "--trials", type=_count, default=200, metavar="M", help="Monte Carlo trials beside it"
     )
+    analyze.add_argument(
+        "--session-trials", type=_count, metavar="M", help="Monte Carlo of the session's joint fit"
+    )
+    analyze.add_argument(
+        "--scatter", action="store_true", help="SD, SE and U of each incline, and half-SD bars"
+    )
     _json(analyze)
+
+    estimated = command("estimate", "estimate restitution, friction and impulses from a session")
+    _session(estimated)
+    estimated.add_argument("-o", "--output", metavar="DIR", help="folder for pictures as SVG files")
+    _json(estimated)
 
     report = command("report", "write the results of a session as one HTML page")
     _session(report)
@@ -231,15 +264,16 @@ def _parser() -> argparse.ArgumentParser:
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
     accuracy.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
-    accuracy.add_argument(
-        "--seeds", type=_count, default=5, metavar="N", help="sessions to simulate"
-    )
+    accuracy.add_argument("--seeds", type=_count, metavar="N", help="sessions to simulate")
     accuracy.add_argument(
         "--repeats", type=_count, metavar="N", help="drops at each incline, not the protocol's"
     )
     accuracy.add_argument(
-        "--doubled", action="store_true", help="also with each dial of the simulation doubled"
+        "--doubled",
+        action="store_true",
+        help="many short sessions, also with each dial of the simulation doubled",
     )
+    accuracy.add_argument("--jobs", type=_count, metavar="N", help="cases at a time")
     _json(accuracy)
     stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
     stability.set_defaults(module="bench_stability")
@@ -260,6 +294,27 @@ def _parser() -> argparse.ArgumentParser:
     scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
     scenes.add_argument("-o", "--output", metavar="DIR", help="folder for CSV, JSON and a picture")
     _json(scenes)
+    every = benches.add_parser("estimators", help="error against run time from edges to Δz and V")
+    every.set_defaults(module="bench_estimators")
+    every.add_argument(
+        "-o", "--output", required=True, metavar="DIR", help="folder for CSV, JSON and a picture"
+    )
+    every.add_argument(
+        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
+    )
+    every.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
+    every.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
+    every.add_argument(
+        "--repeats", type=_count, default=4, metavar="N", help="drops at each incline (default 4)"
+    )
+    every.add_argument(
+        "--budget",
+        type=_count,
+        default=120,
+        metavar="S",
+        help="seconds that one Monte Carlo setting may take (default 120)",
+    )
+    _json(every)
     clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
     clock.set_defaults(module="bench_clock")
     clock.add_argument(
@@ -272,11 +327,22 @@ def _parser() -> argparse.ArgumentParser:
     faults.add_argument(
         "--share", type=_count, default=100, metavar="PERCENT", help="of the full counts"
     )
-    faults.add_argument("--jobs", type=_count, default=4, metavar="N", help="rigs side by side")
+    faults.add_argument("--jobs", type=_count, default=6, metavar="N", help="rigs side by side")
+    faults.add_argument(
+        "--board", dest="boards", nargs="+", choices=["sim", "emu"], default=["sim", "emu"],
+        help="virtual, or real firmware in an emulator",
+    )  # fmt: skip
+    faults.add_argument("--kind", dest="kinds", nargs="+", metavar="KIND", help="only these")
     _json(faults)
     links = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
     links.set_defaults(module="bench_link")
     _json(links)
+    screen = benches.add_parser("tui", help="what the screen costs, and how late it is")
+    screen.set_defaults(module="bench_tui")
+    screen.add_argument(
+        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
+    )
+    _json(screen)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")

@@ -60,6 +60,22 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         ) from error
 
 
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder for several files, unless it is there.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    return folder
+
+
 def sync_directory(path: Path) -> None:
     """Make the names in a folder durable, where the file system can."""
     with suppress(OSError):  # some network and FAT mounts refuse to sync a folder

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rig.link.messages import TEST_RUN
 from rig.link.transcript import Transcript
 from rig.records import Drop, Ping, Pulse
 from rig.results import results
@@ -67,7 +68,8 @@ def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping], list[Puls
         chunks += 1
         for record in transcript.feed(direction, host_ns, data):
             if isinstance(record, Drop):
-                drops.append(record)
+                if record.run != TEST_RUN:  # of the release, and of no plan
+                    drops.append(record)
             elif isinstance(record, Ping):
                 pings.append(record)
             elif isinstance(record, Pulse):
@@ -76,7 +78,21 @@ def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping], list[Puls
     have = {_key(drop) for drop in drops}
     stored = {_key(drop) for drop in session.drops()}
     drops += [d for d in transcript.unfinished() if _key(d) in stored - have]
-    return chunks, drops, pings, pulses
+    return chunks, _once(drops), pings, pulses
+
+
+def _once(drops: list[Drop]) -> list[Drop]:
+    """Leave out what was acknowledged again because the first ACKNOWLEDGE was lost on its way."""
+    kept: list[Drop] = []
+    for drop in drops:
+        if not any(
+            (one.certificate, one.fire_tick, one.edges)
+            == (drop.certificate, drop.fire_tick, drop.edges)
+            for one in kept
+            if _key(one) == _key(drop)
+        ):
+            kept.append(drop)
+    return kept
 
 
 def _key(drop: Drop) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.gravity import check_gravity
@@ -18,6 +19,7 @@ __all__ = [
     "rejected",
     "results",
     "tick_rates",
+    "with_analysis",
 ]
 
 if TYPE_CHECKING:
@@ -29,8 +31,16 @@ if TYPE_CHECKING:
 
 
 def protocol_of(session: Reader) -> Protocol:
-    """Read the protocol as the session keeps it."""
-    return reader.parse(session.protocol_text, session.protocol_source)
+    """Read the protocol as the session keeps it, with the beams that its timer had.
+
+    Other timers may have had fewer than the protocol; a board's beams are those of the protocol.
+    """
+    protocol = reader.parse(session.protocol_text, session.protocol_source)
+    had = next((one["beams"] for _, one in session.identities() if "beams" in one), None)
+    if had is None or protocol.gates is None:
+        return protocol
+    gates = tuple(gate for gate in protocol.gates.gates if gate.channel in had)
+    return replace(protocol, gates=replace(protocol.gates, gates=gates))
 
 
 def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]:
@@ -43,6 +53,13 @@ def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]
     progress
         Called with the number of drops done and the number of all.
     """
+    return with_analysis(session, progress)[0]
+
+
+def with_analysis(
+    session: Reader, progress: Progress | None = None
+) -> tuple[dict[str, Any], Analysis]:
+    """Like `results`, with the analysis that they are of."""
     protocol = protocol_of(session)
     found, clock, drops = _analysed(session, protocol, progress)
     by_key = {(drop.run, drop.attempt): drop for drop in drops}
@@ -52,7 +69,8 @@ def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]
     cases = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
     check = check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in cases])
     head = {"simulated": session.simulated, "clock": clock.details}
-    return head | {"calibration": clock.said | _checked(clock.said["notes"], check)} | said
+    said = head | {"calibration": clock.said | _checked(clock.said["notes"], check)} | said
+    return said, found
 
 
 def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.analysis.drop import analyze_drop
-from rig.calibration import calibration
+from rig.calibration import Calibrator
 from rig.daemon.connecting import connect
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, InputError
@@ -153,6 +153,8 @@ class Campaign:
         self.interrupts = interrupts
         self.plan = runs(protocol)
         self._unfired = 0  # refusals to fire in a row
+        self._calibrator = Calibrator()
+        self._clock_known = False  # once well enough, always: one rate for all samples
 
     def carry_out(self) -> None:
         """Do every run that is not done yet, in order."""
@@ -166,7 +168,7 @@ class Campaign:
 
     def _next_attempt(self, run: Run) -> int | None:
         """Number of the next attempt at a run; `None` when the run is done with."""
-        entries = [entry for entry in self.session.states() if entry.run == run.number]
+        entries = self.session.states(run.number)
         if not entries:
             return 1
         if entries[-1].state in _SETTLED:
@@ -195,8 +197,10 @@ class Campaign:
         if self.operator.ask is not None:
             self.operator.ask(f"run {run.number} of {len(self.plan)}{again}: {what_to_hang(run)}")
         settle = self.protocol.plan.settle
-        clock = calibration(self.session).device
-        if clock is None or clock.u > _CLOCK_U:
+        if not self._clock_known:
+            clock = self._calibrator.look(self.session).device
+            self._clock_known = clock is not None and clock.u <= _CLOCK_U
+        if not self._clock_known:
             settle = max(settle, _CLOCK_S)
         self.rig.wait(settle)
 
@@ -240,7 +244,7 @@ class Campaign:
 
     def _judge(self, run: Run, drop: Drop) -> None:
         """Analyse a recorded drop and log the verdict."""
-        scale = calibration(self.session).scale(drop)
+        scale = self._calibrator.look(self.session).scale(drop)
         result = analyze_drop(self.protocol, run, drop, scale)
         self.rig.log_state(run.number, drop.attempt, RunState(result.verdict), result.reasons)
         self.operator.say(narration(result, len(self.plan)))

@@ -1,9 +1,12 @@
 """A virtual board behind a pseudo-terminal, in real time: ``python -m sim.pty``.
 
 Prints the path of the terminal's link on stdout; any program opens it like a board's port, as
-often as it likes. Lines on stdin do what hands do at a rig: ``reset``, ``pull SECONDS`` (the
-cable), ``block MASK`` (beams), ``stop 1``, ``stop 0``; the end of stdin ends it. The log gets a
-line of JSON for every drop as the board holds it, and for every change of phase or outputs.
+often as it likes. Lines on stdin do what hands do at a rig: ``reset``, ``pull SECONDS [LINK]`` (the
+cable, and put it in again, perhaps elsewhere), ``mute 1`` (the wire towards the host), ``mute 0``,
+``mute fall`` (while chains fall), ``block MASK`` (beams), ``stop 1``, ``stop 0``; the end of stdin
+ends it. The log gets a line of JSON for every drop as the board holds it, and for every change of
+phase or outputs: seen `at_s`, and not yet at `after_s`; `gap_s` is the longest time between two
+looks since the last line, by which the board may have heard too late.
 """
 
 from __future__ import annotations
@@ -18,18 +21,59 @@ import sys
 import time
 import tty
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.link.messages import Phase
 from sim.board import VirtualBoard
+from sim.board_interface import Board
 from sim.line import LineFaults
 from sim.scene import set_scene
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+
+    from sim.scene import Scene
 
 _TICK_S = 4e-3
 _CHUNK = 4096
+HELD = ("label", "fire_tick", "events", "crc32", "overflows")
+"""What the log tells of a drop's certificate."""
+
+
+class GlassBoard(Board, Protocol):
+    """A board with hands around it, and one that can be looked into."""
+
+    def touch(self, gates: int) -> None: ...  # noqa: D102
+
+    def stop(self, opened: bool) -> None: ...  # noqa: D102
+
+    def outputs(self) -> int: ...  # noqa: D102
+
+    def phase(self) -> int:
+        """Tell what it is doing, see `Phase`."""
+        ...
+
+    def held(self) -> tuple[dict[str, int], list[tuple[int, int]]]:
+        """Tell what it keeps of the drop it holds: the certificate's main fields, the events."""
+        ...
+
+
+class GlassVirtualBoard(VirtualBoard):
+    """A virtual board that can be looked into."""
+
+    def phase(self) -> int:
+        """Tell what it is doing."""
+        return self._controller.phase
+
+    def held(self) -> tuple[dict[str, int], list[tuple[int, int]]]:
+        """Tell what it keeps."""
+        drop = self._controller.drop
+        assert drop is not None
+        found: list[tuple[int, int]] = []
+        while part := drop.part(len(found), 40).events:
+            found += [(event.tick, event.state) for event in part]
+        certificate = drop.certificate()
+        return {name: getattr(certificate, name) for name in HELD}, found
 
 
 class Bench:
@@ -48,7 +92,7 @@ class Bench:
     """
 
     def __init__(
-        self, board: VirtualBoard, link: Path, log: Path, faults: tuple[LineFaults, LineFaults]
+        self, board: GlassBoard, link: Path, log: Path, faults: tuple[LineFaults, LineFaults]
     ) -> None:
         self.board = board
         self._link = link
@@ -56,8 +100,11 @@ class Bench:
         self._to_board, self._to_host = faults
         self._ends: tuple[int, int] | None = None
         self._plug_at = 0.0
+        self._mute = "0"
         self._begun_ns = time.monotonic_ns()
         self._seen: tuple[int, int] = (0, 0)
+        self._looked_s = time.monotonic()
+        self._gap_s = 0.0  # between two looks, the longest since the last line of the log
         self.plug()
 
     def plug(self) -> None:
@@ -108,9 +155,12 @@ class Bench:
         match words:
             case ["reset"]:
                 self.board.reset(self._now_ns())
-            case ["pull", seconds]:
+            case ["pull", seconds, *elsewhere]:
                 self.pull()
                 self._plug_at = time.monotonic() + float(seconds)
+                self._link = Path(*elsewhere) if elsewhere else self._link
+            case ["mute", when]:
+                self._mute = when
             case ["block", mask]:
                 self.board.touch(int(mask, 0))
             case ["stop", opened]:
@@ -124,6 +174,9 @@ class Bench:
     def _pass_bytes(self) -> None:
         now_ns = self._now_ns()
         data = self._to_host.damage(self.board.line.arrived(now_ns))
+        falling = self.board.phase() == Phase.RECORDING
+        if self._mute == "1" or (self._mute == "fall" and falling):
+            data = b""
         if self._ends is None:
             return
         far = self._ends[0]
@@ -134,36 +187,42 @@ class Bench:
                 data = data[os.write(far, data) :]
 
     def _note(self) -> None:
-        inside = self.board._controller
-        seen = (int(inside.phase), self.board.outputs())
+        before_s, self._looked_s = self._looked_s, time.monotonic()
+        self._gap_s = max(self._gap_s, self._looked_s - before_s)
+        seen = (int(self.board.phase()), self.board.outputs())
         if seen == self._seen:
             return
-        if inside.drop is not None and (inside.phase, self._seen[0]) == (
-            Phase.HOLDING,
-            Phase.RECORDING,
-        ):
-            self._write({"drop": _told(inside.drop.certificate()), "events": _events(inside.drop)})
+        # A recording may begin and be aborted between two looks; a reset shows the drop again.
+        if seen[0] == Phase.HOLDING != self._seen[0]:
+            drop, events = self.board.held()
+            self._write({"drop": drop, "events": events})
         self._seen = seen
-        self._write({"at_s": time.monotonic(), "phase": seen[0], "outputs": seen[1]})
+        when = {"at_s": self._looked_s, "after_s": before_s, "gap_s": self._gap_s}
+        self._write(when | {"phase": seen[0], "outputs": seen[1]})
+        self._gap_s = 0.0
 
     def _write(self, what: dict[str, Any]) -> None:
         self._log.write(json.dumps(what) + "\n")
 
 
-def _told(certificate: Any) -> dict[str, int]:
-    names = ("label", "fire_tick", "events", "crc32", "overflows")
-    return {name: getattr(certificate, name) for name in names}
+def virtual(scene: Scene) -> GlassBoard:
+    """Put a virtual board before a scene."""
+    return GlassVirtualBoard(scene.lab, scene.seed, ppm=scene.dials.clock * 1e6)
 
 
-def _events(drop: Any) -> list[tuple[int, int]]:
-    found: list[tuple[int, int]] = []
-    while part := drop.part(len(found), 40).events:
-        found += [(event.tick, event.state) for event in part]
-    return found
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(
+    arguments: Sequence[str] | None = None,
+    make: Callable[[Scene], GlassBoard] = virtual,
+    scheme: str = "sim",
+) -> int:
     """Run until stdin ends.
+
+    Parameters
+    ----------
+    arguments
+        Of the command line.
+    make, scheme
+        Which board, and what its URLs begin with.
 
     Returns
     -------
@@ -178,11 +237,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("dial", nargs="*", metavar="NAME=VALUE", help="as in a sim:// URL")
     options = parser.parse_args(arguments)
     dials = dict(text.split("=", 1) for text in options.dial)
-    scene = set_scene("sim", {"protocol": options.protocol, "seed": options.seed} | dials)
+    scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
     line = scene.line()
     faults = [LineFaults(line["corrupt"], line["lose"], seed=2 * scene.seed + n) for n in (0, 1)]
-    board = VirtualBoard(scene.lab, scene.seed, ppm=scene.dials.clock * 1e6)
-    bench = Bench(board, options.link, options.log, (faults[0], faults[1]))
+    bench = Bench(make(scene), options.link, options.log, (faults[0], faults[1]))
     try:
         print(options.link, flush=True)
         bench.serve()

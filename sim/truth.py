@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -34,5 +34,6 @@ class Truth:
 
 def append_truth(path: Path, truth: Truth) -> None:
     """Add one drop's truth as a line of JSON."""
+    row = {one.name: getattr(truth, one.name) for one in fields(truth)}
     with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(asdict(truth)) + "\n")
+        file.write(json.dumps(row) + "\n")

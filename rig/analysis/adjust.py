@@ -39,8 +39,8 @@ class Estimate:
         Normal matrix in units of the prior uncertainties, prior included.
     data
         The part of it that comes from edges.
-    chi2, degrees
-        Of the edges: weighted sum of squares, and number of edges less what they determine.
+    chi2, edges
+        Weighted sum of squares of the edges, and their number.
     scatter
         How much more the edges scatter than assumed; at least 1, and already allowed for.
     settled
@@ -52,7 +52,7 @@ class Estimate:
     information: Array
     data: Array
     chi2: float
-    degrees: float
+    edges: int
     scatter: float
     settled: bool = True
 
@@ -60,6 +60,11 @@ class Estimate:
     def covariance(self) -> Array:
         """Inverse of the normal matrix."""
         return np.linalg.inv(self.information).astype(float, copy=False)
+
+    @property
+    def degrees(self) -> float:
+        """Degrees of freedom: edges less the unknowns that they determine."""
+        return self.edges - self.x.size + float(np.trace(self.covariance))
 
 
 def adjust(model: DropModel, matches: Matches, x: Array, centre: Array | None = None) -> Estimate:
@@ -82,27 +87,32 @@ def adjust(model: DropModel, matches: Matches, x: Array, centre: Array | None = 
     prior = np.zeros_like(x)
     if centre is not None:
         prior = np.divide(centre, sd, out=prior, where=free)
-    information = data = np.eye(x.size)
-    chi2, degrees = 0.0, 0.0
+    identity = np.eye(x.size)
+    information = data = identity
+    chi2, edges, moved = 0.0, 0, 0.0
     inflation = 1.0
     settled = False
     for step in range(_STEPS):
         found = normal(model, matches, scaled * sd, sd, inflation)
         data = found.matrix
-        information = data + np.eye(x.size)
+        information = data + identity
         new = np.linalg.solve(information, data @ scaled - found.vector + prior)
-        moved = float(np.abs(new - scaled).max(initial=0.0))
+        last, moved = moved, float(np.abs(new - scaled).max(initial=0.0))
         scaled = new
-        before, chi2 = chi2, found.chi2
-        if step and abs(chi2 - before) <= _STEADY * max(chi2, 1.0):
-            degrees = found.size - float(np.trace(np.linalg.solve(information, data)))
-            factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
+        before, chi2, edges = chi2, found.chi2, found.size
+        # Unknowns take away less than their number: a chi2 so small needs no closer look.
+        calm = chi2 <= edges - x.size
+        if step and (calm or abs(chi2 - before) <= _STEADY * max(chi2, 1.0)):
+            factor = 1.0
+            if not calm:
+                degrees = edges - float(np.trace(np.linalg.solve(information, data)))
+                factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
             if factor >= 1.05:
                 inflation *= factor  # the edges scatter more than assumed: weigh them so
-            elif moved < _DONE:
+            elif moved < _DONE or moved**2 < _DONE * last:  # the next step is shorter again
                 settled = True
                 break
-    return Estimate(scaled * sd, sd, information, data, chi2, degrees, inflation, settled)
+    return Estimate(scaled * sd, sd, information, data, chi2, edges, inflation, settled)
 
 
 def uncertainty(

@@ -2,8 +2,8 @@
 
 Each observed edge is matched to an expected one of the same polarity, or is extra; each expected
 edge is matched or missed. Order is kept, so the cheapest assignment is found by dynamic
-programming over (observed, expected), for all gates of a side at once; gates where every edge has
-one possible partner need none.
+programming over (observed, expected), block by block: most edges have one possible partner, which
+nobody else may have.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -57,73 +57,82 @@ def align(
         For each train the index of its edge for every expected edge, −1 for a missed one; shape
         ``(expected,)``.
     """
-    costs = [
-        _costs(train, level, trajectory, scale, 1.0 + clock)
-        for train, level in zip(trains, levels, strict=True)
+    if not trains:
+        return []
+    heights, _ = trajectory.heights(np.concatenate([t.times for t in trains]) * (1.0 + clock))
+    begins = np.cumsum([train.times.size for train in trains])[:-1]
+    return [
+        _match(_costs(train, level, height, scale))
+        for train, level, height in zip(trains, levels, np.split(heights, begins), strict=True)
     ]
-    found = [_plain(cost) for cost in costs]
-    hard = [gate for gate, match in enumerate(found) if match is None]
-    solved = dict(zip(hard, _best([costs[gate] for gate in hard]), strict=True))
-    return [solved[gate] if match is None else match for gate, match in enumerate(found)]
 
 
-def _plain(costs: Array) -> Index | None:
-    """Match a gate where every edge has at most one partner; `None` where there is a choice.
+def possible(train: Train, trajectory: Trajectory, scale: float, clock: float) -> int:
+    """Most expected edges that any matching could match at the nominal levels, see `align`."""
+    heights, _ = trajectory.heights(train.times * (1.0 + clock))
+    return int(_worth(_costs(train, train.levels, heights, scale)).any(axis=0).sum())
 
-    A pair is worth while if it costs less than a missed and an extra edge. Where all such pairs
-    are apart and in order, taking all of them is the cheapest of all matchings.
-    """
-    worth = costs < MISSED + EXTRA
-    if costs.size and (worth.sum(axis=0).max() > 1 or worth.sum(axis=1).max() > 1):
-        return None
+
+def _costs(train: Train, levels: Array, heights: Array, scale: float) -> Array:
+    """Cost of every pairing, shape ``(edges, expected)``; infinite for unlike polarities."""
+    distance = (heights[:, None] - levels) / scale
+    return np.where(train.blocked[:, None] == train.blocks, 0.5 * distance**2, np.inf)
+
+
+def _worth(costs: Array) -> NDArray[np.bool_]:
+    """Which pairs cost less than a missed and an extra edge: no other is ever matched."""
+    return costs < MISSED + EXTRA
+
+
+def _match(costs: Array) -> Index:
+    """Match one gate, shape ``(expected,)``."""
     matched = np.full(costs.shape[1], -1, dtype=np.intp)
-    edge, rod = np.nonzero(worth)
-    if np.any(np.diff(rod) < 0):
-        return None
-    matched[rod] = edge
+    worth = _worth(costs)
+    rows = np.flatnonzero(worth.any(axis=1))
+    if not rows.size:
+        return matched
+    first = worth[rows].argmax(axis=1)
+    end = worth.shape[1] - worth[rows, ::-1].argmax(axis=1)
+    # Cut where no edge's choice bears on another's: all later ones begin beyond all earlier ones.
+    later = np.minimum.accumulate(first[::-1])[::-1]
+    earlier = np.maximum.accumulate(end)
+    cuts = np.concatenate([[0], 1 + np.flatnonzero(later[1:] >= earlier[:-1]), [rows.size]])
+    begins, sizes = cuts[:-1], np.diff(cuts)
+    sole = (sizes == 1) & ((end - first)[begins] == 1)
+    matched[first[begins[sole]]] = rows[begins[sole]]
+    for begin, size in zip(begins[~sole].tolist(), sizes[~sole].tolist(), strict=True):
+        edges = rows[begin : begin + size]
+        left, right = later[begin], earlier[begin + size - 1]
+        for row, column in _cheapest(costs[edges, left:right].tolist()):
+            matched[left + column] = edges[row]
     return matched
 
 
-def _best(costs: Sequence[Array]) -> list[Index]:
-    """Match several gates by dynamic programming, side by side."""
-    rows = max((cost.shape[0] for cost in costs), default=0)
-    columns = max((cost.shape[1] for cost in costs), default=0)
-    stacked = np.full((rows, len(costs), columns), np.inf)
-    extra = np.zeros((rows, len(costs)))
-    for gate, cost in enumerate(costs):
-        stacked[: cost.shape[0], gate, : cost.shape[1]] = cost
-        extra[: cost.shape[0], gate] = EXTRA
-    misses = MISSED * np.arange(columns + 1)
-    table = np.empty((rows + 1, len(costs), columns + 1))
-    table[0] = misses
-    for row in range(rows):
-        best = table[row] + extra[row][:, None]
-        np.minimum(best[:, 1:], table[row][:, :-1] + stacked[row], out=best[:, 1:])
-        # What is missed on the way adds a constant a column: a running minimum finds the best.
-        table[row + 1] = np.minimum.accumulate(best - misses, axis=1) + misses
-    return [_trace(table[:, gate], cost) for gate, cost in enumerate(costs)]
+def _cheapest(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
+    """Match one block by dynamic programming over (edges, expected)."""
+    size = len(costs[0])
+    table = [[MISSED * column for column in range(size + 1)]]
+    for number, row in enumerate(costs):
+        before, best = table[-1], EXTRA * (number + 1)
+        line = [best]
+        for column, cost in enumerate(row):
+            best = min(before[column] + cost, before[column + 1] + EXTRA, best + MISSED)
+            line.append(best)
+        table.append(line)
+    return list(_trace(table, costs))
 
 
-def _costs(
-    train: Train, levels: Array, trajectory: Trajectory, scale: float, stretch: float
-) -> Array:
-    """Cost of every pairing, shape ``(edges, expected)``; infinite for unlike polarities."""
-    heights, _ = trajectory.heights(train.times * stretch)
-    distance = (heights[:, None] - levels[None, :]) / scale
-    return np.where(train.blocked[:, None] == train.blocks[None, :], 0.5 * distance**2, np.inf)
-
-
-def _trace(table: Array, costs: Array) -> Index:
-    """Walk back through one gate's table."""
-    row, column = costs.shape
-    matched = np.full(column, -1, dtype=np.intp)
+def _trace(
+    table: Sequence[Sequence[float]], costs: Sequence[Sequence[float]]
+) -> Iterator[tuple[int, int]]:
+    """Walk back through a block's table."""
+    row, column = len(costs), len(costs[0])
     while row and column:
-        here = table[row, column]
-        if table[row - 1, column - 1] + costs[row - 1, column - 1] <= here + _ROUNDING:
+        here = table[row][column] + _ROUNDING
+        if table[row - 1][column - 1] + costs[row - 1][column - 1] <= here:
             row, column = row - 1, column - 1
-            matched[column] = row
-        elif table[row - 1, column] + EXTRA <= here + _ROUNDING:
+            yield row, column
+        elif table[row - 1][column] + EXTRA <= here:
             row -= 1
         else:
             column -= 1
-    return matched

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.analysis.causes import causes
 from rig.analysis.components import STATED, Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import Fit, settle
@@ -69,8 +70,8 @@ def fit_drop(
     early = judge(protocol, drop, guesses, blank, {}, None)
     if early.verdict == "void":
         unlike = [role for role, one in guesses.items() if pattern_faults(role, one)]
-        causes = suspects(protocol, run, drop, scale.hz, sides, unlike)
-        reasons = (*early.reasons, *causes)
+        faults = suspects(protocol, run, drop, scale.hz, sides, unlike)
+        reasons = (*early.reasons, *faults)
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
     fit = settle(DropModel(protocol, sides, guesses, scale.u, components))
     audit = blank.after(fit.matched)
@@ -85,5 +86,6 @@ def fit_drop(
         found,
         fit.rods,
         fit.estimate.scatter,
+        causes=causes(fit),
     )
     return result, fit

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import STATED, Components
+from rig.analysis.equations import Equations, Expected
 from rig.analysis.trajectory import (
     COMMON,
     GRAVITY,
@@ -26,89 +27,33 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.pattern import Guess
-    from rig.analysis.trains import Side, Train
+    from rig.analysis.trains import Side
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.scene import Protocol
 
     Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
 
 
-class Equations(NamedTuple):
-    """Observation equations of one side, one a matched edge.
+class _Local(NamedTuple):
+    """The unknowns that one side knows of, by their places in its own equations.
 
     Attributes
     ----------
-    residuals
-        Where the beam saw the rod's side less where the beam is, m.
-    jacobian
-        Derivatives by all unknowns.
-    sigma
-        Standard deviation of each residual, m.
-    speed
-        Of the chain at each edge, m/s.
-    clean
-        Whether each edge is no part of a flicker.
+    columns
+        Places in the drop's vector, shape ``(columns,)``.
+    at
+        Where each is among them, by the place in the drop's vector.
+    moving
+        Which of them move its trajectory, shape ``(moving,)``.
+    path
+        Derivatives of the trajectory's parameters by these, shape ``(parameters, moving)``.
     """
 
-    residuals: Array
-    jacobian: Array
-    sigma: Array
-    speed: Array
-    clean: Flags
-
-
-class Expected(NamedTuple):
-    """All gates of a side one after another.
-
-    Attributes
-    ----------
-    times, burst
-        Of every observed edge, see `rig.analysis.trains.Train`.
-    rods, gate, levels
-        Of every expected edge.
-    sign
-        By how much its height follows the rods' width: −½ where it darkens the beam, else ½.
-    begins, ends
-        Number of observed edges before each gate, and of expected ones after each but the last.
-    """
-
-    times: Array
-    burst: Array
-    rods: Index
-    gate: Index
-    levels: Array
-    sign: Array
-    begins: Index
-    ends: Index
-
-    @classmethod
-    def of(cls, trains: Sequence[Train]) -> Expected:
-        """Join the gates of a side."""
-        observed = np.array([train.times.size for train in trains])
-        expected = [train.rods.size for train in trains]
-        return cls(
-            np.concatenate([train.times for train in trains]),
-            np.concatenate([train.burst for train in trains]),
-            np.concatenate([train.rods for train in trains]),
-            np.repeat([train.gate for train in trains], expected),
-            np.concatenate([train.levels for train in trains]),
-            np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
-            np.cumsum(observed) - observed,
-            np.cumsum(expected)[:-1],
-        )
-
-    def chosen(self, matches: Sequence[Index]) -> tuple[Index, Index]:
-        """Expected edges that are matched, and the observed edge of each."""
-        edges = np.concatenate(
-            [
-                np.where(match >= 0, match + begin, -1)
-                for match, begin in zip(matches, self.begins, strict=True)
-            ]
-        )
-        pick = np.flatnonzero(edges >= 0)
-        return pick, edges[pick]
+    columns: Index
+    at: Index
+    moving: Index
+    path: Array
 
 
 class DropModel:
@@ -154,6 +99,7 @@ class DropModel:
             role: slope / (self._steepest or 1.0) for role, slope in slopes.items()
         }
         self.unknowns = self._unknowns()
+        self._local = {role: self._columns(role) for role in self.sides}
 
     def _unknowns(self) -> Unknowns:
         """Name everything that is not known, with what is known of it beforehand."""
@@ -183,6 +129,26 @@ class DropModel:
             unknowns.add("alpha", "edges", ANYTHING)
             unknowns.add("impulses", "single impulses", [scatter] * rods)
         return unknowns
+
+    def _columns(self, role: str) -> _Local:
+        """Leave out what the other side alone depends on."""
+        others = [f"{name} " for name in self.sides if name != role]
+        if role == "free":
+            others += ["alpha", "impulses"]
+        assert self.protocol.gates is not None
+        mine = np.ones(len(self.unknowns), dtype=np.bool_)
+        for name, block in self.unknowns.blocks.items():
+            mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
+        elsewhere = np.ones(len(self.protocol.gates.gates), dtype=np.bool_)
+        elsewhere[[train.gate for train in self.sides[role].trains]] = False
+        for name in ("beams", "ripple"):
+            if name in self.unknowns:
+                mine[self.unknowns[name]] &= ~elsewhere
+        columns = np.flatnonzero(mine)
+        parameters = COMMON + (2 * len(self.sides[role].chain.widths) if role == "impact" else 0)
+        path = self.spread(role, np.eye(parameters))[:, columns]
+        moving = np.flatnonzero(path.any(axis=0))
+        return _Local(columns, np.cumsum(mine) - 1, moving, path[:, moving])
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
         """Return the same drop with other priors, that of impulses relative to the α found.
@@ -271,34 +237,30 @@ class DropModel:
         at, expected = self.unknowns, self.expected[role]
         shift = x[at["beams"]][expected.gate] - x[at[f"{role} rods"]][expected.rods]
         if "ripple" in at:
-            shift -= self._ripple(role, expected.rods) * x[at["ripple"]][expected.gate]
+            shift -= self._tilts[role] * expected.turn * x[at["ripple"]][expected.gate]
         found: Array = expected.levels + shift - expected.sign * x[at[f"{role} width"]][0]
         return found
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges."""
-        at, expected = self.unknowns, self.expected[role]
+        at, expected, local = self.unknowns, self.expected[role], self._local[role]
         path = self.trajectory(role, x)
         pick, edge = expected.chosen(matches)
         raw, burst = expected.times[edge], expected.burst[edge]
-        rods, sign, gate = expected.rods[pick], expected.sign[pick], expected.gate[pick]
+        rods, gate = expected.rods[pick], expected.gate[pick]
         times = raw * (1.0 + x[at["clock"]])
         height, speed = path.heights(times)
-        jacobian = self.spread(role, path.derivatives(times))
+        slopes = np.zeros((times.size, local.columns.size))
+        slopes[:, local.moving] = path.derivatives(times, local.path)
         row = np.arange(times.size)
-        jacobian[:, at["clock"].start] -= speed * raw
-        jacobian[row, at[f"{role} rods"].start + rods] += 1.0
-        jacobian[:, at[f"{role} width"].start] += sign
-        jacobian[row, at["beams"].start + gate] -= 1.0
+        slopes[:, local.at[at["clock"].start]] -= speed * raw
+        slopes[row, local.at[at[f"{role} rods"].start + rods]] += 1.0
+        slopes[:, local.at[at[f"{role} width"].start]] += expected.sign[pick]
+        slopes[row, local.at[at["beams"].start + gate]] -= 1.0
         if "ripple" in at:
-            jacobian[row, at["ripple"].start + gate] += self._ripple(role, rods)
+            ripple = self._tilts[role] * expected.turn[pick]
+            slopes[row, local.at[at["ripple"].start + gate]] += ripple
         known = self.components
         sigma = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + burst**2))
         residuals = height - self._levels(role, x)[pick]
-        return Equations(residuals, jacobian, sigma, speed, burst == 0.0)
-
-    def _ripple(self, role: str, rods: Index) -> Array:
-        """+ for even rods, − for odd ones: neighbours are tilted the other way."""
-        tilt = self._tilts[role]
-        found: Array = np.where(rods % 2, -tilt, tilt)
-        return found
+        return Equations(residuals, slopes, sigma, speed, burst == 0.0, local.columns, len(at))

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.components import Components
-    from rig.analysis.drop_model import DropModel, Equations
+    from rig.analysis.drop_model import DropModel
+    from rig.analysis.equations import Equations
 
     Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.align import align
+from rig.analysis.align import align, possible
 from rig.analysis.trains import Train
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.fit import Fit
+    from rig.analysis.trajectory import Trajectory
     from rig.protocol.scene import Gate
 
     Array = NDArray[np.float64]
@@ -75,7 +76,7 @@ def find_faults(fit: Fit) -> Faults:
         elif gate.off > IMPLAUSIBLE:
             void.append(f"{name} is off its height by {gate.off:.0f} times its uncertainty")
     for role in fit.model.sides:
-        void += _rods(fit, role)
+        void += _rods(fit, role, [gate for gate in alive if gate.role == role])
     return Faults(tuple(void), tuple(doubts))
 
 
@@ -140,14 +141,18 @@ def _exchanged(fit: Fit, one: _Seen, other: _Seen) -> bool:
 
     Gates that are a whole number of rods apart see nearly the same: the ends of the chain tell.
     """
-    counts = _count_as(fit, one, other), _count_as(fit, other, one)
-    right = counts[0] > RIGHT * one.match.size and counts[1] > RIGHT * other.match.size
+    counts = []
+    for expected, observed in ((one, other), (other, one)):
+        count = _count_as(fit, expected, observed)
+        if count <= RIGHT * expected.match.size:
+            return False
+        counts.append(count)
     far = max(one.off, other.off) > IMPLAUSIBLE
-    return right and (far or sum(counts) > one.matched + other.matched + 1)
+    return far or sum(counts) > one.matched + other.matched + 1
 
 
 def _count_as(fit: Fit, expected: _Seen, observed: _Seen) -> int:
-    """Count the edges of one gate that are what another should have seen."""
+    """Count the edges of one gate that are what another should have seen; 0 where too few are."""
     train = replace(
         expected.train,
         times=observed.train.times,
@@ -155,33 +160,33 @@ def _count_as(fit: Fit, expected: _Seen, observed: _Seen) -> int:
         burst=observed.train.burst,
         edge=observed.train.edge,
     )
-    (match,) = _aligned(fit, expected.role, [train])
+    path, clock = _motion(fit, expected.role)
+    if possible(train, path, _WIDTH, clock) <= RIGHT * train.rods.size:
+        return 0
+    (match,) = align([train], [train.levels], path, _WIDTH, clock)
     return int((match >= 0).sum())
 
 
-def _aligned(fit: Fit, role: str, trains: Sequence[Train]) -> list[Index]:
-    """Match other trains to the motion found."""
+def _motion(fit: Fit, role: str) -> tuple[Trajectory, float]:
+    """Path of a side as adjusted, and how slow the clock is."""
     model, x = fit.model, fit.estimate.x
-    path = model.trajectory(role, x)
-    clock = float(x[model.unknowns["clock"]][0])
-    return align(trains, [train.levels for train in trains], path, _WIDTH, clock)
+    return model.trajectory(role, x), float(x[model.unknowns["clock"]][0])
 
 
-def _rods(fit: Fit, role: str) -> list[str]:
+def _rods(fit: Fit, role: str, gates: Sequence[_Seen]) -> list[str]:
     """Compare the number of rods that passed with the chain's."""
     chain = fit.model.sides[role].chain
     rods = chain.chain.rods
-    seen = np.zeros(rods, dtype=np.intp)
-    expected = np.zeros(rods, dtype=np.intp)
-    for gate in _gates(fit):
-        if gate.role == role and gate.train.times.size:
-            np.add.at(expected, np.unique(gate.train.rods), 1)
-            np.add.at(seen, np.unique(gate.train.rods[gate.match >= 0]), 1)
+    seen, expected = np.zeros((2, rods), dtype=np.intp)
+    for gate in gates:
+        # Of a rod's two edges one is enough, and counts once.
+        expected += np.bincount(gate.train.rods, minlength=rods) > 0
+        seen += np.bincount(gate.train.rods[gate.match >= 0], minlength=rods) > 0
     there = np.flatnonzero(seen)
     missing = rods - 1 - int(there[-1]) if there.size else 0
     if missing and expected[-missing:].min() >= _ENOUGH:
         return [_count(role, chain.name, rods, rods - missing)]
-    more = _more(fit, role)
+    more = _more(fit, role, gates)
     return [_count(role, chain.name, rods, rods + more)] if more else []
 
 
@@ -189,18 +194,20 @@ def _count(role: str, name: str, stated: int, found: int) -> str:
     return f"chain {name} on the {role} side has {found} rods, not {stated} as the protocol says"
 
 
-def _more(fit: Fit, role: str) -> int:
+def _more(fit: Fit, role: str, gates: Sequence[_Seen]) -> int:
     """Count the rods above the top one of the protocol that most gates saw."""
     chain = fit.model.sides[role].chain
     places = chain.chain.heights
-    if len(places) < 2:
+    enough = max(_ENOUGH, len(gates) / 2)
+    left = [gate for gate in gates if gate.train.times.size - gate.matched > 1]
+    if len(places) < 2 or len(left) < enough:
         return 0
     pitch, width = places[-1] - places[-2], chain.widths[-1]
-    gates = [gate for gate in _gates(fit) if gate.role == role and gate.train.times.size]
+    path, clock = _motion(fit, role)
     for more in range(1, _MOST + 1):
-        trains = [_above(fit, gate, places[-1] + more * pitch, width) for gate in gates]
-        both = sum(bool((match >= 0).all()) for match in _aligned(fit, role, trains))
-        if both < max(_ENOUGH, len(gates) / 2):
+        trains = [_above(fit, gate, places[-1] + more * pitch, width) for gate in left]
+        found = align(trains, [train.levels for train in trains], path, _WIDTH, clock)
+        if sum(bool((match >= 0).all()) for match in found) < enough:
             return more - 1
     return _MOST
 

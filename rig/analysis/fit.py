@@ -42,13 +42,13 @@ class Matched:
     @property
     def rods(self) -> dict[int, int]:
         """Rod of every matched edge of the drop."""
-        return {
-            int(part.edge[edge]): int(rod)
-            for role, side in self.model.sides.items()
-            for part, match in zip(side.trains, self.matches[role], strict=True)
-            for edge, rod in zip(match, part.rods, strict=True)
-            if edge >= 0
-        }
+        found: dict[int, int] = {}
+        for role, side in self.model.sides.items():
+            for part, match in zip(side.trains, self.matches[role], strict=True):
+                seen = match >= 0
+                edges = part.edge[match[seen]]
+                found.update(zip(edges.tolist(), part.rods[seen].tolist(), strict=True))
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +56,11 @@ class Fit(Matched):
     """A drop adjusted by itself."""
 
     estimate: Estimate
+
+    @property
+    def x(self) -> Array:
+        """Unknowns of that adjustment."""
+        return self.estimate.x
 
 
 def settle(model: DropModel) -> Fit:

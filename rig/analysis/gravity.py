@@ -130,20 +130,26 @@ def free_gravity(
     height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
     design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
     _, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
-    sigma2 = _EDGE_M**2 + ((speed - fall * time) * _EDGE_S) ** 2
+    sigma = np.hypot(_EDGE_M, (speed - fall * time) * _EDGE_S)
     turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
     ripple = _BEAM_M * math.tan(math.radians(chain.tilt_deg))
-    same_beam = channel[:, None] == channel
-    covariance = (
-        np.diag(sigma2)
-        + chain.position_u**2 * (rods[:, None] == rods)
-        + same_beam * (protocol.gates.height_u**2 + ripple**2 * np.outer(turn, turn))
-        + chain.width_u**2 * np.outer(side, side)
+    # What edges have in common, one column each, in units of its standard uncertainty: with the
+    # fit's own unknowns beside it, least squares need no covariance of all edges with all.
+    beams = (channel[:, None] == np.array([*gates])).astype(float)
+    common = np.column_stack(
+        [
+            chain.position_u * (rods[:, None] == np.arange(len(chain.widths))),
+            protocol.gates.height_u * beams,
+            ripple * turn[:, None] * beams,
+            chain.width_u * side,
+        ]
     )
-    weighted = np.linalg.solve(covariance, np.column_stack([design, height]))
-    inverse = np.linalg.inv(design.T @ weighted[:, :3])
-    best = inverse @ (weighted[:, :3].T @ height)
-    chi2 = float((height - design @ best) @ (weighted[:, 3] - weighted[:, :3] @ best))
+    whole = np.column_stack([design, common]) / sigma[:, None]
+    prior = np.concatenate([np.zeros(3), np.ones(common.shape[1])])
+    inverse = np.linalg.inv(whole.T @ whole + np.diag(prior))
+    best = inverse @ (whole.T @ (height / sigma))
+    left = height / sigma - whole @ best
+    chi2 = float(left @ left + (prior * best) @ best)
     scatter2 = max(1.0, chi2 / (height.size - 3))
     fitted = math.sqrt(scatter2 * float(inverse[2, 2]))
     return Measured(float(best[2]), math.hypot(fitted, 2.0 * float(best[2]) * scale.u))

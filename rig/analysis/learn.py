@@ -9,14 +9,14 @@ of nuisance scatters is estimated on the way (`rig.analysis.evidence`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.components import STATED
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
-from rig.analysis.normal import STRAY, Normal, normal
+from rig.analysis.joint import Joint, joint_step, scaled
 from rig.analysis.shared import Shared
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.components import Components
-    from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
+    from rig.analysis.normal import Normal
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -36,44 +36,9 @@ FEWEST = 4
 """Drops that a session must have to be learned from: one block of A, B, B, A."""
 _ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again
-_DONE = 0.02  # of a standard unremainingty
+_DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
-_LEAST = {"floor": 5e-6, "impulse_floor": 5e-4}  # where others of their kind count for more
-
-
-@dataclass(slots=True)
-class _Drop:
-    """One drop on the way: its model, its matches, where its unknowns are, its last equations."""
-
-    model: DropModel
-    matches: Matches
-    x: Array
-    own: Index
-    common: Index
-    here: Index
-    part: Part | None = None
-
-
-class Part(NamedTuple):
-    """A drop's equations with its own unknowns o eliminated, all in units of prior unremainingties.
-
-    Attributes
-    ----------
-    inverse
-        A⁻¹ of the drop's own unknowns, prior included.
-    gain
-        G = A⁻¹B: o = o₀ − G c.
-    reduced, vector
-        What the drop says of c: N_cc − BᵀG, and the right-hand side.
-    own
-        o₀.
-    """
-
-    inverse: Array
-    gain: Array
-    reduced: Array
-    vector: Array
-    own: Array
+_LEAST = {"floor": 5e-6}  # where others of its kind count for more
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +52,7 @@ class Taught(Matched):
     own, common, here
         Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
     inverse, gain
-        As in `Part`.
+        As in `rig.analysis.joint.Part`.
     """
 
     x: Array
@@ -107,7 +72,7 @@ class Lesson:
     shared
         Names of the common unknowns.
     x, sd, covariance
-        Estimates (deviations from the protocol), prior standard unremainingties, and covariance in
+        Estimates (deviations from the protocol), prior standard uncertainties, and covariance in
         units of these.
     components, degrees
         How much everything scatters, and how many degrees of freedom each of these numbers has.
@@ -150,27 +115,13 @@ def learn(fits: Sequence[Fit]) -> Lesson:
             if round_ == _REMATCH:
                 drop.matches = match(drop.model, drop.x)
             sd[drop.here] = drop.model.unknowns.sd[drop.common]
-        total, vector = np.eye(len(shared)), -_scaled(x, sd)
-        normals = []
-        for drop in drops:
-            found = normal(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=STRAY)
-            drop.part = part = _eliminate(drop, found)
-            total[np.ix_(drop.here, drop.here)] += part.reduced
-            vector[drop.here] += part.vector
-            normals.append(found)
-        covariance = np.linalg.inv(total).astype(np.float64, copy=False)
-        step = covariance @ vector
+        covariance, step, normals = joint_step(drops, x, sd)
         x = x + step * sd
-        for drop in drops:
-            assert drop.part is not None
-            scale = drop.model.unknowns.sd[drop.own]
-            drop.x[drop.own] += scale * (drop.part.own - drop.part.gain @ step[drop.here])
-            drop.x[drop.common] = x[drop.here]
         moved = float((np.abs(step) / np.sqrt(np.diag(covariance))).max())
         before = evidence.components
         evidence = _weigh(evidence, shared, x, sd, covariance, drops, normals)
         settled = round_ > _REMATCH and moved < _DONE
-        if settled and _steady(before, evidence.components):
+        if settled and _steady(before, evidence.components, drops):
             break
     return Lesson(
         shared,
@@ -184,13 +135,13 @@ def learn(fits: Sequence[Fit]) -> Lesson:
     )
 
 
-def _begin(fit: Fit, shared: Shared) -> _Drop:
+def _begin(fit: Fit, shared: Shared) -> Joint:
     common, here = shared.places(fit.model)
     own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
-    return _Drop(fit.model, fit.matches, fit.estimate.x.copy(), own, common, here)
+    return Joint(fit.model, fit.matches, fit.estimate.x.copy(), own, common, here)
 
 
-def _average(drops: Sequence[_Drop], shared: Shared) -> Array:
+def _average(drops: Sequence[Joint], shared: Shared) -> Array:
     """Begin at the mean of what the drops say by themselves."""
     total, count = np.zeros(len(shared)), np.zeros(len(shared))
     for drop in drops:
@@ -199,71 +150,51 @@ def _average(drops: Sequence[_Drop], shared: Shared) -> Array:
     return total / count
 
 
-def _eliminate(drop: _Drop, found: Normal) -> Part:
-    """Solve for the drop's own unknowns, given the common ones."""
-    own, common = drop.own, drop.common
-    sd = drop.model.unknowns.sd
-    inverse = np.linalg.inv(found.matrix[np.ix_(own, own)] + np.eye(own.size)).astype(
-        np.float64, copy=False
-    )
-    cross = found.matrix[np.ix_(own, common)]
-    gain = inverse @ cross
-    pull = -found.vector[own] - _scaled(drop.x[own], sd[own])
-    return Part(
-        inverse,
-        gain,
-        found.matrix[np.ix_(common, common)] - cross.T @ gain,
-        -found.vector[common] - gain.T @ pull,
-        inverse @ pull,
-    )
-
-
-def _scaled(x: Array, sd: Array) -> Array:
-    """In units of the prior unremainingty; what is known exactly stays."""
-    return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
-
-
 def _weigh(
     evidence: Evidence,
     shared: Shared,
     x: Array,
     sd: Array,
     covariance: Array,
-    drops: Sequence[_Drop],
+    drops: Sequence[Joint],
     normals: Sequence[Normal],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
     new = Evidence(evidence.components)
     remaining = np.diag(covariance)
     for name, block in shared.blocks.items():
-        new.common(name, _scaled(x, sd)[block], remaining[block], sd[block])
+        new.common(name, scaled(x, sd)[block], remaining[block], sd[block])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     for drop, found in zip(drops, normals, strict=True):
         assert drop.part is not None
         part, model = drop.part, drop.model
-        left = np.diag(part.inverse) + np.einsum(
-            "ij,jk,ik->i", part.gain, covariance[np.ix_(drop.here, drop.here)], part.gain,
-            optimize=True,
-        )  # fmt: skip
+        common = covariance[np.ix_(drop.here, drop.here)]
+        left = np.diag(part.inverse) + np.sum((part.gain @ common) * part.gain, axis=1)
         own_sd = model.unknowns.sd[drop.own]
         parameters += float(np.sum((1.0 - left)[own_sd > 0.0]))
         variance = np.zeros(drop.x.size)
         variance[drop.own] = left
-        new.drop(model, _scaled(drop.x, model.unknowns.sd), variance)
+        new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
         new.edges(found.equations)
     return new.settled(parameters)
 
 
-def _steady(one: Components, other: Components) -> bool:
-    """Whether no component changes much; a floor that is not there shrinks for ever."""
-    return all(
-        abs(getattr(one, name) - getattr(other, name))
-        <= _STEADY * max(getattr(other, name), _LEAST.get(name, 0.0))
-        for name in one.__slots__
-    )
+def _steady(one: Components, other: Components, drops: Sequence[Joint]) -> bool:
+    """Whether no component changes much; a floor that is not there shrinks for ever.
+
+    Of impulses it is their scatter in these drops that counts: where all have about the same α, it
+    does not tell its two components apart, and nothing depends on them.
+    """
+    names = [name for name in one.__slots__ if not name.startswith("impulse")]
+    pairs = [(getattr(one, name), getattr(other, name), _LEAST.get(name, 0.0)) for name in names]
+    alphas = {
+        abs(drop.model.guesses["impact"].alpha) for drop in drops if "impact" in drop.model.guesses
+    }
+    pairs += [(one.impulses(alpha), other.impulses(alpha), 0.0) for alpha in alphas]
+    return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)
 
 
-def _taught(drop: _Drop) -> Taught:
+def _taught(drop: Joint) -> Taught:
     assert drop.part is not None
     return Taught(
         drop.model,

@@ -1,24 +1,33 @@
-"""Propagation of distributions through the adjustment of one drop (JCGM 101)."""
+"""Propagation of distributions through the adjustment of a drop, or of a session (JCGM 101)."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.analysis.adjust import adjust
+from rig.analysis.joint import Joint, joint_step
 from rig.analysis.quantities import measurands
+from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import ANYTHING
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
+    from rig.analysis.learn import Lesson, Taught
 
     Array = NDArray[np.float64]
 
 PROBABILITY = 0.95
+_SESSION_STEPS = 3
+_END = 2.7
+"""Standard error of the end of a 95 % interval from M trials, in units of u/√M: the quantile of a
+normal distribution, √(p(1 − p))/density at p = 0.025."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,25 +77,107 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     rng = np.random.default_rng(seed)
     model, at = fit.model, fit.estimate.x
     sd = model.unknowns.sd
-    stated = np.where(sd < ANYTHING, sd, 0.0)
-    shifts = {role: _scatter(fit, role) * fit.estimate.scatter for role in model.sides}
+    shifts = _scatter(fit)
+    for role in shifts:
+        shifts[role] *= fit.estimate.scatter
     found: dict[str, list[float]] = {}
     for _ in range(trials):
-        shaken = model.shaken(
-            {role: shift * rng.normal(size=shift.size) for role, shift in shifts.items()}
-        )
-        estimate = adjust(shaken, fit.matches, at, stated * rng.normal(size=sd.size))
+        shaken = _shaken(model, shifts, rng)
+        estimate = adjust(shaken, fit.matches, at, _stated(sd) * rng.normal(size=sd.size))
         for name, (value, _gradient) in measurands(shaken, estimate.x).items():
             found.setdefault(name, []).append(value)
     return {name: Propagated.of(np.array(values)) for name, values in found.items()}
 
 
-def _scatter(fit: Fit, role: str) -> Array:
-    """Standard deviation of every observed edge of a side in time, s; 0 where it is not matched."""
-    matches = fit.matches[role]
-    rows = fit.model.equations(role, fit.estimate.x, matches)
-    expected = fit.model.expected[role]
-    _, edges = expected.chosen(matches)
-    found = np.zeros(expected.times.size)
-    found[edges] = rows.sigma / rows.speed
+def session_monte_carlo(lesson: Lesson, trials: int, seed: int) -> list[dict[str, Propagated]]:
+    """Draw everything that is uncertain about a session, and adjust all drops together again.
+
+    As `monte_carlo`, with what drops have in common drawn once a trial. How much everything
+    scatters is taken as the session taught it.
+
+    Returns
+    -------
+    list
+        For each drop of the lesson, by JSON name.
+    """
+    rng = np.random.default_rng(seed)
+    shifts = [_scatter(drop) for drop in lesson.drops]
+    found: list[dict[str, list[float]]] = [{} for _ in lesson.drops]
+    for _ in range(trials):
+        centre = _stated(lesson.sd) * rng.normal(size=lesson.sd.size)
+        joint, x = [], lesson.x
+        for drop, shift in zip(lesson.drops, shifts, strict=True):
+            sd = drop.model.unknowns.sd[drop.own]
+            own = _stated(sd) * rng.normal(size=sd.size)
+            model = _shaken(drop.model, shift, rng)
+            places = drop.own, drop.common, drop.here
+            joint.append(Joint(model, drop.matches, drop.x.copy(), *places, own))
+        for _step in range(_SESSION_STEPS):
+            _, step, _ = joint_step(joint, x, lesson.sd, centre)
+            x = x + step * lesson.sd
+        for one, values in zip(joint, found, strict=True):
+            for name, (value, _gradient) in measurands(one.model, one.x).items():
+                values.setdefault(name, []).append(value)
+    return [
+        {name: Propagated.of(np.array(values)) for name, values in drop.items()} for drop in found
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Whether the GUM's framework is validated by the trials (JCGM 101, clause 8).
+
+    Attributes
+    ----------
+    d_low, d_high
+        How far the ends of the two 95 % intervals are apart.
+    tolerance
+        Half a unit of the first digit of u, and twice the standard error of the end of an
+        interval that so many trials give.
+    """
+
+    d_low: float
+    d_high: float
+    tolerance: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether both ends are within the tolerance."""
+        return max(self.d_low, self.d_high) <= self.tolerance
+
+    def json(self) -> dict[str, Any]:
+        """``{"d_low", "d_high", "tolerance", "agrees"}``."""
+        found: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__}
+        return found | {"agrees": self.agrees}
+
+
+def agreement(value: float, u: float, drawn: Propagated, trials: int) -> Agreement:
+    """Compare value ± 1.96 u with the interval of the trials."""
+    half = coverage_factor(math.inf, PROBABILITY) * u
+    digit = 10.0 ** math.floor(math.log10(u))
+    return Agreement(
+        abs(value - half - drawn.low),
+        abs(value + half - drawn.high),
+        0.5 * digit + 2.0 * _END * u / math.sqrt(trials),
+    )
+
+
+def _stated(sd: Array) -> Array:
+    """Leave out what is not known at all: there is nothing to draw."""
+    return np.where(sd < ANYTHING, sd, 0.0)
+
+
+def _shaken(model: DropModel, shifts: dict[str, Array], rng: np.random.Generator) -> DropModel:
+    return model.shaken({role: one * rng.normal(size=one.size) for role, one in shifts.items()})
+
+
+def _scatter(drop: Fit | Taught) -> dict[str, Array]:
+    """Standard deviation of every observed edge of each side, s; 0 where it is not matched."""
+    found = {}
+    for role, matches in drop.matches.items():
+        rows = drop.model.equations(role, drop.x, matches)
+        expected = drop.model.expected[role]
+        _, edges = expected.chosen(matches)
+        found[role] = np.zeros(expected.times.size)
+        found[role][edges] = rows.sigma / rows.speed
     return found

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.drop_model import DropModel, Equations
+    from rig.analysis.drop_model import DropModel
+    from rig.analysis.equations import Equations
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -58,7 +59,7 @@ def normal(
 ) -> Normal:
     """Set up the normal equations; residuals beyond 4 σ weigh less (Huber).
 
-    A side knows nothing of the other's unknowns: only its own columns are multiplied.
+    A side knows nothing of the other's unknowns: only its own are multiplied.
 
     Parameters
     ----------
@@ -77,11 +78,12 @@ def normal(
         residuals = row.residuals / sigma
         far = np.maximum(np.abs(residuals), 1e-300)
         weight = np.where(far > cut, 0.0, np.sqrt(np.minimum(1.0, HUBER / far)))
-        moving = np.flatnonzero(row.jacobian.any(axis=0) & (sd > 0.0))
-        jacobian = row.jacobian[:, moving] * (sd[moving] * (weight / sigma)[:, None])
+        slopes = row.slopes * sd[row.columns]
+        slopes *= (weight / sigma)[:, None]
         residuals = residuals * weight
-        matrix[np.ix_(moving, moving)] += jacobian.T @ jacobian
-        vector[moving] += jacobian.T @ residuals
+        place = row.columns[:, None] * x.size + row.columns
+        matrix.reshape(-1)[place] += slopes.T @ slopes
+        vector[row.columns] += slopes.T @ residuals
         chi2 += float(residuals @ residuals)
         size += residuals.size
     return Normal(matrix, vector, chi2, size, rows)

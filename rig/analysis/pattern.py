@@ -68,13 +68,15 @@ def guess(side: Side, start: Quantity, gravity: float) -> Guess:
     slack = pitch / 6
     # An impact chain falls freely until its bottom rod is down.
     lowest = -np.inf if side.ratios is None else 0.0
-    free = _release(side, start, gravity, lowest, slack)
+    free = guess_release(side, start, gravity, lowest, slack)
     if side.ratios is None or free.share == 0.0:
         return free
     return _alpha(side, gravity, side.ratios, slack, pitch, free)
 
 
-def _release(side: Side, start: Quantity, gravity: float, lowest: float, slack: float) -> Guess:
+def guess_release(
+    side: Side, start: Quantity, gravity: float, lowest: float, slack: float
+) -> Guess:
     """Let all pairs vote and count at the moment that most of them agree on."""
     times, levels, _ = _pairs(side, lowest)
     if times.size == 0:
@@ -82,21 +84,30 @@ def _release(side: Side, start: Quantity, gravity: float, lowest: float, slack: 
     tau = np.sqrt(2.0 * (start.value - levels) / gravity)
     middle = times - tau
     half = np.minimum(slack / np.maximum(gravity * tau, slack / _LONGEST), _LONGEST)
-    steps = np.repeat([1, -1], times.size)
-    moments = np.concatenate([middle - half, middle + half])
-    order = np.lexsort((-steps, moments))
-    moments, votes = moments[order], np.cumsum(steps[order])
+    begins, ends = np.sort(middle - half), np.sort(middle + half)
+    count = np.arange(1, times.size + 1)
+    # Just after each beginning of a vote, and just after each end.
+    votes = count - np.searchsorted(ends, begins, side="left")
+    after = np.searchsorted(begins, ends, side="right") - count
     best = int(np.argmax(votes))
-    release = 0.5 * float(moments[best] + moments[best + 1])
+    until = min(
+        np.append(begins, np.inf)[best + 1],
+        ends[np.searchsorted(ends, begins[best], side="left")],
+    )
+    release = 0.5 * float(begins[best] + until)
     voters = np.abs(middle - release) <= half
     expected = sum(int((train.levels > lowest).sum()) for train in side.trains)
-    elsewhere = votes[np.abs(moments - release) > _APART]
+    elsewhere = max(
+        votes[np.abs(begins - release) > _APART].max(initial=0),
+        after[np.abs(ends - release) > _APART].max(initial=0),
+    )
+    most = float(votes[best])
     release, height = _refine(times[voters], levels[voters], release, start, gravity)
     return Guess(
         release,
         height,
-        share=min(1.0, float(votes[best]) / expected),
-        runner_up=float(elsewhere.max(initial=0)) / expected,
+        share=min(1.0, most / expected),
+        runner_up=float(elsewhere) / expected,
     )
 
 
@@ -161,12 +172,7 @@ def _alpha(
     places = np.array(side.chain.chain.heights)
     time, height, speed = _paths(free.release, free.start, gravity, ratios, places)
     pairs = _within_reach(_pairs(side, -np.inf), time, height, speed, gravity, slack)
-    scores = np.array(
-        [
-            _support(pairs, side.expected, time[:, n], height, speed[:, n], gravity, slack)
-            for n in range(ALPHAS.size)
-        ]
-    )
+    scores = _scores(pairs, side.expected, time, height, speed, gravity, slack)
     # The middle of a plateau, not its left end.
     plateau = np.flatnonzero(scores == scores.max())
     best = int(plateau[plateau.size // 2])
@@ -210,14 +216,26 @@ def _within_reach(
     return Pairs(pairs.times[near], pairs.levels[near], pairs.expected[near])
 
 
-def _support(
+def _scores(
     pairs: Pairs, size: int, time: Array, height: Array, speed: Array, gravity: float, slack: float
-) -> int:
-    """Count the expected edges that have an observed one where the chain would be."""
-    at = _heights(pairs.times, time, height, speed, gravity)
-    found = np.zeros(size, dtype=np.bool_)
-    found[pairs.expected[np.abs(at - pairs.levels) < slack]] = True
-    return int(found.sum())
+) -> NDArray[np.intp]:
+    """Count for every α the expected edges that have an observed one where the chain would be."""
+    legs, alphas = time.shape
+    order = np.argsort(pairs.times, kind="stable")
+    times, levels, expected = (one[order] for one in pairs)
+    # How many edges come on each leg of each α, and so the leg on which each one comes.
+    begins = np.searchsorted(times, time.T)
+    begins[:, 0] = 0
+    counts = np.diff(begins, axis=1, append=times.size)
+    leg = np.repeat(np.tile(np.arange(legs), alphas), counts.ravel()).reshape(alphas, times.size)
+    flat = leg * alphas + np.arange(alphas)[:, None]
+    since = np.maximum(times - time.take(flat), 0.0)
+    at = height.take(leg) - (speed.take(flat) + 0.5 * gravity * since) * since
+    alpha, pair = np.nonzero(np.abs(at - levels) < slack)
+    found = np.zeros((alphas, size), dtype=np.bool_)
+    found[alpha, expected[pair]] = True
+    scores: NDArray[np.intp] = found.sum(axis=1)
+    return scores
 
 
 def _heights(times: Array, time: Array, height: Array, speed: Array, gravity: float) -> Array:

@@ -11,11 +11,15 @@ from rig.analysis.quantities import measurands
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from rig.analysis.learn import Lesson, Taught
 
     Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+    Places = Mapping[str, Index]
 
 _DEGREES = {
     "edges": "jitter",
@@ -55,12 +59,15 @@ class Budgets:
 
     def measured(self, drop: Taught) -> dict[str, Measured]:
         """Everything the scene lets one measure, by its JSON name."""
+        lines = _groups(drop), _common(drop)
         return {
-            name: self._measured(drop, value, gradient * drop.model.unknowns.sd)
+            name: self._measured(drop, lines, value, gradient * drop.model.unknowns.sd)
             for name, (value, gradient) in measurands(drop.model, drop.x).items()
         }
 
-    def _measured(self, drop: Taught, value: float, gradient: Array) -> Measured:
+    def _measured(
+        self, drop: Taught, places: tuple[Places, Places], value: float, gradient: Array
+    ) -> Measured:
         """Put value and uncertainty together; `gradient` is in units of the prior uncertainties."""
         alone = drop.inverse @ gradient[drop.own]
         h = np.zeros(len(self.lesson.shared))
@@ -70,26 +77,16 @@ class Budgets:
         shared = h @ self._root
         variance = float(gradient[drop.own] @ alone) + float(shared @ shared)
         lines: dict[str, float] = {}
-        for name, rows in _groups(drop).items():
+        for name, rows in places[0].items():
             here = drop.gain[rows] @ common[drop.here]
             others = float(common @ self._others[name] @ common) - float(here @ here)
             lines[name] = float(own[rows] @ own[rows]) + max(0.0, others)
-        for name, places in self._common(drop).items():
-            lines[name] = lines.get(name, 0.0) + float(common[places] @ common[places])
+        for name, rows in places[1].items():
+            lines[name] = lines.get(name, 0.0) + float(common[rows] @ common[rows])
         lines["edges"] = lines.get("edges", 0.0) + max(0.0, variance - sum(lines.values()))
         budget = {name: math.sqrt(line) for name, line in lines.items() if line > 0.0}
         u = math.sqrt(variance)
         return Measured(value, u, self._degrees(u, budget), budget, shared)
-
-    def _common(self, drop: Taught) -> dict[str, NDArray[np.intp]]:
-        """Places in the session's vector of each line of the budget."""
-        places = np.full(drop.x.size, -1)
-        places[drop.common] = drop.here
-        found = {
-            name: np.concatenate([places[block] for block in blocks])
-            for name, blocks in drop.model.unknowns.groups.items()
-        }
-        return {name: here[here >= 0] for name, here in found.items()}
 
     def _degrees(self, u: float, budget: dict[str, float]) -> float:
         """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4)."""
@@ -102,12 +99,24 @@ class Budgets:
         return 1.0 / share if share > 0.0 else math.inf
 
 
-def _groups(drop: Taught) -> dict[str, NDArray[np.intp]]:
+def _common(drop: Taught) -> Places:
+    """Places in the session's vector of each line of the budget."""
+    places = np.full(drop.x.size, -1)
+    places[drop.common] = drop.here
+    return _lines(drop, places)
+
+
+def _groups(drop: Taught) -> Places:
     """Rows of a drop's own unknowns that each line of the budget has."""
     row = np.full(drop.x.size, -1)
     row[drop.own] = np.arange(drop.own.size)
+    return _lines(drop, row)
+
+
+def _lines(drop: Taught, places: Index) -> Places:
+    """Sort places that there are, one an unknown, by line of the budget."""
     found = {
-        name: np.concatenate([row[block] for block in blocks])
+        name: np.concatenate([places[block] for block in blocks])
         for name, blocks in drop.model.unknowns.groups.items()
     }
     return {name: rows[rows >= 0] for name, rows in found.items() if (rows >= 0).any()}

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rig.analysis.causes import Cause
     from rig.protocol.scene import Run
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
@@ -102,6 +103,10 @@ class DropResult:
         How much more than assumed the edges scatter, at least 1; `None` when nothing was fitted.
     learned
         Whether the quantities are in the light of the whole session.
+    causes
+        Every edge that is missing or belongs to no rod, and why.
+    limits
+        The verdict that a rejected drop has by its limits.
     """
 
     run: Run
@@ -113,6 +118,8 @@ class DropResult:
     matches: Mapping[int, int] = field(default_factory=dict)
     scatter: float | None = None
     learned: bool = False
+    causes: tuple[Cause, ...] = ()
+    limits: Verdict | None = None
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
@@ -124,6 +131,8 @@ class DropResult:
         }
         found |= {name: value.json() for name, value in self.quantities.items()}
         found["edges"] = self.audit.json()
+        if self.matches:
+            found["causes"] = [cause.json() for cause in self.causes]
         if self.scatter is not None:
             found["scatter"] = self.scatter
         found["learned"] = self.learned

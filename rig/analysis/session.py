@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.causes import causes
 from rig.analysis.drop import TimeScale, fit_drop
 from rig.analysis.learn import FEWEST, learn
 from rig.analysis.lesson_json import lesson_json
+from rig.analysis.pairs import Effects, effects
 from rig.analysis.refine import Budgets
 from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rig.analysis.fit import Fit
-    from rig.analysis.learn import Lesson
+    from rig.analysis.learn import Lesson, Taught
     from rig.analysis.result import DropResult
     from rig.protocol.scene import Protocol
     from rig.records import Drop
@@ -41,12 +43,23 @@ class Analysis:
         One line an incline.
     lesson
         What all good drops together teach; `None` where there are too few of them.
+    adjusted
+        Good drops with their unknowns, in the light of all where there is a lesson, by run and
+        attempt.
+    effects
+        Of chains and sides, by incline; none where the plan has no blocks of A, B, B, A.
+    with_rejected
+        The summary as it would be with the runs that were rejected and are good by their limits;
+        none where there are no such runs.
     """
 
     runs: tuple[DropResult, ...]
     superseded: tuple[DropResult, ...]
     summary: tuple[Incline, ...]
     lesson: Lesson | None = None
+    adjusted: Mapping[tuple[int, int], Fit | Taught] = field(default_factory=dict)
+    effects: tuple[Effects, ...] = ()
+    with_rejected: tuple[Incline, ...] = ()
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
@@ -56,6 +69,10 @@ class Analysis:
         }
         if self.superseded:
             found["superseded"] = [run.json() for run in self.superseded]
+        if self.with_rejected:
+            found["summary_with_rejected"] = [line.json() for line in self.with_rejected]
+        if self.effects:
+            found["effects"] = [one.json() for one in self.effects]
         if self.lesson is not None:
             found["learned"] = lesson_json(self.lesson)
         return found
@@ -105,24 +122,44 @@ def analyze(
                 "is it the right protocol? rig check PROTOCOL shows the plan",
             )
         result, fit = fit_drop(protocol, planned[drop.run], drop, scale(drop))
-        causes = rejected.get((drop.run, drop.attempt))
-        if causes is not None:
-            result = replace(result, verdict="rejected", reasons=(*causes, *result.reasons))
+        why = rejected.get((drop.run, drop.attempt))
+        if why is not None:
+            reasons = (*why, *result.reasons)
+            result = replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
         results.append(result)
         fits.append(fit)
         if progress is not None:
             progress(number, len(drops))
-    results, lesson = _taught(results, fits)
-    results.sort(key=lambda result: (result.run.number, result.attempt))
-    last = {result.run.number: result for result in results}
+    return gather(protocol, results, fits)
+
+
+def gather(
+    protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
+) -> Analysis:
+    """Let drops that were analysed one by one teach each other, and sum up.
+
+    Parameters
+    ----------
+    protocol
+        The scene and its plan.
+    results, fits
+        Of each drop, as `rig.analysis.drop.fit_drop` gives them.
+    """
+    found, lesson, adjusted = _taught(results, fits)
+    found.sort(key=lambda result: (result.run.number, result.attempt))
+    last = {result.run.number: result for result in found}
     latest = tuple(last.values())
-    earlier = tuple(result for result in results if last[result.run.number] is not result)
-    return Analysis(latest, earlier, tuple(summarize(protocol, latest)), lesson)
+    earlier = tuple(result for result in found if last[result.run.number] is not result)
+    summary = tuple(summarize(protocol, latest))
+    spared = any(result.limits in GOOD for result in latest)
+    whole = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
+    paired = effects(protocol, latest)
+    return Analysis(latest, earlier, summary, lesson, adjusted, paired, whole)
 
 
 def _taught(
     results: Sequence[DropResult], fits: Sequence[Fit | None]
-) -> tuple[list[DropResult], Lesson | None]:
+) -> tuple[list[DropResult], Lesson | None, dict[tuple[int, int], Fit | Taught]]:
     """Give good drops the numbers that they have in the light of all of them.
 
     A verdict is on a drop by itself, by limits fixed beforehand: what others teach about the rig
@@ -134,11 +171,13 @@ def _taught(
         if fit is not None and result.verdict in GOOD and fit.estimate.settled
     }
     found = list(results)
+    keys = [(results[n].run.number, results[n].attempt) for n in good]
+    alone = dict[tuple[int, int], "Fit | Taught"](zip(keys, good.values(), strict=True))
     if len(good) < FEWEST:
-        return found, None
+        return found, None, alone
     lesson = learn(list(good.values()))
     if not lesson.settled:
-        return found, None
+        return found, None, alone
     budgets = Budgets(lesson)
     for n, drop in zip(good, lesson.drops, strict=True):
         found[n] = replace(
@@ -147,5 +186,6 @@ def _taught(
             quantities=budgets.measured(drop),
             matches=drop.rods,
             learned=True,
+            causes=causes(drop),
         )
-    return found, lesson
+    return found, lesson, dict(zip(keys, lesson.drops, strict=True))

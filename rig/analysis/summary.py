@@ -81,11 +81,19 @@ class Incline:
         return found
 
 
-def summarize(protocol: Protocol, results: Iterable[DropResult]) -> list[Incline]:
-    """Average the good runs of each incline, in order of incline."""
+def summarize(
+    protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
+) -> list[Incline]:
+    """Average the good runs of each incline, in order of incline.
+
+    Parameters
+    ----------
+    rejected
+        Whether runs that are good by their limits count though the operator rejected them.
+    """
     by_incline: dict[float, list[DropResult]] = {}
     for result in results:
-        if result.verdict in GOOD:
+        if result.verdict in GOOD or (rejected and result.limits in GOOD):
             by_incline.setdefault(result.run.incline_deg, []).append(result)
     return [_incline(protocol, incline, runs) for incline, runs in sorted(by_incline.items())]
 

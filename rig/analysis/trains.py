@@ -127,6 +127,8 @@ def train(
     seen = flat < start
     if struck:
         seen &= flat > -places[rods]
+    if edges.blocked.size and edges.blocked.all():  # some timers tell only when a beam darkens
+        seen &= blocks
     return Train(
         number,
         times,

@@ -2,14 +2,15 @@
 
 The path is ballistic between impacts (section III.D): the same legs as in `rig.model.fall`, but
 with release time, start, gravity, the relative gain at each impact and the place of each rod all
-free, and with the derivative by each of them carried along.
+free, and with the derivative by each of them on request.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,37 @@ RELEASE, START, GRAVITY = 0, 1, 2
 COMMON = 3
 
 
-@dataclass(frozen=True, slots=True)
+class Hits(NamedTuple):
+    """The impacts of a fall, shape ``(rods,)`` each.
+
+    Attributes
+    ----------
+    distance
+        How far the chain fell since the impact before, m.
+    arrival
+        Speed just before, m/s.
+    gain
+        ΔV/V.
+    ratio
+        ΔV/V for α = 1.
+    """
+
+    distance: Array
+    arrival: Array
+    gain: Array
+    ratio: Array
+
+
+class Slopes(NamedTuple):
+    """Derivatives of a trajectory by its parameters, see `Trajectory`."""
+
+    time: Array
+    height: Array
+    speed: Array
+    arrival: Array
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Legs of a fall. Leg 0 begins at the release, leg k + 1 at the impact of rod k.
 
@@ -31,42 +62,79 @@ class Trajectory:
     ----------
     time, height, speed
         At the beginning of each leg; speed after the impact, downward positive; shape ``(legs,)``.
-    d_time, d_height, d_speed
-        Their derivatives by release time, start, gravity and further parameters, shape
-        ``(legs, parameters)``.
-    arrival, d_arrival
-        Speed just before the last impact with its derivatives; zero where nothing was struck.
     gravity
         m/s².
+    hits
+        `None` where nothing is struck.
     """
 
     time: Array
     height: Array
     speed: Array
-    d_time: Array
-    d_height: Array
-    d_speed: Array
     gravity: float
-    arrival: float
-    d_arrival: Array
+    hits: Hits | None = None
+
+    @property
+    def arrival(self) -> float:
+        """Speed just before the last impact, m/s; zero where nothing is struck."""
+        return 0.0 if self.hits is None else float(self.hits.arrival[-1])
+
+    @property
+    def d_time(self) -> Array:
+        """Derivatives by release time, start, gravity, … , shape ``(legs, parameters)``."""
+        return self._slopes.time
+
+    @property
+    def d_height(self) -> Array:
+        """Derivatives likewise."""
+        return self._slopes.height
+
+    @property
+    def d_speed(self) -> Array:
+        """Derivatives likewise."""
+        return self._slopes.speed
+
+    @property
+    def d_arrival(self) -> Array:
+        """Derivatives of `arrival`, shape ``(parameters,)``."""
+        return self._slopes.arrival
 
     def heights(self, times: Array) -> tuple[Array, Array]:
         """Height of the reference point and its speed (downward positive), shape of `times`."""
         leg, since = self._legs(times)
-        height = self.height[leg] - (self.speed[leg] + 0.5 * self.gravity * since) * since
-        return height, self.speed[leg] + self.gravity * since
+        speed = self.speed[leg]
+        fallen = (speed + 0.5 * self.gravity * since) * since
+        return self.height[leg] - fallen, speed + self.gravity * since
 
-    def derivatives(self, times: Array) -> Array:
-        """Derivatives of the height at fixed times, shape ``(times, parameters)``."""
+    def derivatives(self, times: Array, by: Array | None = None) -> Array:
+        """Derivatives of the height at fixed times.
+
+        Parameters
+        ----------
+        by
+            Derivatives of the parameters by anything else, shape ``(parameters, others)``.
+
+        Returns
+        -------
+        ndarray
+            Shape ``(times, parameters)``, or ``(times, others)``.
+        """
         leg, since = self._legs(times)
-        speed = self.speed[leg] + self.gravity * since
-        found: Array = (
-            self.d_height[leg]
-            - self.d_speed[leg] * since[:, None]
-            + self.d_time[leg] * speed[:, None]
-        )
-        found[:, GRAVITY] -= 0.5 * since * since
-        return found
+        slopes = self._slopes
+        gravity = np.zeros(slopes.time.shape[1])
+        gravity[GRAVITY] = 1.0
+        begin = [slopes.time, slopes.height, slopes.speed]
+        if by is not None:
+            begin, gravity = [one @ by for one in begin], by[GRAVITY]
+        time, height, speed = (one.take(leg, axis=0) for one in begin)
+        # In place: these are the largest arrays of an adjustment.
+        time *= (self.speed[leg] + self.gravity * since)[:, None]
+        speed *= since[:, None]
+        time += height
+        time -= speed
+        pulled = np.flatnonzero(gravity)
+        time[:, pulled] -= (0.5 * since * since)[:, None] * gravity[pulled]
+        return time
 
     def times(self, heights: Array) -> Array:
         """When the reference point comes down to each height, s; the release for higher ones."""
@@ -82,22 +150,19 @@ class Trajectory:
         leg = np.maximum(np.searchsorted(self.time, times, side="right") - 1, 0)
         return leg, np.maximum(times - self.time[leg], 0.0)
 
+    @cached_property
+    def _slopes(self) -> Slopes:
+        """All derivatives; whoever only asks where the chain is does without them."""
+        if self.hits is None:
+            time, height, speed = (np.zeros((1, COMMON)) for _ in range(3))
+            time[0, RELEASE] = height[0, START] = 1.0
+            return Slopes(time, height, speed, np.zeros(COMMON))
+        return _struck_slopes(self.speed, self.gravity, self.hits)
+
 
 def free_trajectory(release: float, start: float, gravity: float) -> Trajectory:
     """Free fall from rest."""
-    d_time, d_height, d_speed = (np.zeros((1, COMMON)) for _ in range(3))
-    d_time[0, RELEASE] = d_height[0, START] = 1.0
-    return Trajectory(
-        np.array([release]),
-        np.array([start]),
-        np.zeros(1),
-        d_time,
-        d_height,
-        d_speed,
-        gravity,
-        0.0,
-        np.zeros(COMMON),
-    )
+    return Trajectory(np.array([release]), np.array([start]), np.zeros(1), gravity)
 
 
 def struck_trajectory(
@@ -120,44 +185,58 @@ def struck_trajectory(
         Its parameters are the common ones, then α of each rod, then the place of each rod.
     """
     rods = len(places)
+    gain = gains * ratios
+    height = np.empty(rods + 1)
+    height[0] = start
+    np.negative(places, out=height[1:])
+    distance = height[:-1] - height[1:]
+    now, speed = release, 0.0
+    time, speeds, arrivals = [now], [speed], []
+    for fallen, more in zip(distance.tolist(), gain.tolist(), strict=True):
+        arrival = math.sqrt(speed * speed + 2.0 * gravity * max(fallen, 0.0))
+        now += 2.0 * fallen / (speed + arrival)
+        speed = arrival * (1.0 + more)
+        time.append(now)
+        speeds.append(speed)
+        arrivals.append(arrival)
+    hits = Hits(distance, np.array(arrivals), gain, ratios)
+    return Trajectory(np.array(time), height, np.array(speeds), gravity, hits)
+
+
+def _struck_slopes(speed: Array, gravity: float, hits: Hits) -> Slopes:
+    """Derivatives of a struck chain's legs.
+
+    With squared speeds E_k before and f_k²·E_k after each impact, E_k = f²_{k−1}·E_{k−1} + 2g·d_k
+    is linear: E_k = Σ_j P_kj·2g·d_j, where P_kj is the product of f² from j to k − 1.
+    """
+    rods = hits.distance.size
     size = COMMON + 2 * rods
-    time, height, speed = [release], [start], [0.0]
-    d_time, d_height, d_speed = (np.zeros((rods + 1, size)) for _ in range(3))
-    d_time[0, RELEASE] = d_height[0, START] = 1.0
-    d_height[np.arange(1, rods + 1), COMMON + rods + np.arange(rods)] = -1.0
-    arrival, d_arrival = 0.0, np.zeros(size)
-    above, sign = START, 1.0  # the place at which a leg begins, and how its height follows it
-    for k, (gain, ratio, place) in enumerate(
-        zip(gains.tolist(), ratios.tolist(), places.tolist(), strict=True)
-    ):
-        below = COMMON + rods + k
-        distance = height[k] + place
-        arrival = math.sqrt(speed[k] ** 2 + 2.0 * gravity * max(distance, 0.0))
-        # Few parameters change a leg's length: the sparse terms are added one by one.
-        by_length = gravity / arrival
-        d_arrival = (speed[k] / arrival) * d_speed[k]
-        d_arrival[above] += sign * by_length
-        d_arrival[below] += by_length
-        d_arrival[GRAVITY] += distance / arrival
-        both = speed[k] + arrival
-        d_time[k + 1] = d_time[k] - (2.0 * distance / both**2) * (d_speed[k] + d_arrival)
-        d_time[k + 1, above] += sign * 2.0 / both
-        d_time[k + 1, below] += 2.0 / both
-        factor = 1.0 + gain * ratio
-        d_speed[k + 1] = factor * d_arrival
-        d_speed[k + 1, COMMON + k] += arrival * ratio
-        time.append(time[k] + 2.0 * distance / both)
-        height.append(-place)
-        speed.append(arrival * factor)
-        above, sign = below, -1.0
-    return Trajectory(
-        np.array(time),
-        np.array(height),
-        np.array(speed),
-        d_time,
-        d_height,
-        d_speed,
-        gravity,
-        arrival,
-        d_arrival,
-    )
+    row = np.arange(rods)
+    places = slice(COMMON + rods, size)
+    gain, factor = COMMON + row, 1.0 + hits.gain
+    arrival, squares = hits.arrival, factor * factor
+    steps = np.ones((rods, rods))
+    steps[1:] = np.where(row[1:, None] > row, squares[:-1, None], 1.0)
+    product = np.tril(np.cumprod(steps, axis=0))
+    after = np.zeros((rods, rods))
+    after[:, :-1] = product[:, 1:]
+    # Of E: f² − 1 as a product, for it is small where α is.
+    energy = np.zeros((rods, size))
+    energy[:, START] = 2.0 * gravity * product[:, 0]
+    energy[:, GRAVITY] = product @ (2.0 * hits.distance)
+    energy[:, COMMON : COMMON + rods] = after * (2.0 * factor * arrival**2 * hits.ratio)
+    energy[:, places] = after * (2.0 * gravity * hits.gain * (factor + 1.0))
+    energy[row, places.start + row] = 2.0 * gravity
+    d_arrival = energy / (2.0 * arrival)[:, None]
+    d_speed = np.zeros((rods + 1, size))
+    d_speed[1:] = factor[:, None] * d_arrival
+    d_speed[1 + row, gain] += arrival * hits.ratio
+    d_height = np.zeros((rods + 1, size))
+    d_height[0, START] = 1.0
+    d_height[1 + row, places.start + row] = -1.0
+    both = speed[:-1] + arrival
+    legs = np.zeros((rods + 1, size))
+    legs[0, RELEASE] = 1.0
+    legs[1:] = (2.0 / both)[:, None] * (d_height[:-1] - d_height[1:])
+    legs[1:] -= (2.0 * hits.distance / both**2)[:, None] * (d_speed[:-1] + d_arrival)
+    return Slopes(np.cumsum(legs, axis=0), d_height, d_speed, d_arrival[-1])

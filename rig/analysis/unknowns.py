@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,7 +45,7 @@ class Unknowns:
         sd
             Prior standard uncertainties.
         """
-        values = np.atleast_1d(np.asarray(sd, dtype=float)).tolist()
+        values = [sd] if isinstance(sd, int | float) else [*sd]
         block = slice(len(self._sd), len(self._sd) + len(values))
         self._blocks[name] = block
         self._groups.setdefault(group, []).append(block)
@@ -60,8 +61,13 @@ class Unknowns:
         return name in self._blocks
 
     @property
+    def blocks(self) -> dict[str, slice]:
+        """Place of each block in the vector, by name."""
+        return self._blocks
+
+    @cached_property
     def sd(self) -> Array:
-        """Prior standard uncertainties, shape ``(unknowns,)``."""
+        """Prior standard uncertainties once all are added, shape ``(unknowns,)``."""
         return np.array(self._sd)
 
     @property

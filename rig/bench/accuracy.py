@@ -13,6 +13,8 @@ from statistics import fmean, median, stdev
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rig.analysis.result import GOOD
 from rig.bench.rivals import plain_fit, two_gate_timer
 from rig.errors import InputError
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
 _STRAY = -1  # the truth's rod number of what was no rod
+_HELD = 0.95  # share of the truths that intervals are made to hold
 
 
 @dataclass(slots=True)
@@ -65,7 +68,10 @@ class Errors:
         }
         if len(set(self.rigs)) > 1:
             found["bias_se"] = self._between(self.errors)
-            found["coverage_se"] = self._between(held)
+            # Few misses tell little of how they scatter: so many independent errors there are.
+            independent = (found["rms"] / found["bias_se"]) ** 2
+            chance = math.sqrt(_HELD * (1.0 - _HELD) / independent)
+            found["coverage_se"] = max(self._between(held), chance)
         return found
 
     def _between(self, values: Sequence[float]) -> float:
@@ -88,6 +94,7 @@ class Tally:
     edges: int = 0
     wrong_rods: int = 0
     strays: int = 0
+    speed_shares: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     analysis_s: float = 0.0
     plain_s: float = 0.0
@@ -111,6 +118,9 @@ class Tally:
                 found = self.quantities.setdefault(name, Errors())
                 found.add(measured.value - truth[name], measured.expanded, rig)
         true = {"separation_m": truth.get("separation_raw_m"), "speed_m_s": truth.get("speed_m_s")}
+        if "speed_m_s" in result.quantities:
+            found_speed = result.quantities["speed_m_s"].value
+            self.speed_shares.append(found_speed / truth["speed_m_s"] - 1.0)
         timer = two_gate_timer(protocol, drop, hz)
         for name, value in true.items():
             reading = truth.get(f"camera_{name}")
@@ -129,17 +139,17 @@ class Tally:
         origins: dict[tuple[int, bool], list[tuple[float, int]]] = {}
         for when, channel, blocked, rod in edges:
             origins.setdefault((channel, blocked), []).append((when, rod))
+        seen: dict[tuple[int, bool], list[tuple[float, int]]] = {}
         for number, rod in result.matches.items():
-            self.edges += 1
             edge = drop.edges[number]
-            _, true = min(
-                origins[edge.channel, edge.blocked],
-                key=lambda origin: abs(origin[0] - edge.tick / hz),
-            )
-            if true == _STRAY:
-                self.strays += 1
-            elif true != rod:
-                self.wrong_rods += 1
+            seen.setdefault((edge.channel, edge.blocked), []).append((edge.tick / hz, rod))
+        for key, pairs in seen.items():
+            times, rods = np.array(pairs).T
+            moments, true = np.array(origins[key]).T
+            nearest = true[np.abs(times[:, None] - moments).argmin(axis=1)]
+            self.edges += times.size
+            self.strays += int((nearest == _STRAY).sum())
+            self.wrong_rods += int(((nearest != _STRAY) & (nearest != rods)).sum())
 
     def json(self) -> dict[str, Any]:
         """Return the figures to report."""
@@ -151,6 +161,8 @@ class Tally:
             "strays_taken_for_a_rod": self.strays,
             "quantities": {name: errors.json() for name, errors in self.quantities.items()},
         }
+        if self.speed_shares:
+            found["speed_rms_relative"] = math.sqrt(fmean(one**2 for one in self.speed_shares))
         for rival, errors in (("camera_480_fps", self.camera), ("two_gate_timer", self.timer)):
             if errors:
                 found[rival] = {name: _plain(one) for name, one in errors.items()}
@@ -204,7 +216,7 @@ def accuracy(
         raise InputError(f"{url} is no simulation", "only a simulation knows the truth: sim://")
     tally = Tally()
     with TemporaryDirectory() as folder:
-        source = _repeated(protocol, repeats, Path(folder)) if repeats else protocol
+        source = repeated(protocol, repeats, Path(folder)) if repeats else protocol
         for seed in range(1, seeds + 1):
             path = Path(folder) / f"{seed}.session"
             begin = time.perf_counter()
@@ -225,7 +237,7 @@ def accuracy(
     return tally.json()
 
 
-def _repeated(protocol: str, repeats: int, folder: Path) -> str:
+def repeated(protocol: str, repeats: int, folder: Path) -> str:
     """Write the protocol again with another number of drops at each incline."""
     text = Path(protocol).read_text(encoding="utf-8")
     changed, n = re.subn(r"(\brepeats:\s*)\d+", rf"\g<1>{repeats}", text)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from urllib.parse import quote
+
 DOUBLED = {
     "skew_sd": "4 ms",
     "delay_sd": "2 ms",
@@ -21,8 +23,15 @@ DOUBLED = {
     "latency": "0.6 ms",
 }
 
+STACK = ("clock", "latency")
+"""Dials that only show where a board and a line stand between the chains and the analysis."""
+
 
 def doubled(url: str, dial: str) -> str:
     """Set one dial in a port's URL."""
-    value = DOUBLED[dial].replace("%", "%25").replace(" ", "%20")
-    return f"{url}{'&' if '?' in url else '?'}{dial}={value}"
+    return with_setting(url, dial, DOUBLED[dial])
+
+
+def with_setting(url: str, name: str, value: str) -> str:
+    """Add a setting to a port's URL."""
+    return f"{url}{'&' if '?' in url else '?'}{name}={quote(value)}"

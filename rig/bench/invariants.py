@@ -75,7 +75,11 @@ def _edges(seen: dict[str, Any]) -> list[tuple[int, int, bool]]:
 
 
 def longest_on(happened: Iterable[dict[str, Any]]) -> float:
-    """How long the release was on at a stretch at most, s."""
+    """How long the release was on at a stretch, the longest for certain, s.
+
+    A computer with other things to do looks at the board late: what it sees on and then off was
+    off, for all that is known, at once after the look before.
+    """
     longest, since = 0.0, None
     for seen in happened:
         if "outputs" not in seen:
@@ -83,5 +87,5 @@ def longest_on(happened: Iterable[dict[str, Any]]) -> float:
         if seen["outputs"] and since is None:
             since = seen["at_s"]
         elif not seen["outputs"] and since is not None:
-            longest, since = max(longest, seen["at_s"] - since), None
+            longest, since = max(longest, seen["after_s"] - since), None
     return longest

@@ -10,13 +10,17 @@ import time
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
+from rig.bench.small_disk import SmallDisk
 from rig.daemon.client import Client
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    Process: TypeAlias = subprocess.Popen[str]
+    Seen: TypeAlias = dict[str, Any]
 
 FENCE = """\
 protocol: 1
@@ -33,6 +37,7 @@ plan: {repeats: RUNS, settle: 0.2 s}
 accept: {missed_edges: 15 %}
 """
 _READY_S = 20.0
+_BOARDS = {"sim": "sim.pty", "emu": "rig_emulator.hands"}
 
 
 class Stand:
@@ -46,9 +51,21 @@ class Stand:
         Of the simulation.
     dials
         As in a ``sim://`` URL.
+    board
+        ``sim``, or ``emu`` for real firmware in an emulator.
+    small_disk
+        Whether the session is on a disk that can be filled.
     """
 
-    def __init__(self, runs: int, seed: int = 0, dials: dict[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        runs: int,
+        seed: int = 0,
+        dials: dict[str, str] | None = None,
+        *,
+        board: str = "sim",
+        small_disk: bool = False,
+    ) -> None:
         self._folder = TemporaryDirectory(prefix="rig-")
         self.folder = Path(self._folder.name)
         self.runs, self.seed, self._dials = runs, seed, dials or {}
@@ -57,26 +74,34 @@ class Stand:
         self.port = self.folder / "port"
         self.socket = self.folder / "door" / "rig.sock"
         self.log = self.folder / "board.jsonl"
-        self.session = self.folder / "session"
+        self.disk = SmallDisk(self.folder / "disk") if small_disk else None
+        self.session = (self.disk.folder if self.disk else self.folder) / "session"
         self.told = ""  # what the last runner said
-        self.board: subprocess.Popen[str] | None = None
-        self.daemon: subprocess.Popen[str] | None = None
-        self.runner: subprocess.Popen[str] | None = None
+        self._kind = board
+        self._followed = 0  # bytes of the log
+        self.board: Process | None = None
+        self.daemon: Process | None = None
+        self.runner: Process | None = None
 
     def __enter__(self) -> Self:
         self.board = self._start(
-            *("-m", "sim.pty", "--protocol", self.protocol, "--seed", self.seed),
+            *("-m", _BOARDS[self._kind], "--protocol", self.protocol, "--seed", self.seed),
             *("--link", self.port, "--log", self.log),
             *(f"{name}={value}" for name, value in self._dials.items()),
             stdin=subprocess.PIPE,
         )
         assert self.board.stdout is not None
-        self.board.stdout.readline()
+        if not self.board.stdout.readline():
+            _, told = self.board.communicate()
+            self.__exit__()
+            raise DeviceError(f"the board does not start: {told}")
         return self
 
     def __exit__(self, *_exc: object) -> None:
         for process in (self.runner, self.daemon, self.board):
             self.kill(process)
+        if self.disk is not None:
+            self.disk.close()
         self._folder.cleanup()
 
     # ------------------------------------------------------------------ processes
@@ -91,23 +116,34 @@ class Stand:
         if not line.startswith("rig daemon:"):
             raise DeviceError(f"the daemon does not start: {line}")
 
-    def start_runner(self) -> None:
+    def start_runner(self) -> Process:
         """Start ``rig run`` on the session, through the daemon."""
         self.runner = self._start(
             *("-m", "rig", "run", self.protocol, "--port", self.port, "--session", self.session),
             *("--socket", self.socket, "--yes"),
         )
+        return self.runner
+
+    def see_to_runner(self) -> None:
+        """Start a runner unless one is still at it."""
+        if self.runner is None or self.runner.poll() is not None:
+            self.kill(self.runner)
+            self.start_runner()
 
     def run(self) -> int:
         """Have a runner go on with the session to its end; return the exit code."""
-        self.start_runner()
+        self.see_to_runner()
+        return self.waited()
+
+    def waited(self, seconds: float = 600.0) -> int:
+        """Wait for the runner's end; return its exit code, and keep what it said in `told`."""
         assert self.runner is not None
-        _, self.told = self.runner.communicate(timeout=600)
+        _, self.told = self.runner.communicate(timeout=seconds)
         if "Traceback" in self.told:
             raise AssertionError(self.told)
         return self.runner.returncode
 
-    def kill(self, process: subprocess.Popen[str] | None) -> None:
+    def kill(self, process: Process | None) -> None:
         """Kill one of the processes, as ``kill -9`` does."""
         if process is not None:
             process.kill()
@@ -128,7 +164,7 @@ class Stand:
         """Connect to the daemon, once it answers."""
         return Client(self.socket, name)
 
-    def _start(self, *arguments: object, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+    def _start(self, *arguments: object, stdin: int = subprocess.DEVNULL) -> Process:
         return subprocess.Popen(  # noqa: S603 - our own program
             [sys.executable, "-W", "error", *map(str, arguments)],
             stdin=stdin,
@@ -140,11 +176,21 @@ class Stand:
 
     # ------------------------------------------------------------------ what the board saw
 
-    def happened(self) -> Iterator[dict[str, Any]]:
+    def happened(self) -> Iterator[Seen]:
         """What the board logged so far."""
         for line in self.log.read_text("utf-8").splitlines(keepends=True):
             if line.endswith("\n"):
                 yield json.loads(line)
+
+    def follow(self) -> list[Seen]:
+        """What the board logged since this was asked last."""
+        if self.log.stat().st_size == self._followed:
+            return []
+        with self.log.open("rb") as file:
+            file.seek(self._followed)
+            *lines, _ = file.read().split(b"\n")
+        self._followed += sum(len(line) + 1 for line in lines)
+        return [json.loads(line) for line in lines]
 
     def await_phase(self, phase: int, count: int = 1) -> float:
         """Wait until the board was in a phase so often; return when, s (monotonic)."""

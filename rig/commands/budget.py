@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.drop import fit_drop
-from rig.analysis.monte_carlo import monte_carlo
+from rig.analysis.monte_carlo import agreement, monte_carlo
 from rig.analysis.student import coverage_factor
 from rig.commands.output import print_json
 from rig.errors import InputError
@@ -68,7 +68,13 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
         "monte_carlo": {
             "trials": trials,
             "seed": seed,
-            "quantities": {name: one.json() for name, one in trial.items()},
+            "quantities": {
+                name: one.json()
+                | agreement(
+                    alone.quantities[name].value, alone.quantities[name].u, one, trials
+                ).json()
+                for name, one in trial.items()
+            },
         },
     }
 
@@ -102,6 +108,7 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         alone, trial = found["by_itself"][name], drawn["quantities"][name]
         lines.append(
             f"  by itself u = {alone['u']:.2g}; by {drawn['trials']} trials (seed "
-            f"{drawn['seed']}) {trial['u']:.2g}, 95 % in {trial['low']:.6g} … {trial['high']:.6g}"
+            f"{drawn['seed']}) {trial['u']:.2g}, 95 % in {trial['low']:.6g} … {trial['high']:.6g}: "
+            + ("both agree" if trial["agrees"] else "they do not agree")
         )
     return lines

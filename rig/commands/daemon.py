@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.output import say
+from rig.daemon.doorway import notify_systemd
+from rig.daemon.narration import Teller
 from rig.daemon.place import default_socket
-from rig.daemon.server import notify_systemd, serve
+from rig.daemon.server import serve
+from rig.link.port import check_url
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -15,12 +18,13 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Own a port and serve clients, in the foreground, until SIGTERM or Ctrl-C."""
+    check_url(arguments.port)
     path = Path(arguments.socket).absolute() if arguments.socket else default_socket()
 
     def ready() -> None:
         say(f"rig daemon: {arguments.port} at {path}")
         notify_systemd()
 
-    serve(arguments.port, path, tcp=arguments.tcp, ready=ready)
+    serve(arguments.port, path, tcp=arguments.tcp, ready=ready, tell=Teller().tell)
     say("rig daemon: ended")
     return 0

@@ -25,6 +25,7 @@ _BOARD = (
     board_checks.held_drop,
     board_checks.clock,
     board_checks.round_trip,
+    board_checks.emergency_stop,
     board_checks.stuck_gates,
     board_checks.flickering_gates,
 )
@@ -54,7 +55,9 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
     yield file_checks.disk(look_at_disk(Path(session).parent if session else Path()))
-    if session:
+    if session and not Path(session).exists():
+        yield Finding(f"session {session}", "not there", "check its name; rig run makes a new one")
+    elif session:
         try:
             yield file_checks.session(look_at_session(session))
         except SessionError as error:

@@ -15,26 +15,35 @@ from rig.protocol.plan import runs
 from rig.session.edges_csv import read_edges
 from rig.session.schema import RunState
 from rig.session.store import Session
+from rig.session.timer_csv import read_timer
+from rig.session.timer_table import is_logger_table
 from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Sequence
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.scene import Gate, Protocol
     from rig.records import Drop
 
 
 def main(arguments: Namespace) -> int:
     """Make a session from an edge file."""
     protocol = reader.read(arguments.protocol)
-    drops = read_edges(arguments.events)
+    exported = is_logger_table(arguments.events)
+    if exported:
+        gate, bars = _beam(protocol, arguments.channel)
+        drops = read_timer(arguments.events, gate.channel, bars)
+    else:
+        drops = read_edges(arguments.events)
     _fits(protocol, drops, arguments.events)
     timer: dict[str, object] = {
         "source": "imported edges",
         "file": Path(arguments.events).name,
         "sha256": hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest(),
     }
+    if exported:
+        timer["beams"] = [gate.channel]
     if arguments.clock_uncertainty is not None:
         timer["clock_u"] = _relative(arguments.clock_uncertainty)
     now_ns = SystemClock().now_ns()
@@ -52,6 +61,19 @@ def main(arguments: Namespace) -> int:
     edges = sum(len(drop.edges) for drop in drops)
     say(f"{edges} edges of {len(drops)} runs → {arguments.session}")
     return 0
+
+
+def _beam(protocol: Protocol, channel: int | None) -> tuple[Gate, int]:
+    """Which gate a data logger's beam was, and how many rods or bars pass it."""
+    gates = protocol.gates.gates if protocol.gates else ()
+    named = [gate for gate in gates if channel is None or gate.channel == channel]
+    if len(named) == 1:
+        return named[0], max(one.chain.rods for one in protocol.chains.values())
+    known = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
+    raise InputError(
+        f"{protocol.source}: the file does not say which gate its times are of",
+        f"say which with --channel N: {known}" if known else "add the gate they are of",
+    )
 
 
 def _relative(text: str) -> float:

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
-from rig.errors import InputError
-from rig.files import write_atomic
+from rig.estimate.session import estimate
+from rig.files import make_folder, write_atomic
 from rig.report.clock import clock_lines
+from rig.report.effects import effects_parts
+from rig.report.estimate import page_parts
+from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
 from rig.report.pictures import pictures
-from rig.results import protocol_of, results
+from rig.results import protocol_of, with_analysis
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Sequence
 
+    from rig.analysis.session import Analysis
+    from rig.protocol.scene import Protocol
     from rig.report.embed import Picture
 
 
@@ -27,7 +32,7 @@ def main(arguments: Namespace) -> int:
     """Write a session's report."""
     with Session.open(arguments.session, readonly=True) as session:
         protocol = protocol_of(session)
-        found = results(session, progress("analysing run"))
+        found, analysis = with_analysis(session, progress("analysing run"))
         figures = pictures(
             found,
             model_curves(protocol),
@@ -35,6 +40,9 @@ def main(arguments: Namespace) -> int:
             skew_limit_s=protocol.accept.release_skew,
             site_m_s2={"value": protocol.gravity.value, "U95": 2.0 * protocol.gravity.u},
         )
+        estimated = _estimated(protocol, analysis, simulated=session.simulated)
+        if estimated:
+            figures += estimate_pictures(estimated).values()
         write_report(
             arguments.output,
             ReportContext(
@@ -55,6 +63,7 @@ def main(arguments: Namespace) -> int:
                 identities=[identity for _, identity in session.identities()],
                 clock=found["clock"],
                 notes=clock_lines(found),
+                parts=[*effects_parts(found), *(page_parts(estimated) if estimated else ())],
             ),
         )
     if arguments.figures is not None:
@@ -63,11 +72,15 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
+def _estimated(protocol: Protocol, analysis: Analysis, *, simulated: bool) -> dict[str, Any]:
+    """What the impacts have in common; empty where there are none, or none is good."""
+    if protocol.surface is None or not analysis.adjusted:
+        return {}
+    return {"simulated": simulated} | estimate(protocol, analysis)
+
+
 def _write_figures(folder: Path, figures: Sequence[Picture]) -> None:
     """Write ``figure-1.svg`` and on, numbered as in the report."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    make_folder(folder)
     for number, picture in enumerate(figures, 1):
         write_atomic(folder / f"figure-{number}.svg", picture.svg)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
-from rig.tui.app import Options, RigApp
+from rig.tui.app import RigApp
 from rig.tui.keys import read_keys
+from rig.tui.options import Options
 
 if TYPE_CHECKING:
     from argparse import Namespace

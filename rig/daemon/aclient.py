@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from typing import TYPE_CHECKING, Any, Self
 
 from rig.daemon import rpc
+from rig.daemon.dialogue import Dialogue, gone, hello
 from rig.daemon.mirror import Mirror
-from rig.daemon.place import check_folder, token_file
+from rig.daemon.place import reach
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+
+
+_CHUNK = 1 << 16
+_HUNG_UP = "it hung up"
 
 
 class AsyncClient:
@@ -39,7 +43,7 @@ class AsyncClient:
         self.changed: Callable[[], None] = lambda: None
         self.lost = asyncio.Event()
         self._writer = writer
-        self._number = 0
+        self._dialogue = Dialogue()
         self._open: dict[int, asyncio.Future[Any]] = {}
         self._listening = asyncio.get_running_loop().create_task(self._listen(reader))
 
@@ -61,23 +65,11 @@ class AsyncClient:
         VersionError
             It speaks another version.
         """
-        tcp, token = token_file(path), ""
+        line, token = await asyncio.to_thread(reach, path)
+        line.setblocking(False)
+        client = cls(*await asyncio.open_connection(sock=line))
         try:
-            check_folder(path.parent)
-            if not path.exists() and tcp.exists():
-                told = json.loads(tcp.read_text("ascii"))
-                token = told["token"]
-                streams = await asyncio.open_connection(
-                    "127.0.0.1", told["port"], limit=rpc.MESSAGE_LIMIT
-                )
-            else:
-                streams = await asyncio.open_unix_connection(path, limit=rpc.MESSAGE_LIMIT)
-        except (OSError, ValueError) as error:
-            raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
-        client = cls(*streams)
-        try:
-            more = {"token": token} if token else {}
-            await client.call("hello", api=rpc.API, client=name, **more)
+            await client.call("hello", **hello(name, token))
         except BaseException:
             await client.close()
             raise
@@ -92,11 +84,11 @@ class AsyncClient:
             As the daemon raised it, or it is gone.
         """
         if self.lost.is_set():
-            raise _gone()
-        self._number += 1
+            raise gone(_HUNG_UP)
+        number, line = self._dialogue.ask(method, params)
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._open[self._number] = answer
-        self._writer.write(rpc.request(method, params, self._number))
+        self._open[number] = answer
+        self._writer.write(line)
         return await answer
 
     async def subscribe(self) -> None:
@@ -117,14 +109,14 @@ class AsyncClient:
 
     async def _listen(self, reader: asyncio.StreamReader) -> None:
         try:
-            while line := await reader.readline():
-                message = json.loads(line)
-                if "method" in message:
-                    self.mirror.notified(message["method"], message["params"])
-                    self.changed()
-                else:
-                    self._answered(message)
-        except OSError:
+            while True:
+                for message in self._dialogue.feed(await reader.read(_CHUNK)):
+                    if "method" in message:
+                        self.mirror.notified(message["method"], message["params"])
+                        self.changed()
+                    else:
+                        self._answered(message)
+        except (OSError, DeviceError):
             pass  # gone
         finally:
             self._end()
@@ -146,10 +138,6 @@ class AsyncClient:
         self.lost.set()
         for answer in self._open.values():
             if not answer.done():
-                answer.set_exception(_gone())
+                answer.set_exception(gone(_HUNG_UP))
         self._open.clear()
         self.changed()
-
-
-def _gone() -> DeviceError:
-    return DeviceError("the daemon is gone", "start it again: rig daemon")

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import socket
-import sys
 import threading
 import time
 from contextlib import suppress
@@ -13,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon import rpc
+from rig.daemon.dialogue import Dialogue, gone, hello
 from rig.daemon.faults import ControlError
 from rig.daemon.interrupts import Interrupts
 from rig.daemon.lease import LEASE_S
-from rig.daemon.place import check_folder, peer_uid, token_file
+from rig.daemon.place import reach
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.session.store import Session
 
@@ -51,17 +48,16 @@ class Client:
 
     def __init__(self, path: Path, name: str, interrupts: Interrupts | None = None) -> None:
         self._interrupts = Interrupts() if interrupts is None else interrupts
-        self._buffer = bytearray()
-        self._number = 0
+        self._dialogue = Dialogue()
         self._writing = threading.Lock()
         self._session: Session | None = None
         self._armed = False
         self._over = threading.Event()
         self._beat: threading.Thread | None = None
-        self._socket, token = _connected(path)
+        self._socket, token = reach(path)
+        self._socket.settimeout(_LOOK_S)
         try:
-            more: dict[str, Any] = {"token": token} if token else {}
-            self.daemon: dict[str, Any] = self.call("hello", api=rpc.API, client=name, **more)
+            self.daemon: dict[str, Any] = self.call("hello", **hello(name, token))
         except BaseException:
             self._socket.close()
             raise
@@ -81,10 +77,9 @@ class Client:
         RigError
             As the daemon raised it, or it is gone.
         """
-        self._number += 1
-        number = self._number
+        number, line = self._dialogue.ask(method, params)
         with self._interrupts.held():
-            self._send(rpc.request(method, params, number))
+            self._send(line)
         until = time.monotonic() + patience
         while True:
             with self._interrupts.held():
@@ -203,7 +198,7 @@ class Client:
             with self._writing:
                 self._socket.sendall(line)
         except OSError as error:
-            raise _gone(error) from error
+            raise gone(error) from error
 
     def _receive(self) -> list[dict[str, Any]]:
         """Take what has come within `_LOOK_S`."""
@@ -212,42 +207,5 @@ class Client:
         except TimeoutError:
             return []
         except OSError as error:
-            raise _gone(error) from error
-        if not data:
-            raise _gone("it hung up")
-        self._buffer += data
-        *lines, rest = self._buffer.split(b"\n")
-        self._buffer = bytearray(rest)
-        if len(rest) > rpc.MESSAGE_LIMIT:
-            raise DeviceError("what answers there is no daemon of this rig")
-        return [json.loads(line) for line in lines]
-
-
-def _gone(why: object) -> DeviceError:
-    return DeviceError(
-        f"the daemon is gone: {why}",
-        "start it again (rig daemon), then give the same command: a drop that fell is fetched",
-    )
-
-
-def _connected(path: Path) -> tuple[socket.socket, str]:
-    """Connect to a daemon; also give the token that it wants to hear."""
-    tcp, token = token_file(path), ""
-    line: socket.socket | None = None
-    try:
-        check_folder(path.parent)
-        if not path.exists() and tcp.exists():
-            told = json.loads(tcp.read_text("ascii"))
-            line, token = socket.create_connection(("127.0.0.1", told["port"]), 5.0), told["token"]
-        elif sys.platform != "win32":
-            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            line.settimeout(5.0)
-            line.connect(str(path))
-    except (OSError, ValueError) as error:
-        if line is not None:
-            line.close()
-        raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
-    if line is None or peer_uid(line) not in {None, getattr(os, "getuid", int)()}:
-        raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")
-    line.settimeout(_LOOK_S)
-    return line, token
+            raise gone(error) from error
+        return self._dialogue.feed(data)

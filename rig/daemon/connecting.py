@@ -86,7 +86,8 @@ def connect(
             raise
         return Desk(url, interrupts)  # what a killed daemon left, or one of another version
     try:
-        if not _same(client.daemon["port"], url):
+        # A board that was plugged in again may have another path than the daemon was told.
+        if not any(_same(client.daemon.get(name, ""), url) for name in ("port", "path")):
             if socket is None:
                 client.close()
                 return Desk(url, interrupts)

@@ -7,18 +7,20 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
+from rig.daemon import release
 from rig.daemon.faults import StoppedError
+from rig.daemon.home import SERIAL_NUMBER, Home
 from rig.daemon.hub import Hub
 from rig.daemon.interrupts import Interrupts
-from rig.daemon.opening import open_for, port_before, shown
+from rig.daemon.opening import known_before, open_for, shown
 from rig.daemon.record import Unrecorded
 from rig.daemon.station import DISCARD, Station
 from rig.daemon.view import View
 from rig.errors import DeviceError, InputError, RigError, SessionError
-from rig.link.messages import Reason
+from rig.link.messages import TEST_RUN, Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
@@ -79,6 +81,7 @@ class Desk:
         self._session: Session | None = None
         self._protocol: Protocol | None = None
         self._line_url = url  # with all that a simulation is told
+        self._home = Home(url)
         self._unarmed: RigError | None = None  # why what was armed is not
         self._lost: dict[tuple[int, int], RigError] = {}  # why a drop is not in the session
 
@@ -134,9 +137,12 @@ class Desk:
         self.close_session()
         opened = open_for(scene, source, fresh, path)
         try:
-            self._line_url = completed(self.url, source, path, seed, port_before(opened))
+            before = known_before(opened)
+            self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
+            self._home.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
             self.connect()
+            self._home.bound = True
             with self.interrupts.held():
                 opened.put_results([], __version__)  # of less than there will be
                 opened.commit()
@@ -146,7 +152,7 @@ class Desk:
             raise
         about, plan = shown(opened, scene)
         self.hub.plan(plan)
-        self.hub.set(session=about, drop=None)
+        self.hub.set(session=about, drop=None, release_test=None)
         return fetched
 
     def close_session(self) -> None:
@@ -157,6 +163,7 @@ class Desk:
     def _part_with(self, session: Session) -> None:
         """Close a session; a port that shall stay open does."""
         self._session = self._protocol = None
+        self._home.bound = False
         self._lost.clear()
         station, self.station, self.due = self.station, None, None
         port = None
@@ -183,7 +190,7 @@ class Desk:
         Raises
         ------
         DeviceError
-            No such port, nobody there, another protocol version.
+            No such port, nobody there, another protocol version, another board than the session's.
         """
         if port is None and self.station is not None:
             try:
@@ -191,12 +198,17 @@ class Desk:
             except DeviceError:
                 self.station.close()
         book = Unrecorded() if self._session is None else self._session
-        station = Station(
-            book, self._line_url, self.interrupts, view=View(self.hub), halted=self._halted
-        )
         self.station = None
         self.hub.set(link={"state": "opening", "error": None, "retry_s": None})
+        url = self._line_url
+        if not is_simulated(url):
+            url = self._home.now if port is not None else self._home.look()
+        station = Station(
+            book, url, self.interrupts, view=View(self.hub), halted=self._halted,
+            meet=self._home.meet,
+        )  # fmt: skip
         station.connect(port)
+        self.hub.set(port={"url": self.url, "simulated": is_simulated(url), "path": self._home.now})
         self.station = station
         self.hub.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
 
@@ -221,6 +233,9 @@ class Desk:
         """
         station = self._connected()
         held = station.held()
+        if held is not None and held[0] == TEST_RUN:
+            release.forget(station)
+            held = None
         log = self.session.states()
         if held is not None:
             if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in log):
@@ -334,6 +349,24 @@ class Desk:
                 f"there is no record of run {run}, attempt {attempt}", "repeat the run"
             )
         return drop
+
+    def test_release(self) -> dict[str, Any]:
+        """Drive the release once with nothing hung, see `rig.daemon.release.drive`.
+
+        Raises
+        ------
+        InputError
+            No session is open, or a drop is under way.
+        """
+        station = self._connected()
+        if self._protocol is None or station.armed or self.due:
+            raise InputError(
+                "this is not the moment to test the release", "open a session; finish the drop"
+            )
+        self.hub.set(release_test=None)
+        found = release.drive(station, self._protocol, self._halted)
+        self.hub.set(release_test=found)
+        return found
 
     def log_state(
         self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()

@@ -24,6 +24,7 @@ _FIRST: dict[str, Any] = {
     "gates": None,
     "phase": "idle",
     "drop": None,
+    "release_test": None,
     "session": None,
     "control": None,
     "clients": 0,

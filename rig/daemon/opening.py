@@ -48,10 +48,10 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
     return session
 
 
-def port_before(session: Reader) -> str:
-    """Say which port the session was recorded at so far; empty for none."""
-    ports = [str(identity["port"]) for _, identity in session.identities() if "port" in identity]
-    return ports[-1] if ports else ""
+def known_before(session: Reader) -> dict[str, str]:
+    """Say what is known of the board and port where the session was recorded at last."""
+    known = [identity for _, identity in session.identities() if "port" in identity]
+    return {name: str(value) for name, value in known[-1].items()} if known else {}
 
 
 def shown(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[dict[str, Any]]]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import struct
+import sys
 from pathlib import Path
 
-from rig.errors import InputError
+from rig.errors import DeviceError, InputError
 
 _SECRET = 0o077  # what the group and others may not have
+_REACH_S = 5.0
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
 
@@ -58,7 +61,11 @@ def check_folder(folder: Path) -> None:
     if about.st_uid != os.getuid():
         raise InputError(f"{folder} belongs to somebody else", "name another place with --socket")
     if about.st_mode & _SECRET:
-        raise InputError(f"{folder} is open to other users", f"chmod 700 {folder}")
+        raise InputError(
+            f"{folder} is open to other users",
+            "name a place in a folder of your own with --socket; if this one is for nothing else: "
+            f"chmod 700 {folder}",
+        )
 
 
 def peer_uid(connection: socket.socket) -> int | None:
@@ -69,3 +76,44 @@ def peer_uid(connection: socket.socket) -> int | None:
     data = connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size)
     uid: int = _CREDENTIALS.unpack(data)[1]
     return uid
+
+
+def reach(path: Path) -> tuple[socket.socket, str]:
+    """Connect to a daemon of this user.
+
+    Parameters
+    ----------
+    path
+        Its Unix socket; beside it the file that stands for TCP.
+
+    Returns
+    -------
+    socket, str
+        The connection, and the token that the daemon wants to hear; empty for none.
+
+    Raises
+    ------
+    DeviceError
+        Nobody answers there, or somebody else.
+    """
+    tcp, token = token_file(path), ""
+    line: socket.socket | None = None
+    try:
+        check_folder(path.parent)
+        if not path.exists() and tcp.exists():
+            told = json.loads(tcp.read_text("ascii"))
+            address = "127.0.0.1", told["port"]
+            line, token = socket.create_connection(address, _REACH_S), told["token"]
+        elif sys.platform != "win32":
+            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            line.settimeout(_REACH_S)
+            line.connect(str(path))
+    except (OSError, ValueError) as error:
+        if line is not None:
+            line.close()
+        raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
+    if line is None or peer_uid(line) not in {None, getattr(os, "getuid", int)()}:
+        if line is not None:
+            line.close()
+        raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")
+    return line, token

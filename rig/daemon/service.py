@@ -14,8 +14,9 @@ from rig.session.schema import RunState
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
+    from rig.daemon.connection import Connection
     from rig.daemon.desk import Desk
-    from rig.daemon.server import Connection, Server
+    from rig.daemon.server import Server
 
 _ANY_NUMBER = (int, float)
 
@@ -46,6 +47,7 @@ class Service:
             "arm": self._arm,
             "fire": self._fire,
             "collect": self._collect,
+            "test_release": self._test_release,
             "log_state": self._log_state,
         }
 
@@ -85,6 +87,7 @@ class Service:
             "version": __version__,
             "pid": os.getpid(),
             "port": self._server.url,
+            "path": self._server.hub.get("port")["path"],
         }
 
     async def _subscribe(self) -> dict[str, Any]:
@@ -152,6 +155,9 @@ class Service:
             desk.collect(*which)
 
         return await self._ask(work, writes=False)
+
+    async def _test_release(self) -> dict[str, Any]:
+        return await self._ask(lambda desk: desk.test_release())
 
     async def _log_state(
         self, run: object, attempt: object, state: object, reasons: object

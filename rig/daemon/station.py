@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
@@ -21,7 +21,7 @@ from rig.records import Ping, Pulse
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rig.daemon.record import Record as Book
     from rig.daemon.view import View
@@ -43,8 +43,8 @@ _REFERENCE_S = 10.0  # between two questions for the latest pulse of the referen
 class Station:
     """The owner of the port and of the session.
 
-    Every chunk of bytes is put into the session before anything is done with it; a drop is
-    committed before the device is told to forget it.
+    All bytes are put into the session before anything is done with them; a drop is committed before
+    the device is told to forget it.
 
     Parameters
     ----------
@@ -58,6 +58,8 @@ class Station:
         What is told of everything that becomes known.
     halted
         Asked all the time whether everything shall be off.
+    meet
+        Called with who is there before anything is asked of it; gives what else is known of it.
 
     Attributes
     ----------
@@ -73,12 +75,14 @@ class Station:
         *,
         view: View | None = None,
         halted: Callable[[], bool] = lambda: False,
+        meet: Callable[[Identity], dict[str, str]] = lambda _: {},
     ) -> None:
         self.session = session
         self.url = url
         self.interrupts = Interrupts() if interrupts is None else interrupts
         self._view = view
         self._halted = halted
+        self._meet = meet
         self._port: Port | None = None
         self._device: Device | None = None
         self._uneven = random.Random(0)  # noqa: S311 - spacing, not secrets
@@ -88,6 +92,7 @@ class Station:
         self._host: HostWatch | None = None
         self._reference_ns = 0  # when to ask for the next pulse
         self._disk_must_not_matter = False
+        self._checks: tuple[Callable[[], None], ...] = ()  # what may end a request now
 
     def __enter__(self) -> Self:
         self.connect()
@@ -115,10 +120,14 @@ class Station:
                 self.clock = port_clock(self._port)
                 self._host = HostWatch() if isinstance(self.clock, SystemClock) else None
                 self._reference_ns = self.clock.now_ns()
-                self._device = Device(self._port, self.clock, self._log, on_record=self._note)
+                self._device = Device(
+                    self._port, self.clock, self._log, on_record=self._note,
+                    give_way=self._give_way,
+                )  # fmt: skip
                 identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
                 known = asdict(identity) | {"unique_id": identity.unique_id.hex()}
-                self.session.add_identity(known | {"port": told(self.url)}, self.clock.now_ns())
+                known |= {"port": told(self.url)} | self._meet(identity)
+                self.session.add_identity(known, self.clock.now_ns())
                 self.session.commit()
             except BaseException:
                 self.close()
@@ -183,7 +192,7 @@ class Station:
 
     def look(self) -> None:
         """Ask what the device is doing, and let it know that somebody is there."""
-        with self.interrupts.held():
+        with self.interrupts.held(), self._unless(self.interrupts.check, self._go_on):
             self.device.status()
 
     def ping(self) -> None:
@@ -191,10 +200,11 @@ class Station:
         with self.interrupts.held():
             if self._host is not None and (found := self._host.look()) is not None:
                 self.session.add_host_break(found)
-            self._sample = self.device.ping()
-            if self.clock.now_ns() >= self._reference_ns:
-                self._reference_ns = self.clock.now_ns() + round(_REFERENCE_S * 1e9)
-                self.device.reference()
+            with self._unless(self.interrupts.check, self._go_on):
+                self._sample = self.device.ping()
+                if self.clock.now_ns() >= self._reference_ns:
+                    self._reference_ns = self.clock.now_ns() + round(_REFERENCE_S * 1e9)
+                    self.device.reference()
 
     def statistics(self) -> dict[str, object]:
         """Count what went over the line since it is up, see rig/daemon/API.md."""
@@ -226,14 +236,19 @@ class Station:
         """
         gates, release = protocol.gates, protocol.release
         with self.interrupts.held():
-            token = self.device.arm(
-                label=pack_label(run, attempt),
-                gates=gates.mask if gates else 0,
-                release=1 << release.channel,
-                pulse_us=round(release.pulse * 1e6),
-                timeout_ms=ARM_TIMEOUT_MS,
-                record_ms=RECORD_MS,
-            )
+            try:
+                with self._unless(self.interrupts.check, self._go_on):
+                    token = self.device.arm(
+                        label=pack_label(run, attempt),
+                        gates=gates.mask if gates else 0,
+                        release=1 << release.channel,
+                        pulse_us=round(release.pulse * 1e6),
+                        timeout_ms=ARM_TIMEOUT_MS,
+                        record_ms=RECORD_MS,
+                    )
+            except (StoppedError, KeyboardInterrupt):
+                self.abort()  # the device may have heard what it did not answer
+                raise
             self._armed, self.lapsed = (run, attempt), None
             self.state(run, attempt, RunState.ARMED)
             return token
@@ -248,12 +263,19 @@ class Station:
         """
         run, attempt = self._armed or (0, 0)
         with self.interrupts.held():
-            self.device.status()  # a slow disk may take most of the silence allowed, twice
+            with self._unless(self.interrupts.check, self._go_on):
+                self.device.status()  # a slow disk may take most of the silence allowed, twice
             self.state(run, attempt, RunState.FIRED)
             self.interrupts.check()  # whoever asked to stop until now sees nothing fall
-            if self._halted():
-                raise StoppedError("stopped before the release", "arm again when all is well")
-            self.device.fire(token)
+            self._go_on()
+            try:
+                with self._unless(self._go_on):
+                    self.device.fire(token)
+            except StoppedError:
+                self.abort()
+                if self.held() == (run, attempt):
+                    self._armed = None  # it had heard: what fell is collected
+                raise
             self._armed = None  # from here on there is a recording, which `close` leaves alone
 
     def collect(self, run: int, attempt: int) -> Drop:
@@ -300,6 +322,23 @@ class Station:
             self.session.commit()
             if self._view is not None:
                 self._view.state(run, attempt, state, reasons)
+
+    @contextmanager
+    def _unless(self, *checks: Callable[[], None]) -> Iterator[None]:
+        """Let these end what gets no answer: on a bad line a request is repeated for seconds."""
+        self._checks = checks
+        try:
+            yield
+        finally:
+            self._checks = ()
+
+    def _give_way(self) -> None:
+        for check in self._checks:
+            check()
+
+    def _go_on(self) -> None:
+        if self._halted():
+            raise StoppedError("everything was switched off", "arm again when all is well")
 
     def _keep(self, drop: Drop) -> Drop:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")

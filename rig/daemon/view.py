@@ -10,15 +10,16 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
+from rig.link.edges import ALL_GATES, edges
 from rig.link.transcript import Received
+from rig.link.wiretypes import EVENTS
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from rig.daemon.hub import Edge3, Hub
+    from rig.daemon.hub import Hub
     from rig.link.transcript import Record
     from rig.records import Drop
 
-_WRAP = 1 << 32
 _PHASES = {
     wire.Phase.IDLE: "idle",
     wire.Phase.ARMED: "armed",
@@ -107,20 +108,13 @@ class View:
     def _events(self, frame: wire.EventsFrame) -> None:
         if frame.first < self._next or self._fire_tick is None:
             return
+        events = list(EVENTS.rows(frame.events))
         state = self._state
-        if frame.first > self._next and frame.events:
-            state = frame.events[0].state  # it is not known when the gates changed
-        edges: list[Edge3] = []
-        for event in frame.events:
-            now = event.state
-            changed = state ^ now
-            tick = (event.tick - self._fire_tick + _WRAP // 2) % _WRAP - _WRAP // 2
-            while changed:
-                lowest = changed & -changed
-                edges.append((tick, lowest.bit_length() - 1, 1 if now & lowest else 0))
-                changed ^= lowest
-            state = now
-        self._state, self._next = state, frame.first + len(frame.events)
-        self._hub.edges(edges)
-        self._hub.set(gates={"blocked": state})
+        if frame.first > self._next and events:
+            state = events[0][1]  # it is not known when the gates changed
+        found = edges(events, state, ALL_GATES, self._fire_tick)
+        self._state = events[-1][1] if events else state
+        self._next = frame.first + len(events)
+        self._hub.edges([(tick, channel, int(blocked)) for tick, channel, blocked in found])
+        self._hub.set(gates={"blocked": self._state})
         self._drop("fired")

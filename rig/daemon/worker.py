@@ -64,6 +64,7 @@ class Worker:
         self._stops: list[Future[None]] = []
         self._guard = threading.Lock()  # of the two above
         self._holder: object = None  # who armed
+        self._at_work = False  # for a client
         self._ending = False
         self._uneven = random.Random()  # noqa: S311 - spacing, not secrets
         self._pause_s = _FIRST_PAUSE_S
@@ -136,7 +137,8 @@ class Worker:
             return True
         station = self.desk.station
         armed = station is not None and station.armed is not None
-        return (self._ending or not self._held) and (armed or not self.desk.due)
+        asked = self._at_work and not self.desk.due
+        return (self._ending or not self._held) and (armed or asked)
 
     @property
     def _held(self) -> bool:
@@ -163,17 +165,21 @@ class Worker:
         if self._stop:
             job.outcome.set_exception(StoppedError(self._stop))
             return
+        self._at_work = True
         try:
             result = job.work()
         except Exception as error:
             # First what follows for the link, so that a client sees it before its answer.
             if self._trouble is None:
                 self._weigh(known(error))
-            job.outcome.set_exception(known(error))
+            stopped = isinstance(error, StoppedError) and self._stop
+            job.outcome.set_exception(StoppedError(self._stop) if stopped else known(error))
         else:
             if self._trouble is not None and self._over():
                 self._well()
             job.outcome.set_result(result)
+        finally:
+            self._at_work = False
 
     def _over(self) -> bool:
         """Whether what was asked for has ended the trouble, by the way."""

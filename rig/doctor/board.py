@@ -46,12 +46,12 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
         clock.sleep(0.023 + 0.0071 * (n % 5))
     state = device.status()
     states = watch_gates(lambda: device.status().gates, clock, _GLANCE_S)
-    edges, unwatched = None, "it holds a drop"
+    edges, unwatched, stopped = None, "it holds a drop", False
     if state.phase is Phase.IDLE:
-        edges, unwatched = _recorded(device, ((1 << identity.gates) - 1) & ~states.stuck)
+        edges, unwatched, stopped = _recorded(device, ((1 << identity.gates) - 1) & ~states.stuck)
     held = unpack_label(state.label) if state.phase is Phase.HOLDING else None
     return BoardFacts(
-        identity, _shipped(identity), tuple(pings), held, states, edges, WATCH_S, unwatched
+        identity, _shipped(identity), tuple(pings), held, states, edges, WATCH_S, unwatched, stopped
     )
 
 
@@ -62,15 +62,15 @@ def _shipped(identity: Identity) -> str:
     return ""
 
 
-def _recorded(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str]:
-    """Record the gates for a while with all releases off; else say why not.
+def _recorded(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str, bool]:
+    """Record the gates for a while with all releases off; else say why not, and if it is stopped.
 
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
     if not gates:
-        return None, "all gates are blocked"
-    why = ""
+        return None, "all gates are blocked", False
+    why, stopped = "", False
     for _ in range(_TRIES):
         try:
             token = device.arm(
@@ -83,14 +83,14 @@ def _recorded(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str]
             )
             device.fire(token)
         except DeviceRefusedError as refusal:
-            why = refusal.message
+            why, stopped = refusal.message, refusal.reason is Reason.STOPPED
             if refusal.reason not in _AGAIN:
                 break
             continue
         drop = device.collect(_LABEL)
         if drop.certificate is not None:
             device.acknowledge(_LABEL, drop.certificate.crc32)
-        return drop.edges, ""
+        return drop.edges, "", False
     with suppress(DeviceRefusedError):
         device.abort()
-    return None, why
+    return None, why, stopped

@@ -71,6 +71,13 @@ def round_trip(board: BoardFacts) -> Finding:
     return Finding("round trip", said)
 
 
+def emergency_stop(board: BoardFacts) -> Finding:
+    """See that the emergency stop lets the board arm."""
+    if board.stopped:
+        return Finding("emergency stop", "open", "close it, or plug its cable in: it opens too")
+    return Finding("emergency stop", "closed" if board.edges is not None else "not tried")
+
+
 def stuck_gates(board: BoardFacts) -> Finding:
     """See that no gate is blocked all the time."""
     stuck = board.states.stuck
@@ -84,11 +91,12 @@ def stuck_gates(board: BoardFacts) -> Finding:
 def flickering_gates(board: BoardFacts) -> Finding:
     """See that no gate changes while nothing moves, and whether the mains do it if one does."""
     name = "flickering gates"
-    if board.edges is None:
-        seen = board.states.flickering
-        if seen:
+    if not board.edges:
+        if seen := board.states.flickering:
             return Finding(name, listed(seen), f"{_BEAM}; let the chains hang still")
-        return Finding(name, f"none seen at a glance; not recorded: {board.unwatched}")
+        if board.edges is None:
+            return Finding(name, f"none seen at a glance; not recorded: {board.unwatched}")
+        return Finding(name, f"none within {board.watched_s:g} s")
     rises: dict[int, list[float]] = {}
     for edge in board.edges:
         if edge.blocked:
@@ -100,8 +108,6 @@ def flickering_gates(board: BoardFacts) -> Finding:
         said.append(
             f"gate {channel} {len(times)} times" + (f", in step with {hz} Hz" if hz else "")
         )
-    if not said:
-        return Finding(name, f"none within {board.watched_s:g} s")
     lamp = "keep lamps off the receivers and mains leads off the cables; shield the beams"
     return Finding(
         name,

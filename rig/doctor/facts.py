@@ -61,6 +61,8 @@ class BoardFacts:
     edges
         Of all gates that were not blocked, for `watched_s`, from a recording without a release;
         `None` when none could be made, for the reason `unwatched`.
+    stopped
+        Whether that was because the emergency stop is open.
     """
 
     identity: Identity
@@ -71,6 +73,7 @@ class BoardFacts:
     edges: tuple[Edge, ...] | None
     watched_s: float
     unwatched: str
+    stopped: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING
 
+from rig.link.edges import ALL_GATES, edges, ticks_since
 from rig.link.messages import EVENTS_PER_FRAME, unpack_label
+from rig.link.wiretypes import EVENTS
 from rig.records import Certificate, Drop, Edge
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rig.link.messages import DropCertificate, EventsFrame
-    from rig.link.wiretypes import Event
 
 _WRAP = 1 << 32
 
@@ -39,21 +42,26 @@ class Assembly:
 
     def __init__(self, label: int) -> None:
         self.label = label
-        self.gates = 0xFFFF
+        self.gates = ALL_GATES
         self.fire_tick: int | None = None
         self.certificate: DropCertificate | None = None
         self.reset = False
         self.first_kept = 0
-        self._events: dict[int, Event] = {}
+        self._raw = bytearray()  # the events' records, each at its number's place
+        self._known = bytearray()  # 1 where there is one
 
     @property
     def begun(self) -> bool:
         """Whether anything of the drop itself was seen."""
-        return bool(self._events) or self.fire_tick is not None or self.certificate is not None
+        return 1 in self._known or self.fire_tick is not None or self.certificate is not None
 
     def add(self, frame: EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
-        self._events.update(enumerate(frame.events, start=frame.first))
+        first, raw = frame.first, EVENTS.pack(frame.events)
+        end = first + len(frame.events)
+        self._reserve(end)
+        self._raw[first * EVENTS.size : end * EVENTS.size] = raw
+        self._known[first:end] = b"\1" * (end - first)
 
     def missing(
         self, at_most: int = EVENTS_PER_FRAME, *, readable: bool = False
@@ -73,17 +81,12 @@ class Assembly:
             Empty when nothing is missing, and while there is no certificate to say how many.
         """
         total = self.certificate.events if self.certificate else 0
-        stretches: list[tuple[int, int]] = []
-        for index in range(self.first_kept if readable else 0, total):
-            if index in self._events:
-                continue
-            if stretches:
-                first, count = stretches[-1]
-                if first + count == index and count < at_most:
-                    stretches[-1] = (first, count + 1)
-                    continue
-            stretches.append((index, 1))
-        return stretches
+        self._reserve(total)
+        return [
+            (at, min(at_most, end - at))
+            for first, end in self._stretches(0, self.first_kept if readable else 0, total)
+            for at in range(first, end, at_most)
+        ]
 
     def sound(self) -> bool:
         """Whether every event and the certificate are in and agree."""
@@ -92,8 +95,8 @@ class Assembly:
 
     def forget_events(self, latest: int | None = None) -> None:
         """Drop the events, to read them again; only the latest so many, when said."""
-        first = max(0, len(self._events) - latest) if latest is not None else 0
-        self._events = {index: e for index, e in self._events.items() if index < first}
+        first = max(0, self._known.count(1) - latest) if latest is not None else 0
+        del self._known[first:], self._raw[first * EVENTS.size :]
 
     def drop(self, tick_hz: int) -> Drop:
         """Make the raw record of what is known now.
@@ -124,37 +127,43 @@ class Assembly:
             faults=self._faults(tick_hz),
         )
 
-    def _crc(self) -> int:
-        return zlib.crc32(
-            b"".join(
-                event.tick.to_bytes(4, "little") + event.state.to_bytes(2, "little")
-                for _, event in self._in_order()
-            )
-        )
+    @property
+    def _end(self) -> int:
+        """One more than the last number an event can have."""
+        return self.certificate.events if self.certificate else len(self._known)
 
-    def _in_order(self) -> list[tuple[int, Event]]:
-        """Events by index, without any beyond the certificate's count."""
-        total = self.certificate.events if self.certificate else _WRAP
-        return sorted(item for item in self._events.items() if item[0] < total)
+    def _reserve(self, end: int) -> None:
+        """Make room for the events before a number."""
+        more = max(0, end - len(self._known))
+        self._known += bytes(more)
+        self._raw += bytes(more * EVENTS.size)
+
+    def _stretches(self, known: int, first: int, end: int) -> Iterator[tuple[int, int]]:
+        """List from where to where events are known (1) or not (0)."""
+        first = self._known.find(known, first, end)
+        while first >= 0:
+            other = self._known.find(1 - known, first, end)
+            yield first, end if other < 0 else other
+            first = self._known.find(known, other, end) if other >= 0 else -1
+
+    def _crc(self) -> int:
+        """CRC-32 over all events; none is missing."""
+        return zlib.crc32(self._raw[: self._end * EVENTS.size])
 
     def _edges(self, initial: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
             return ()
         gates = self.certificate.gates if self.certificate else self.gates
-        edges: list[Edge] = []
-        state, expected = initial & gates, 0
-        for index, event in self._in_order():
-            now = event.state & gates
-            # Behind a gap it is not known when the gates changed: no edge is better than a
-            # wrong one.
-            changed = state ^ now if index == expected else 0
-            tick = _since(fire_tick, event.tick)
-            while changed:
-                lowest = changed & -changed
-                edges.append(Edge(tick, lowest.bit_length() - 1, bool(now & lowest)))
-                changed ^= lowest
-            state, expected = now, index + 1
-        return tuple(edges)
+        found: list[tuple[int, int, bool]] = []
+        for first, end in self._stretches(1, 0, min(self._end, len(self._known))):
+            raw = self._raw[first * EVENTS.size : end * EVENTS.size]
+            events, state = EVENTS.layout.iter_unpack(raw), initial
+            if first:
+                # Behind a gap it is not known when the gates changed: no edge is better than a
+                # wrong one.
+                _, state = next(events)
+            found += edges(events, state, gates, fire_tick)
+        return tuple(map(Edge._make, found))
 
     def _faults(self, tick_hz: int) -> tuple[str, ...]:
         faults = []
@@ -180,10 +189,5 @@ class Assembly:
 
 
 def _account(seen: DropCertificate) -> Certificate:
-    sense = _since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
+    sense = ticks_since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
     return Certificate(seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
-
-
-def _since(fire_tick: int, tick: int) -> int:
-    """Ticks from the fire stamp; negative before it."""
-    return (tick - fire_tick + _WRAP // 2) % _WRAP - _WRAP // 2

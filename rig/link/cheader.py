@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Raw, Scalar, Tail
+from rig.link.records import Scalar, Tail
+from rig.link.wiretypes import Chars, Raw
 
 if TYPE_CHECKING:
     from enum import IntEnum

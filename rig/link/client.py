@@ -29,6 +29,8 @@ _LATE_S = 0.25  # how much later than announced a certificate may come before th
 _SMALLEST_READ = 4
 _FIRE_WAIT_S = 0.05
 """Two FIREs may be lost before an armed device takes the host for gone."""
+_ABORT_WAIT_S = 0.03
+"""Five ABORTs leave within the 250 ms after which everything shall be off."""
 
 
 class Device:
@@ -41,12 +43,14 @@ class Device:
     clock
         From `rig.link.port.port_clock`.
     tap
-        Called with every chunk written or read, before anything else is done with it, so that
-        what was recorded is never behind what was acted upon.
+        Called with every byte written or read, before anything else is done with it, so that
+        what was recorded is never behind what was acted upon; see `rig.link.exchange.Exchange`.
     on_record
         Called with everything that becomes known, see `Transcript.feed`.
     tries
         How often a request is sent before the device counts as silent.
+    give_way
+        As for `rig.link.exchange.Exchange`.
     """
 
     def __init__(
@@ -57,6 +61,7 @@ class Device:
         *,
         on_record: OnRecord | None = None,
         tries: int = 8,
+        give_way: Callable[[], None] = lambda: None,
     ) -> None:
         self._samples: list[Ping] = []
         self._record_ms: dict[int, int] = {}  # of the last armed drop, by label
@@ -74,6 +79,7 @@ class Device:
                 on_record(record)
 
         self._line = Exchange(port, clock, tap, know, tries)
+        self._line.give_way = give_way
 
     @property
     def transcript(self) -> Transcript:
@@ -210,7 +216,7 @@ class Device:
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""
-        self._line.request(wire.Abort(), wire.Done)
+        self._line.request(wire.Abort(), wire.Done, wait=_ABORT_WAIT_S)
 
     def acknowledge(self, label: int, crc32: int) -> None:
         """Let the device forget a drop: call it when the drop is safe on disk, not before.

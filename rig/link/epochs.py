@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.records import Ping
+import numpy as np
+
+from rig.link.samples import RECV, SEND, TICK, middles_ns, samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.link.samples import Samples
+    from rig.records import Ping
 
 RESONATOR_TOLERANCE = 0.005
 """Genuine Uno and Mega boards clock the AVR from a ceramic resonator, ±0.5 % (Murata CSTCE16M0)."""
 _SEARCH = 0.006  # the tolerance with some room for temperature and a cheap clone
 _WANDER = 1e-3  # what a rate that is known may change by until it is used
 WRAP = 1 << 32
+_BROKEN = -(1 << 62)
 
 
 class Moment(NamedTuple):
@@ -36,7 +44,7 @@ class Moment(NamedTuple):
     at_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Epochs:
     """Clock samples in the stretches over which the board's counter went on.
 
@@ -50,7 +58,7 @@ class Epochs:
     """
 
     nominal_hz: int
-    pings: tuple[tuple[Ping, ...], ...]
+    pings: tuple[Samples, ...]
 
     def place(
         self, tick: int, host_ns: int, hz: float, early_s: float, late_s: float
@@ -74,22 +82,24 @@ class Epochs:
             `None` when no epoch's counter can have stood there then: the samples before it are of
             another epoch.
         """
-        starts = [pings[0].host_send_ns for pings in self.pings]
+        starts = [int(pings[0, SEND]) for pings in self.pings]
         number = bisect_right(starts, host_ns) - 1
         if number < 0:
             return None
         pings = self.pings[number]
-        near = pings[bisect_right(pings, host_ns, key=lambda ping: ping.host_send_ns) - 1]
-        gap_s = (host_ns - _middle_ns(near)) * 1e-9
-        expected = near.tick + round(gap_s * hz)
-        off = _nearest(tick - expected)
-        slack_s = (near.host_recv_ns - near.host_send_ns) * 1e-9 + abs(gap_s) * _WANDER
+        send_ns, recv_ns, near = map(
+            int, pings[int(np.searchsorted(pings[:, SEND], host_ns, "right")) - 1]
+        )
+        gap_s = (host_ns - (send_ns + recv_ns) // 2) * 1e-9
+        expected = near + round(gap_s * hz)
+        off = (tick - expected + WRAP // 2) % WRAP - WRAP // 2
+        slack_s = (recv_ns - send_ns) * 1e-9 + abs(gap_s) * _WANDER
         if not -early_s - slack_s <= off / hz <= late_s + slack_s:
             return None
         return Moment(number, expected + off, host_ns + round(off / hz * 1e9))
 
 
-def epochs(pings: Iterable[Ping], nominal_hz: int, cuts_ns: Sequence[int] = ()) -> Epochs:
+def epochs(pings: Iterable[Ping] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()) -> Epochs:
     """Split samples where the board's counter did not go on, and count its wraps in between.
 
     Parameters
@@ -103,40 +113,28 @@ def epochs(pings: Iterable[Ping], nominal_hz: int, cuts_ns: Sequence[int] = ()) 
         Host times over which nothing is bridged. A counter that began anew, or a host clock that
         stood still, is found without them too, when the tick jumps out of tolerance.
     """
-    cuts = sorted(cuts_ns)
-    found: list[list[Ping]] = []
-    last: Ping | None = None
-    for ping in sorted(pings):
-        wide = None
-        if last is not None:
-            cut = bisect_left(cuts, last.host_recv_ns)
-            if cut == len(cuts) or cuts[cut] > ping.host_send_ns:
-                wide = _widen(last, ping, nominal_hz)
-        if wide is None:
-            wide = ping.tick
-            found.append([])
-        last = Ping(ping.host_send_ns, ping.host_recv_ns, wide)
-        found[-1].append(last)
-    return Epochs(nominal_hz, tuple(map(tuple, found)))
+    found = samples(pings)
+    if not found.size:
+        return Epochs(nominal_hz, ())
+    found = found[np.lexsort(found.T[::-1])]  # as tuples are sorted
+    cuts = np.sort(np.array(cuts_ns, np.int64))
+    steps = _steps(found, nominal_hz)
+    first_cut = np.searchsorted(cuts, found[:-1, RECV], "left")
+    steps[first_cut < np.searchsorted(cuts, found[1:, SEND], "right")] = _BROKEN
+    begins = np.flatnonzero(steps == _BROKEN) + 1
+    pieces = np.split(found, begins)
+    for piece, counted in zip(pieces, np.split(np.append(0, steps), begins), strict=True):
+        counted[0] = piece[0, TICK]
+        piece[:, TICK] = np.cumsum(counted)
+    return Epochs(nominal_hz, tuple(pieces))
 
 
-def _widen(last: Ping, ping: Ping, nominal_hz: int) -> int | None:
-    """Count the wraps between two samples; `None` when they cannot be of one count."""
-    elapsed_ns = _middle_ns(ping) - _middle_ns(last)
-    trips_ns = ping.host_recv_ns - ping.host_send_ns + last.host_recv_ns - last.host_send_ns
-    expected = elapsed_ns * 1e-9 * nominal_hz
-    slack = abs(expected) * _SEARCH + trips_ns * 1e-9 * nominal_hz / 2 + 2
-    if slack >= WRAP / 2:
-        return None
+def _steps(found: Samples, nominal_hz: int) -> NDArray[np.int64]:
+    """Count ticks from each sample to the next; `_BROKEN` when they cannot be of one count."""
+    trips_ns = found[:, RECV] - found[:, SEND]
+    expected = np.diff(middles_ns(found)) * 1e-9 * nominal_hz
+    slack = np.abs(expected) * _SEARCH + (trips_ns[1:] + trips_ns[:-1]) * 1e-9 * nominal_hz / 2 + 2
+    whole = np.rint(expected).astype(np.int64)
     # Nearest to the expectation among the values that agree with the 32 bits seen.
-    off = _nearest(ping.tick - last.tick - round(expected))
-    return last.tick + round(expected) + off if abs(off) <= slack else None
-
-
-def _middle_ns(ping: Ping) -> int:
-    return (ping.host_send_ns + ping.host_recv_ns) // 2
-
-
-def _nearest(difference: int) -> int:
-    """Fold a difference of ticks to the one nearest zero."""
-    return (difference + WRAP // 2) % WRAP - WRAP // 2
+    off = (np.diff(found[:, TICK]) - whole + WRAP // 2) % WRAP - WRAP // 2
+    return np.where((slack < WRAP / 2) & (np.abs(off) <= slack), whole + off, _BROKEN)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
-from rig.link.frames import Frame, encode
+from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import refusal
 from rig.link.transcript import Received, Record, Transcript
 
@@ -25,6 +25,7 @@ Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 _FIRST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
+_NOISE = 4096  # bytes without a delimiter that are no half of a frame any more
 
 
 class Exchange:
@@ -35,7 +36,8 @@ class Exchange:
     port, clock
         The port and its time.
     tap
-        Called with every chunk written or read, before anything else is done with it.
+        Called with every byte written or read, before anything else is done with it; what was
+        read is kept together until a frame has ended or something is written.
     on_record
         Called with everything that becomes known.
     tries
@@ -51,6 +53,8 @@ class Exchange:
         How many were sent, and how often one was sent again.
     rx_bytes, tx_bytes
         How much went over the line.
+    give_way
+        Called all the time while an answer is waited for; what it raises ends the waiting.
     """
 
     def __init__(
@@ -62,10 +66,12 @@ class Exchange:
         self.expect_boot = False
         self.requests = self.repeats = 0
         self.rx_bytes = self.tx_bytes = 0
+        self.give_way: Callable[[], None] = lambda: None
         self._port = port
         self._tap = tap
         self._on_record = on_record
         self._seq = 0
+        self._part = b""  # of a frame that has not ended yet
 
     def request(
         self,
@@ -142,6 +148,7 @@ class Exchange:
         """
         until = self.clock.now_ns() + round(seconds * 1e9)
         while self.clock.now_ns() < until:
+            self.give_way()
             for record in self.receive():
                 if isinstance(record, Received) and wanted(record):
                     return record.message
@@ -165,7 +172,10 @@ class Exchange:
         except OSError as error:  # SerialException is one
             raise _lost(error) from error
         self.rx_bytes += len(data)
-        records = self._chunk("rx", data) if data else []
+        self._part += data
+        # A line gives single bytes, and half a frame says nothing.
+        ended = DELIMITER in data or len(self._part) > _NOISE
+        records = self._take() if ended else []
         boots = (r for r in records if isinstance(r, Received) and isinstance(r.message, wire.Boot))
         if not self.expect_boot and any(boots):
             raise DeviceError(
@@ -188,6 +198,8 @@ class Exchange:
         DeviceError
             The connection broke.
         """
+        if self._part:
+            self._take()
         self.tx_bytes += len(data)
         self._chunk("tx", data)
         try:
@@ -208,6 +220,10 @@ class Exchange:
         except OSError as error:
             raise _lost(error) from error
 
+    def _take(self) -> list[Record]:
+        part, self._part = self._part, b""
+        return self._chunk("rx", part)
+
     def _chunk(self, direction: Direction, data: bytes) -> list[Record]:
         now_ns = self.clock.now_ns()
         if self._tap is not None:
@@ -220,7 +236,10 @@ class Exchange:
 
 
 def _lost(error: OSError) -> DeviceError:
+    # What pyserial says of a port that is gone sounds like something else.
+    why = "the port is gone" if "returned no data" in str(error) else error
     return DeviceError(
-        f"connection lost: {error}",
-        "check the cable; the board is found again by its serial number when it is back",
+        f"connection lost: {why}",
+        "check the cable; plugged in again, the board is found by its serial number, and the same "
+        "rig run goes on: a drop that fell is fetched",
     )

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.records import Ping
+import numpy as np
+
+from rig.link.samples import RECV, SEND, samples
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
-    from rig.records import HostBreak
+    from rig.link.samples import Samples
+    from rig.records import HostBreak, Ping
 
 _APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
 
@@ -22,7 +25,7 @@ class Stretch(NamedTuple):
     shift_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class HostTime:
     """Clock samples on one axis of time.
 
@@ -37,7 +40,7 @@ class HostTime:
         For each life of the host's clock its stretches, in order: sleep begins a new one.
     """
 
-    pings: tuple[Ping, ...]
+    pings: Samples
     cuts_ns: tuple[int, ...]
     lives: tuple[tuple[Stretch, ...], ...]
 
@@ -50,7 +53,9 @@ class HostTime:
 
 
 def one_axis(
-    pings: Sequence[Ping], boots_ns: Sequence[int] = (), breaks: Sequence[HostBreak] = ()
+    pings: Iterable[Ping] | Samples,
+    boots_ns: Sequence[int] = (),
+    breaks: Sequence[HostBreak] = (),
 ) -> HostTime:
     """Put samples on one axis where the host's clock began again or stood still in between.
 
@@ -63,26 +68,29 @@ def one_axis(
     breaks
         When the host slept or its clock was set.
     """
-    found: list[Ping] = []
+    found = samples(pings).copy()
+    befores, afters = found[:-1, RECV].copy(), found[1:, SEND].copy()
+    odd = afters < befores
+    for one in breaks:
+        odd |= (befores <= one.host_ns) & (one.host_ns <= afters)
+    shift = 0
     lives = [[Stretch(0, 0)]]
     cuts: list[int] = []
-    before_ns = 0  # the last sample, by the host's clock
-    for ping in pings:
-        shift = lives[-1][-1].shift_ns
-        if ping.host_send_ns < before_ns:
-            shift += before_ns + _APART_NS - ping.host_send_ns
+    for gap in np.flatnonzero(odd).tolist():
+        before, after, shifted = int(befores[gap]), int(afters[gap]), shift
+        if after < before:
+            cuts.append(before + shift)
+            shift += before + _APART_NS - after
             lives.append([Stretch(0, shift)])
-            cuts.append(found[-1].host_recv_ns)
-        elif found:
+        else:
             for one in breaks:
-                if before_ns <= one.host_ns <= ping.host_send_ns:
+                if before <= one.host_ns <= after:
                     shift += one.slept_ns
                     lives[-1].append(Stretch(one.host_ns, shift))
-        before_ns = ping.host_recv_ns
-        found.append(Ping(ping.host_send_ns + shift, before_ns + shift, ping.tick))
+        found[gap + 1 :, : RECV + 1] += shift - shifted
     moments = [*boots_ns, *(one.host_ns for one in breaks)]
     cuts += [moment + _shift(life, moment) for life in lives for moment in moments]
-    return HostTime(tuple(found), tuple(sorted(cuts)), tuple(map(tuple, lives)))
+    return HostTime(found, tuple(sorted(cuts)), tuple(map(tuple, lives)))
 
 
 def _shift(life: Sequence[Stretch], host_ns: int) -> int:

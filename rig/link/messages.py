@@ -25,19 +25,19 @@ from enum import IntEnum
 from typing import Annotated, Any, TypeAlias
 
 from rig.link.frames import PAYLOAD_LIMIT
+from rig.link.records import Event
 from rig.link.wiretypes import (
     BYTE_ENUM,
     U8,
     U16,
     U32,
-    Event,
-    Events,
+    EventList,
     Field,
     Line,
     MessageError,
     Name,
     UniqueId,
-    read_field,
+    payload_reader,
     wire_fields,
     write_field,
 )
@@ -292,7 +292,7 @@ class EventsFrame:
 
     label: U32
     first: U16
-    events: Events
+    events: EventList
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,6 +394,7 @@ TABLE: dict[int, type[Message]] = {
 }
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}
+_READERS = {kind: payload_reader(fields) for kind, fields in FIELDS.items()}
 
 
 def pack(message: Message) -> tuple[int, bytes]:
@@ -440,14 +441,7 @@ def unpack(code: int, payload: bytes) -> Message:
     kind: type[Any] | None = TABLE.get(code)
     if kind is None:
         raise MessageError(f"unknown message code 0x{code:02X}")
-    values: list[Any] = []
-    at = 0
-    for field in FIELDS[kind]:
-        value, at = read_field(field, payload, at)
-        values.append(value)
-    if at != len(payload):
-        raise MessageError(f"{len(payload) - at} bytes too many for {kind.__name__}")
-    message: Message = kind(*values)
+    message: Message = kind(*_READERS[kind](payload))
     return message
 
 

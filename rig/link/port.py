@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import errno
+import warnings
 from typing import Any, Protocol
 
 import serial
 
-from rig.errors import DeviceError, RigError
+from rig.errors import DeviceError, InputError, RigError
 from rig.link.clock import Clock, SystemClock
 from rig.link.network import NETWORK, REACH, NetworkPort, why_unreachable
 
@@ -72,13 +73,14 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
     DeviceError
         When it cannot be opened; the hint says what to try.
     """
-    for package in _HANDLERS:
-        if package not in serial.protocol_handler_packages:
-            serial.protocol_handler_packages.append(package)
+    _add_handlers()
     try:
-        port: Any = serial.serial_for_url(  # a subclass of SerialBase
-            url, baudrate=baudrate, timeout=READ_TIMEOUT_S, exclusive=True
-        )
+        with warnings.catch_warnings():
+            # Pyserial 3.5 starts its RFC 2217 reader in a way Python has given up since.
+            warnings.filterwarnings("ignore", r"set(Daemon|Name)\(\)", DeprecationWarning)
+            port: Any = serial.serial_for_url(  # a subclass of SerialBase
+                url, baudrate=baudrate, timeout=READ_TIMEOUT_S, exclusive=True
+            )
     except RigError:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
@@ -92,6 +94,29 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
         raise DeviceError(f"cannot open {url}: {error}", _LOOK) from error
     opened: Port = NetworkPort(port) if _scheme(url) == "socket" else port
     return opened
+
+
+def check_url(url: str) -> None:
+    """See that a port's name is one that could ever be opened; opens nothing.
+
+    Raises
+    ------
+    InputError
+        No such kind of URL.
+    """
+    _add_handlers()
+    try:
+        serial.serial_for_url(url, do_not_open=True)
+    except ValueError as error:
+        raise InputError(
+            f"{url} is no port: {error}", "a device path, or a URL such as sim://"
+        ) from error
+
+
+def _add_handlers() -> None:
+    for package in _HANDLERS:
+        if package not in serial.protocol_handler_packages:
+            serial.protocol_handler_packages.append(package)
 
 
 def _scheme(url: str) -> str:

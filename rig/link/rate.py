@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.link.epochs import RESONATOR_TOLERANCE, epochs
+from rig.link.samples import RECV, SEND, TICK
 from rig.link.wander import Readings, Track
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.link.epochs import Epochs
+    from rig.link.samples import Samples
     from rig.records import Ping, Pulse
 
     Array = NDArray[np.float64]
@@ -75,7 +77,9 @@ class TickRate:
         return _least(self.nominal_hz, self.track.rate(seconds))
 
 
-def tick_rate(pings: Iterable[Ping], nominal_hz: int, cuts_ns: Sequence[int] = ()) -> TickRate:
+def tick_rate(
+    pings: Iterable[Ping] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
+) -> TickRate:
     """Measure the device's tick rate from clock samples in any order, see `ping_rate`.
 
     Parameters
@@ -160,31 +164,28 @@ def pulse_rate(found: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
 class _Piece(NamedTuple):
     """Readings of one intercept: s, s beyond nominal, s."""
 
-    at: list[float]
-    phase: list[float]
-    sigma: list[float]
+    at: Array
+    phase: Array
+    sigma: Array
 
 
-def _ping_piece(pings: Sequence[Ping], nominal_hz: int) -> _Piece:
+def _ping_piece(pings: Samples, nominal_hz: int) -> _Piece:
     """Turn samples of one epoch into numbers small enough for floats."""
-    first = pings[0]
+    begin_ns = int(pings[0, SEND])
+    trip_ns = pings[:, RECV] - pings[:, SEND]
     # The fastest trip is the line's own; what a trip takes beyond it is delay on one unknown
     # side, and displaces the middle by half. A quarter of the fastest trip stands for the rest.
-    fastest_ns = min(ping.host_recv_ns - ping.host_send_ns for ping in pings)
-    piece = _Piece([], [], [])
-    for ping in pings:
-        trip_ns = ping.host_recv_ns - ping.host_send_ns
-        middle_ns2 = ping.host_send_ns + ping.host_recv_ns - 2 * first.host_send_ns
-        # In integers: a day's ticks times 1e9 do not fit a float's 53 bits.
-        excess = (ping.tick - first.tick) * 2_000_000_000 - nominal_hz * middle_ns2
-        if len(pings) > 2:
-            sigma_ns = sqrt(((trip_ns - fastest_ns) / 2) ** 2 + (fastest_ns / 4) ** 2)
-        else:
-            sigma_ns = trip_ns / sqrt(12)  # nothing to compare with: anywhere in the trip
-        piece.at.append(first.host_send_ns * 1e-9 + middle_ns2 * 0.5e-9)
-        piece.phase.append(excess / (2e9 * nominal_hz))
-        piece.sigma.append(sqrt(sigma_ns**2 * 1e-18 + 1 / (12 * nominal_hz**2)))
-    return piece
+    fastest_ns = float(trip_ns.min())
+    sigma_ns: Array = np.sqrt(((trip_ns - fastest_ns) / 2) ** 2 + (fastest_ns / 4) ** 2)
+    if len(pings) == 2:
+        sigma_ns = trip_ns / sqrt(12)  # nothing to compare with: anywhere in the trip
+    middle_ns2 = pings[:, SEND] + pings[:, RECV] - 2 * begin_ns
+    # Whole seconds in integers: a day's ticks and nanoseconds leave a float too few bits.
+    whole, rest_ns2 = np.divmod(middle_ns2, 2_000_000_000)
+    excess = pings[:, TICK] - pings[0, TICK] - nominal_hz * whole
+    at = begin_ns * 1e-9 + middle_ns2 / 2e9
+    sigma: Array = np.sqrt(sigma_ns**2 * 1e-18 + 1 / (12 * nominal_hz**2))
+    return _Piece(at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma)
 
 
 def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: int) -> _Piece:
@@ -196,18 +197,19 @@ def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: 
         for (_, tick), passed in zip(stretch, seconds, strict=True)
     ]
     return _Piece(
-        [began_ns * 1e-9 + passed for passed in seconds],
-        [ticks / nominal_hz for ticks in excess],
-        [sigma] * len(stretch),
+        np.array([began_ns * 1e-9 + passed for passed in seconds]),
+        np.array([ticks / nominal_hz for ticks in excess]),
+        np.full(len(stretch), sigma),
     )
 
 
 def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
     """Fit a track, leave out what is far off even for its own scatter, and fit again."""
+    at, phase, sigma = (np.concatenate([[], *(piece[n] for piece in pieces)]) for n in range(3))
     given = Readings(
-        np.array([at for piece in pieces for at in piece.at]),
-        np.array([phase for piece in pieces for phase in piece.phase]),
-        np.array([sigma for piece in pieces for sigma in piece.sigma]),
+        at,
+        phase,
+        sigma,
         np.repeat(np.arange(len(pieces)), [len(piece.at) for piece in pieces]),
     )
     nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)

@@ -4,27 +4,20 @@ from __future__ import annotations
 
 import struct
 import typing
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from itertools import takewhile
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from rig.errors import DeviceError
+from rig.link.records import Event, Events, Scalar, Tail, layout
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 class MessageError(DeviceError, ValueError):
     """A payload that does not fit its message, or a value that does not fit its field."""
-
-
-@dataclass(frozen=True, slots=True)
-class Scalar:
-    """An unsigned little-endian integer: its `struct` code and its C type."""
-
-    code: str
-    c_type: str
-
-    @property
-    def size(self) -> int:
-        """Bytes on the wire."""
-        return struct.calcsize("<" + self.code)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,32 +34,7 @@ class Raw:
     size: int
 
 
-@dataclass(frozen=True, slots=True)
-class Tail:
-    """Records of the same shape up to the end of the payload; only ever the last field."""
-
-    record: type[tuple[int, ...]]
-    scalars: tuple[Scalar, ...]
-
-    @property
-    def size(self) -> int:
-        """Bytes of one record."""
-        return sum(scalar.size for scalar in self.scalars)
-
-    @property
-    def layout(self) -> struct.Struct:
-        """One record as a `struct`."""
-        return struct.Struct("<" + "".join(scalar.code for scalar in self.scalars))
-
-
 Wire: TypeAlias = Scalar | Chars | Raw | Tail
-
-
-class Event(NamedTuple):
-    """One snapshot: the device's tick (u32) and the gates' state after the change (1 = blocked)."""
-
-    tick: int
-    state: int
 
 
 _BYTE = Scalar("B", "uint8_t")
@@ -79,7 +47,8 @@ U32: TypeAlias = Annotated[int, _LONG]
 UniqueId: TypeAlias = Annotated[bytes, Raw(8)]
 Name: TypeAlias = Annotated[str, Chars(24)]
 Line: TypeAlias = Annotated[str, Chars(96)]
-Events: TypeAlias = Annotated[tuple[Event, ...], Tail(Event, (_LONG, _WORD))]
+EVENTS = Tail((_LONG, _WORD))
+EventList: TypeAlias = Annotated[Sequence[Event], EVENTS]
 
 BYTE_ENUM = _BYTE
 """For ``Annotated[SomeIntEnum, BYTE_ENUM]``."""
@@ -145,8 +114,7 @@ def write_field(field: Field, value: Any) -> bytes:
                 text: bytes = value.encode()
                 return bytes((len(text),)) + text
             case Tail() as tail:
-                layout = tail.layout
-                return b"".join([layout.pack(*record) for record in value])
+                return tail.pack(value)
     except struct.error as error:
         raise MessageError(f"{field.name}={value!r} does not fit: {error}") from error
     raise MessageError(f"{field.name}={value!r} does not fit")
@@ -187,9 +155,49 @@ def read_field(field: Field, payload: bytes, at: int) -> tuple[Any, int]:
                 value = payload[at + 1 : end].decode()
             case Tail() as tail:
                 end = len(payload)
-                value = tuple(map(tail.record._make, tail.layout.iter_unpack(payload[at:])))  # type: ignore[attr-defined]
+                value = Events(tail, payload[at:])
     except (struct.error, IndexError, ValueError) as error:
         raise MessageError(f"bad {field.name}: {error}") from error
     if end > len(payload):
         raise MessageError(f"payload ends within {field.name}")
     return value, end
+
+
+def payload_reader(fields: Sequence[Field]) -> Callable[[bytes], list[Any]]:
+    """Make what reads a whole payload: numbers at its beginning at once, the rest by `read_field`.
+
+    Parameters
+    ----------
+    fields
+        Of a message.
+
+    Returns
+    -------
+    callable
+        From a payload to the fields' values; raises `MessageError` where `read_field` does, and
+        when bytes are left over.
+    """
+    scalars = [f.wire for f in takewhile(lambda f: isinstance(f.wire, Scalar), fields)]
+    head = layout([wire for wire in scalars if isinstance(wire, Scalar)])
+    names = [(n, f.python) for n, f in enumerate(fields[: len(scalars)]) if f.python is not int]
+    rest = fields[len(scalars) :]
+
+    def read(payload: bytes) -> list[Any]:
+        try:
+            values: list[Any] = [*head.unpack_from(payload)]
+            for number, python in names:
+                values[number] = python(values[number])
+        except (struct.error, ValueError):
+            return _one_by_one(fields, payload, [], 0)  # it says which field is wrong
+        return _one_by_one(rest, payload, values, head.size)
+
+    return read
+
+
+def _one_by_one(fields: Sequence[Field], payload: bytes, values: list[Any], at: int) -> list[Any]:
+    for field in fields:
+        value, at = read_field(field, payload, at)
+        values.append(value)
+    if at != len(payload):
+        raise MessageError(f"{len(payload) - at} bytes too many")
+    return values

@@ -61,7 +61,7 @@ class Canvas:
     Attributes
     ----------
     axes
-        The panels row by row, with one horizontal axis in common.
+        The panels row by row.
     svg
         The text, once the block has ended.
     """
@@ -79,6 +79,7 @@ def canvas(
     *,
     simulated: bool,
     columns: int = 1,
+    sharex: bool = True,
     description: str | None = None,
 ) -> Iterator[Canvas]:
     """Set the style up, hand out empty panels, and make the SVG text at the end.
@@ -93,6 +94,8 @@ def canvas(
         Whether to stamp the figure.
     columns
         Panels side by side in each row.
+    sharex
+        Whether all panels have one horizontal axis.
     description
         Kept in the file's metadata, where programs find it.
 
@@ -111,7 +114,7 @@ def canvas(
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width_in, sum(heights)), layout="constrained")
         panels = figure.subplots(
-            len(heights), columns, sharex=True, squeeze=False, height_ratios=list(heights)
+            len(heights), columns, sharex=sharex, squeeze=False, height_ratios=list(heights)
         )
         drawing = Canvas(figure, list(panels.flat))
         yield drawing

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.report.embed import Picture
+    from rig.report.parts import Part
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,8 @@ class ReportContext:
         The clock calibration, in words or numbers by name.
     notes
         Sentences for the reader: warnings, what was left out.
+    parts
+        Further sections, after the runs.
     """
 
     title: str
@@ -58,6 +61,7 @@ class ReportContext:
     identities: Sequence[Mapping[str, object]] = ()
     clock: Mapping[str, object] = field(default_factory=dict)
     notes: Sequence[str] = ()
+    parts: Sequence[Part] = ()
 
 
 def write_report(path: str | os.PathLike[str], context: ReportContext) -> None:
@@ -88,6 +92,7 @@ def report_html(context: ReportContext) -> str:
         _summary(context.analysis),
         "".join(embedded(picture, number) for number, picture in enumerate(context.figures, 1)),
         _runs(context.analysis),
+        "".join(map(_part, context.parts)),
         _budget(context.analysis),
         _provenance(context),
     ]
@@ -148,6 +153,14 @@ def _runs(analysis: Mapping[str, Any]) -> str:
     if analysis.get("superseded"):
         html += f"<h2>Earlier attempts</h2>{_table(RUNS, analysis['superseded'])}"
     return html
+
+
+def _part(part: Part) -> str:
+    table = _table(part.columns, part.records) if part.records else ""
+    notes = "".join(f'<p class="note">{escape(sentence)}</p>' for sentence in part.sentences)
+    if part.folded:
+        table = f"<details><summary>{escape(part.folded)}</summary>{table}</details>"
+    return f"<h2>{escape(part.heading)}</h2>{table}{notes}"
 
 
 def _budget(analysis: Mapping[str, Any]) -> str:

@@ -9,6 +9,8 @@ from rig.report.columns import SUMMARY, filled
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from rig.report.columns import Column
+
 
 def summary_table(analysis: Mapping[str, Any]) -> str:
     """Write the summary as aligned text.
@@ -26,7 +28,12 @@ def summary_table(analysis: Mapping[str, Any]) -> str:
     summary = analysis.get("summary") or ()
     if not summary:
         return "No accepted runs, so no summary."
-    columns, rows = filled(SUMMARY, summary)
+    return "\n".join(aligned(SUMMARY, summary))
+
+
+def aligned(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Write records as lines of aligned text below their headings; empty columns are left out."""
+    columns, rows = filled(columns, records)
     headings = [column.heading for column in columns]
     cells = [_align(list(column)) for column in zip(*rows, strict=True)]
     widths = [
@@ -38,7 +45,7 @@ def summary_table(analysis: Mapping[str, Any]) -> str:
         for line in [headings, *zip(*cells, strict=True)]
     ]
     rule = "  ".join("─" * width for width in widths)
-    return "\n".join([lines[0], rule, *lines[1:]])
+    return [lines[0], rule, *lines[1:]]
 
 
 def _align(column: Sequence[str]) -> list[str]:

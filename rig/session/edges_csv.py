@@ -73,7 +73,7 @@ def read_edges(path: str | os.PathLike[str]) -> list[Drop]:
     if not table.runs:
         problems.add_if_none(1, 1, "", "no edges in this file")
     problems.raise_if_any()
-    return [_drop(run, edges) for run, edges in sorted(table.runs.items())]
+    return [drop_of(run, edges) for run, edges in sorted(table.runs.items())]
 
 
 def write_edges(
@@ -177,17 +177,30 @@ class _Place:
     def time(self, record: list[str], field: int) -> int | None:
         """Read a time in seconds as picoseconds, ties to even."""
         text = record[field]
-        match = _DECIMAL.fullmatch(text)
-        if match is None or not (match[2] or match[3]):
+        ticks = picoseconds(text)
+        if ticks is None:
             self.problem(field, f"{text!r:.40} is not a time in seconds")
-            return None
-        sign, whole, part, exponent = match.groups(default="")
-        digits, shift = int(whole + part), int(exponent or 0) - len(part) + 12
-        ticks = digits * 10**shift if shift >= 0 else round(Fraction(digits, 10**-shift))
-        if ticks >= 10**12 * TICK_HZ:
+        elif abs(ticks) >= 10**12 * TICK_HZ:
             self.problem(field, f"{text:.40} s is absurd")
             return None
-        return -ticks if sign == "-" else ticks
+        return ticks
+
+
+def picoseconds(text: str, power: int = 0) -> int | None:
+    """Read a decimal number of seconds, or of 10^power s, as picoseconds, ties to even.
+
+    Returns
+    -------
+    int or None
+        `None` for what is no such number.
+    """
+    match = _DECIMAL.fullmatch(text)
+    if match is None or not (match[2] or match[3]):
+        return None
+    sign, whole, part, exponent = match.groups(default="")
+    digits, shift = int(whole + part), int(exponent or 0) - len(part) + 12 + power
+    ticks = digits * 10**shift if shift >= 0 else round(Fraction(digits, 10**-shift))
+    return -ticks if sign == "-" else ticks
 
 
 def _records(lines: Lines, problems: ProblemList) -> Iterator[tuple[_Place, list[str]]]:
@@ -220,7 +233,8 @@ def _records(lines: Lines, problems: ProblemList) -> Iterator[tuple[_Place, list
             yield place, record
 
 
-def _drop(run: int, edges: list[Edge]) -> Drop:
+def drop_of(run: int, edges: list[Edge]) -> Drop:
+    """Put the edges of a run in order, in picoseconds from the whole second before them."""
     edges.sort(key=lambda edge: edge.tick)  # stable: equal times stay as the file has them
     start = edges[0].tick // TICK_HZ * TICK_HZ
     first: dict[int, bool] = {}

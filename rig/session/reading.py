@@ -31,7 +31,7 @@ class StateEntry(NamedTuple):
 
 
 class ByteChunk(NamedTuple):
-    """Bytes as one read or write moved them."""
+    """Bytes that went one way, and when the last of them did."""
 
     host_ns: int
     direction: Direction
@@ -86,9 +86,12 @@ class Reader:
         for row in self._rows("SELECT host_ns, direction, data FROM bytes ORDER BY id"):
             yield ByteChunk(*row)
 
-    def pings(self) -> list[Ping]:
-        """All clock samples in order."""
-        rows = self._rows("SELECT host_send_ns, host_recv_ns, tick FROM ping ORDER BY id")
+    def pings(self, after: int = 0) -> list[Ping]:
+        """Clock samples in order, all but the first so many."""
+        # Nothing is ever deleted, so rows are numbered from 1 without gaps.
+        rows = self._rows(
+            "SELECT host_send_ns, host_recv_ns, tick FROM ping WHERE id > ? ORDER BY id", after
+        )
         return [Ping(*row) for row in rows]
 
     def pulses(self) -> list[Pulse]:
@@ -118,10 +121,22 @@ class Reader:
         )
         return [self._drop(row) for row in list(rows)]
 
-    def states(self) -> list[StateEntry]:
-        """Return the whole log of run states, in order."""
-        rows = self._rows("SELECT run, attempt, state, host_ns, reasons FROM run_state ORDER BY id")
+    def states(self, run: int | None = None) -> list[StateEntry]:
+        """Return the log of run states, in order: the whole of it, or of one run."""
+        which, values = ("", ()) if run is None else ("WHERE run = ?", (run,))
+        rows = self._rows(
+            f"SELECT run, attempt, state, host_ns, reasons FROM run_state {which} ORDER BY id",  # noqa: S608
+            *values,
+        )
         return [_state(row) for row in rows]
+
+    def fired_ns(self) -> dict[tuple[int, int], int]:
+        """Return by run and attempt when the host's log says that it was fired."""
+        rows = self._rows(
+            "SELECT run, attempt, host_ns FROM run_state WHERE state = ? ORDER BY id",
+            RunState.FIRED,
+        )
+        return {(run, attempt): host_ns for run, attempt, host_ns in rows}
 
     def latest_state(self, run: int) -> StateEntry | None:
         """Where a run stands; `None` when the log does not name it."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rig.tui.flow import BEFORE_RELEASE, Stage
+from rig.tui.flow import BEFORE_RELEASE
+from rig.tui.turns import Stage
 
 ANY = frozenset(Stage)
 _JUDGED = frozenset({Stage.RESULT})
@@ -58,6 +59,9 @@ ACTIONS: tuple[Action, ...] = (
     Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
     Action("close", "z", "close", "Close the session; another protocol can be chosen", "",
            frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
+    Action("release_test", "l", "try release", "Try the release with nothing hung",
+           "rig selftest --port PORT --release",
+           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
     Action("wave", "w", "wave", "Begin the wave-your-hand test and the counters again"),
     Action("page_protocol", "1,p", "protocol", "Page: protocol, its scene and plan",
            "rig check PROTOCOL"),
@@ -74,6 +78,10 @@ ACTIONS: tuple[Action, ...] = (
     Action("slower", "minus", "slower", "History: half the speed"),
     Action("faster", "plus", "faster", "History: twice the speed"),
     Action("play", "full_stop", "play", "History: play, or stand still"),
+    Action("turn_round", "i", "turn", "History: play in the other direction"),
+    Action("sessions", "o", "sessions", "History: another session"),
+    Action("drops", "g", "drops", "History: another drop"),
+    Action("control_chart", "y", "skew/g", "Session: skew or g in the control chart"),
     Action("previous", "up", "previous", "Previous drop, protocol or line"),
     Action("next", "down", "next", "Next drop, protocol or line"),
     Action("theme", "t", "theme", "Next theme: dark, light, high contrast"),

@@ -1,38 +1,24 @@
-"""What the session file says, read beside its writer and analysed drop by drop."""
+"""What the session file says, as the screens need it."""
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass, field, replace
-from statistics import median
-from threading import Lock
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.curves import model_curves
-from rig.analysis.drop import analyze_drop
 from rig.analysis.result import GOOD
-from rig.analysis.session import Analysis
-from rig.analysis.summary import summarize
-from rig.protocol.plan import runs as planned_runs
-from rig.results import calibration, protocol_of, rejected
-from rig.session.schema import RunState
-from rig.session.store import Session
-from rig.tui.plan import Job
 from rig.tui.state import RunLine, State
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
     from rig.analysis.drop import TimeScale
-    from rig.analysis.result import DropResult
+    from rig.analysis.result import DropResult, Measured
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
     from rig.results import Calibration
     from rig.session.reading import StateEntry
-
-_SAME_SCALE = 5e-6
-"""Relative change of the tick rate below which a drop is not analysed again: 50 nm in 10 mm."""
+    from rig.tui.plan import Job
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +30,16 @@ class Findings:
     reading
         Which reading of the file this is: what is drawn from it changes with it.
     drops, results
-        Every recorded attempt, and what it says.
+        Every recorded attempt, and what it says by itself.
+    gravity
+        What each good drop's free chain says of gravity, m/s².
     analysis
-        What ``rig analyze --json`` prints of it.
+        What ``rig analyze --json`` prints: of the drops that `learned` is about, or, before
+        anything was learned, of all of them by themselves.
+    learned
+        How many drops taught each other in `analysis`; 0 for none.
+    lagging
+        Whether the drops could teach more than is in `analysis`.
     curves
         The model against inclination, as `rig.analysis.curves.model_curves` gives it.
     voids
@@ -64,7 +57,10 @@ class Findings:
     drops: Mapping[Job, Drop]
     results: Mapping[Job, DropResult]
     scales: Mapping[Job, TimeScale]
+    gravity: Mapping[Job, Measured]
     analysis: Mapping[str, Any]
+    learned: int
+    lagging: bool
     curves: Mapping[str, Any]
     clock: Calibration
     voids: frozenset[Job]
@@ -101,90 +97,6 @@ class Findings:
         """One attempt's result as `rig analyze --json` prints it; empty when not analysed."""
         result = self.results.get(job)
         return {} if result is None else result.json()
-
-
-@dataclass(slots=True)
-class Book:
-    """Reads one session again and again, and analyses what is new.
-
-    Parameters
-    ----------
-    path
-        The session file.
-    """
-
-    path: Path
-    _results: dict[Job, tuple[float, DropResult]] = field(default_factory=dict)
-    _curves: dict[str, Any] | None = None
-    _readings: int = 0
-    _lock: Lock = field(default_factory=Lock)
-
-    def read(self) -> Findings:
-        """Read the file as it is now; safe in any thread, one at a time.
-
-        Raises
-        ------
-        SessionError
-            The file cannot be read.
-        """
-        with self._lock, Session.open(self.path, readonly=True) as session:
-            protocol = protocol_of(session)
-            plan = {run.number: run for run in planned_runs(protocol)}
-            clock = calibration(session)
-            drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
-            scales = {job: clock.scale(drop) for job, drop in drops.items()}
-            causes = rejected(session)
-            for job, drop in drops.items():
-                self._analyse(protocol, plan[job.run], job, drop, scales[job])
-            results = {job: _rejected(self._results[job][1], causes.get(job)) for job in drops}
-            states = tuple(session.states())
-            if self._curves is None:
-                self._curves = model_curves(protocol)
-            self._readings += 1
-            return Findings(
-                path=self.path,
-                reading=self._readings,
-                protocol=protocol,
-                simulated=session.simulated,
-                created=session.meta["created"],
-                plan=plan,
-                drops=drops,
-                results=results,
-                scales=scales,
-                analysis=_summed(protocol, results),
-                curves=self._curves,
-                clock=clock,
-                voids=frozenset(Job(e.run, e.attempt) for e in states if e.state is RunState.VOID),
-                states=states,
-                pace_s=_pace(states),
-            )
-
-    def _analyse(
-        self, protocol: Protocol, run: Run, job: Job, drop: Drop, scale: TimeScale
-    ) -> None:
-        known = self._results.get(job)
-        if known is None or abs(known[0] / scale.hz - 1.0) > _SAME_SCALE:
-            self._results[job] = scale.hz, analyze_drop(protocol, run, drop, scale)
-
-
-def _rejected(result: DropResult, causes: Sequence[str] | None) -> DropResult:
-    if causes is None:
-        return result
-    return replace(result, verdict="rejected", reasons=(*causes, *result.reasons))
-
-
-def _summed(protocol: Protocol, results: Mapping[Job, DropResult]) -> dict[str, Any]:
-    ordered = [results[job] for job in sorted(results)]
-    last = {result.run.number: result for result in ordered}
-    latest = tuple(last.values())
-    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
-    return Analysis(latest, earlier, tuple(summarize(protocol, latest))).json()
-
-
-def _pace(states: Sequence[StateEntry]) -> float | None:
-    at = [entry.host_ns for entry in states if entry.state is RunState.RECORDED]
-    gaps = [(b - a) * 1e-9 for a, b in itertools.pairwise(at) if b > a]
-    return median(gaps) if len(gaps) > 1 else None
 
 
 def good(record: Mapping[str, Any]) -> bool:

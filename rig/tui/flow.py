@@ -8,167 +8,49 @@ has an old ticket and changes nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
+
+from rig.tui.turns import (
+    Again,
+    Answered,
+    Arm,
+    Closed,
+    Collect,
+    Drive,
+    Fire,
+    Found,
+    GoOn,
+    Judge,
+    Judged,
+    Log,
+    Lost,
+    Note,
+    Opened,
+    Refused,
+    Reject,
+    Stage,
+    Stop,
+    Stopped,
+    Tick,
+    Try,
+    Wait,
+    Warned,
+)
 
 if TYPE_CHECKING:
     from rig.tui.plan import Job
+    from rig.tui.turns import Effect, Event
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""
 
 
-class Stage(StrEnum):
-    """Where the operator is."""
-
-    PROTOCOL = "protocol"
-    DEVICE = "device"
-    PREPARE = "prepare"
-    SETTLING = "settling"
-    ARMING = "arming"
-    COUNTDOWN = "countdown"
-    FIRING = "firing"
-    LIVE = "live"
-    JUDGING = "judging"
-    RESULT = "result"
-    DONE = "done"
-
-
-BEFORE_RELEASE = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
+BEFORE_RELEASE = (
+    Stage.TESTING, Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING
+)  # fmt: skip
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 
-# ---------------------------------------------------------------- events
-
-
-class Opened(NamedTuple):
-    """A session is open at the daemon."""
-
-
-class Closed(NamedTuple):
-    """The session was closed."""
-
-
-class GoOn(NamedTuple):
-    """The operator wants the next step; `job` is the attempt it would be at."""
-
-    job: Job | None
-    settle_s: float = 0.0
-
-
-class Answered(NamedTuple):
-    """An effect was carried out; `token` is of an `Arm`."""
-
-    ticket: int
-    token: int | None = None
-
-
-class Judged(NamedTuple):
-    """The drop was analysed."""
-
-    ticket: int
-    verdict: str
-    reasons: tuple[str, ...]
-
-
-class Refused(NamedTuple):
-    """An effect failed; `trouble` says why and what to do."""
-
-    ticket: int
-    trouble: str
-
-
-class Tick(NamedTuple):
-    """Time went by."""
-
-    seconds: float
-
-
-class Stopped(NamedTuple):
-    """STOP, or any key before the release."""
-
-
-class Lost(NamedTuple):
-    """The daemon is out of reach, or control is somebody else's."""
-
-    trouble: str
-
-
-class Found(NamedTuple):
-    """The session has a recorded drop that nobody has judged."""
-
-    job: Job
-
-
-class Reject(NamedTuple):
-    """The operator rejects the drop."""
-
-    cause: str
-
-
-class Note(NamedTuple):
-    """The operator has something to say about the drop."""
-
-    text: str
-
-
-class Again(NamedTuple):
-    """The operator wants another attempt."""
-
-    job: Job
-
-
-Event: TypeAlias = (
-    Opened | Closed | GoOn | Answered | Judged | Refused | Tick | Stopped | Lost | Found | Reject
-    | Note | Again
-)  # fmt: skip
-
-# ---------------------------------------------------------------- effects
-
-
-class Wait(NamedTuple):
-    """Let the chains come to rest."""
-
-    seconds: float
-
-
-class Arm(NamedTuple):
-    """Prepare the release."""
-
-    job: Job
-
-
-class Fire(NamedTuple):
-    """Let go."""
-
-    token: int
-
-
-class Collect(NamedTuple):
-    """Wait until the drop is in the session file."""
-
-    job: Job
-
-
-class Judge(NamedTuple):
-    """Analyse the drop."""
-
-    job: Job
-
-
-class Log(NamedTuple):
-    """Put a verdict into the session file."""
-
-    job: Job
-    state: str
-    reasons: tuple[str, ...]
-
-
-class Stop(NamedTuple):
-    """Everything off."""
-
-
-Effect: TypeAlias = Wait | Arm | Fire | Collect | Judge | Log | Stop
 Step: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
 
 
@@ -196,6 +78,8 @@ class Flow:
         Of this drop, as logged.
     trouble
         What went wrong last; empty when it is over.
+    home
+        Where a stage leads that ends without a drop.
     """
 
     stage: Stage = Stage.PROTOCOL
@@ -210,10 +94,13 @@ class Flow:
     verdict: str = ""
     reasons: tuple[str, ...] = ()
     trouble: str = ""
+    home: Stage = Stage.PREPARE
 
     def to(self, stage: Stage, trouble: str = "") -> Flow:
         """Go to another stage; answers to earlier effects count no more."""
-        return replace(self, stage=stage, ticket=self.ticket + 1, trouble=trouble)
+        return replace(
+            self, stage=stage, ticket=self.ticket + 1, trouble=trouble, home=Stage.PREPARE
+        )
 
 
 def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
@@ -223,6 +110,8 @@ def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
             return _stopped(flow)
         case Lost(trouble):
             return _lost(flow, trouble)
+        case Warned(trouble):
+            return replace(flow, trouble=flow.trouble or trouble), ()
         case Answered(ticket, token):
             return _answered(flow, ticket, token)
         case Refused(ticket, trouble):
@@ -233,6 +122,8 @@ def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
             return _judged(flow, event)
         case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
+        case Try() if flow.stage in _IDLE:
+            return replace(flow.to(Stage.TESTING), home=flow.stage), (Drive(),)
         case Opened() if flow.stage is Stage.PROTOCOL:
             return flow.to(Stage.DEVICE), ()
         case Closed() if flow.stage in {*_IDLE, Stage.RESULT}:
@@ -251,14 +142,17 @@ def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
 
 def _stopped(flow: Flow) -> Step:
     if flow.stage in BEFORE_RELEASE:
-        return flow.to(Stage.PREPARE, "stopped: nothing fell"), (Stop(),)
+        said = "stopped: the release is off"
+        if flow.stage is not Stage.TESTING:
+            said = "stopped: nothing fell"
+        return flow.to(flow.home, said), (Stop(),)
     return flow, (Stop(),)
 
 
 def _lost(flow: Flow, trouble: str) -> Step:
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
         # A chain that fell is recorded by the daemon, and found when it is back.
-        return flow.to(Stage.PREPARE, trouble), ()
+        return flow.to(flow.home, trouble), ()
     return flow, ()
 
 
@@ -266,6 +160,8 @@ def _answered(flow: Flow, ticket: int, token: int | None) -> Step:
     if ticket != flow.ticket:
         # What was stopped while the device was arming must not stay armed.
         return flow, () if token is None else (Stop(),)
+    if flow.stage is Stage.TESTING:
+        return flow.to(flow.home), ()
     job = flow.job
     if job is None:
         return flow, ()
@@ -288,7 +184,7 @@ def _refused(flow: Flow, ticket: int, trouble: str) -> Step:
         # Whether it was let go is not known for sure when the answer is an error.
         return flow.to(Stage.PREPARE, trouble), (Stop(),)
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
-        return flow.to(Stage.PREPARE, trouble), ()
+        return flow.to(flow.home, trouble), ()
     return replace(flow, trouble=trouble, logged=True), ()
 
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
+import unicodedata
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from textual.keys import Keys
 
 from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME
@@ -14,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 STOP_KEY = "f9"
+_HOW = 'one line an action: reject = "r"'
 RESERVED = ("escape",)
 """Keys whose meaning is fixed."""
 
@@ -41,36 +46,69 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
     if path is None and not place.is_file():
         return {action.name: action.keys for action in ACTIONS}
     try:
-        given = tomllib.loads(place.read_text("utf-8"))
+        text = place.read_text("utf-8")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{place}: {reason}", 'one line an action: reject = "r"') from None
-    return combined(given, str(place))
+        raise InputError(f"{place}: {reason}", _HOW) from None
+    try:
+        given = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        reason, _, at = str(error).partition(" (at ")
+        line, column = re.findall(r"\d+", at) or (
+            text.count("\n") + 1,
+            len(text.split("\n")[-1]) + 1,
+        )
+        raise InputError(f"{place}:{line}:{column}: {reason}", _HOW) from None
+    lines = {line.partition("=")[0].strip(): n for n, line in enumerate(text.splitlines(), start=1)}
+    return combined(given, str(place), lines)
 
 
-def combined(given: Mapping[str, object], source: str) -> dict[str, str]:
+def combined(
+    given: Mapping[str, object], source: str, lines: Mapping[str, int] | None = None
+) -> dict[str, str]:
     """Put given keys over the table's own.
 
     A key that is given to one action is taken from the action that had it in the table.
+
+    Parameters
+    ----------
+    given
+        Keys by action.
+    source
+        For messages.
+    lines
+        Where in the source each action stands.
+
+    Raises
+    ------
+    InputError
+        With every problem.
     """
     faults = []
+    places = {name: f"{source}:{line}" for name, line in (lines or {}).items()}
     chosen: dict[str, list[str]] = {}
     owner: dict[str, str] = {STOP_KEY: "stop"}
     for name, value in given.items():
+        at = places.get(name, source)
         if name not in BY_NAME:
-            faults.append(f"{source}: {name}: no such action; there are {', '.join(BY_NAME)}")
+            faults.append(f"{at}: {name}: no such action; there are {', '.join(BY_NAME)}")
             continue
         if not isinstance(value, str) or not value.strip():
-            faults.append(f'{source}: {name}: a key or several, as in "r" or "r,f5"')
+            faults.append(f'{at}: {name}: a key or several, as in "r" or "r,f5"')
             continue
         keys = [key.strip() for key in value.split(",") if key.strip()]
+        faults += [
+            f"{at}: {name}: {key} is no key; they are named as r, f5, ctrl+r, enter, question_mark"
+            for key in keys
+            if not _is_key(key)
+        ]
         if name == "stop" and STOP_KEY not in keys:
             keys.append(STOP_KEY)  # whoever knows only one key knows this one
         for key in keys:
             if key in RESERVED:
-                faults.append(f"{source}: {name}: {key} always means STOP")
+                faults.append(f"{at}: {name}: {key} always means STOP")
             elif owner.setdefault(key, name) != name:
-                faults.append(f"{source}: {name}: {key} is the key of {owner[key]}")
+                faults.append(f"{at}: {name}: {key} is the key of {owner[key]}")
         chosen[name] = keys
     for action in ACTIONS:
         if action.name not in chosen:
@@ -81,3 +119,18 @@ def combined(given: Mapping[str, object], source: str) -> dict[str, str]:
     if faults:
         raise InputError("\n".join(faults))
     return {action.name: ",".join(chosen[action.name]) for action in ACTIONS}
+
+
+def _is_key(key: str) -> bool:
+    """Whether a terminal may send it, by Textual's names."""
+    *held, last = key.split("+")
+    if not set(held) <= {"ctrl", "shift", "alt"}:
+        return False
+    if len(last) == 1:
+        return last.isalnum()  # others have names, such as question_mark
+    if last in {one.value for one in Keys}:
+        return True
+    try:
+        return bool(unicodedata.lookup(last.replace("_", " ")))
+    except KeyError:
+        return False

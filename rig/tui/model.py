@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.tui.flow import Stage
+from rig.tui.turns import Stage
 
 if TYPE_CHECKING:
     from rig.protocol.scene import Protocol, Run
@@ -44,6 +44,10 @@ class Model:
         Why the daemon is not heard.
     offline
         Whether only a file is looked at.
+    unreadable
+        Why the session file cannot be read.
+    read
+        How many of its drops were analysed so far.
     """
 
     state: State
@@ -59,6 +63,8 @@ class Model:
     settle_s: float = 0.0
     port: str = ""
     offline: bool = False
+    unreadable: str = ""
+    read: int = 0
 
     @property
     def stage(self) -> Stage:
@@ -99,24 +105,24 @@ class Model:
 def alarm(model: Model) -> Alarm | None:
     """Name what is most wrong now; `None` when all is well."""
     if not model.connected:
+        silence, _, hint = model.silence.partition("\n")
         return Alarm(
-            f"no daemon: {model.silence or 'connecting'}",
-            "tried again by itself; a drop that was fired is recorded without this screen; "
-            "in danger switch the release's supply off",
+            f"no daemon: {silence or 'connecting'}",
+            f"{hint}{'; ' * bool(hint)}tried again by itself; a drop that was fired is recorded "
+            "without this screen; in danger switch the release's supply off",
         )
-    link = model.state.section("link")
-    if link.get("state") == "down":
-        why, wait = link.get("error"), link.get("retry_s")
-        text = why.get("message", "") if isinstance(why, dict) else why or ""
+    link, error = model.state.section("link"), model.state.section("error")
+    if link.get("state") == "down" or (link.get("state") == "opening" and error):
+        why, wait = link.get("error") or error, link.get("retry_s")
         again = f" (next try in {float(wait):.0f} s)" if wait is not None else ""
         return Alarm(
-            f"the port is lost: {text}",
-            f"check cable and power; the board is found again by itself{again}",
+            f"the port is lost: {why.get('message', '')}",
+            f"it is found again by itself{again}; {why.get('hint') or 'check cable and power'}",
         )
-    error = model.state.sections.get("error")
-    if isinstance(error, dict):
+    if error:
         return Alarm(str(error.get("message", "")), str(error.get("hint", "")))
-    if model.flow.trouble:
-        message, _, hint = model.flow.trouble.partition("\n")
-        return Alarm(message, hint)
+    for trouble in (model.flow.trouble, model.unreadable):
+        if trouble:
+            message, _, hint = trouble.partition("\n")
+            return Alarm(message, hint)
     return None

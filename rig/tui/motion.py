@@ -12,7 +12,6 @@ from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.errors import DomainError
 from rig.model.fall import kicks
 from rig.model.rods import rod_impacts
-from rig.records import Drop, Edge
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -24,8 +23,10 @@ if TYPE_CHECKING:
     from rig.protocol.scene import Protocol, Run
 
     Array = NDArray[np.float64]
+    Table = Iterable[Sequence[int]] | NDArray[np.int64]
 
 _FIRST = 4
+_MOST = 1200  # edges of a drop that is still falling
 _POINTS = 120  # of a curve: two a column of a wide terminal
 
 
@@ -63,7 +64,7 @@ class Motion:
 def motions(
     protocol: Protocol,
     run: Run,
-    edges: Iterable[Sequence[int]],
+    edges: Table,
     hz: float,
     matches: Mapping[int, int] | None = None,
 ) -> tuple[Motion, ...]:
@@ -74,7 +75,7 @@ def motions(
     run
         What hung where.
     edges
-        Tick, channel and state of each.
+        Tick, channel and state of each, as they come or as a table of them.
     hz
         Tick rate.
     matches
@@ -83,13 +84,7 @@ def motions(
     """
     if protocol.gates is None:
         return ()
-    drop = Drop(
-        run.number,
-        1,
-        round(hz),
-        tuple(Edge(tick, gate, bool(blocked)) for tick, gate, blocked in edges),
-    )
-    table = Edges.of(drop, hz)
+    table = _table(edges, hz, thin=matches is None)
     found = []
     for role in ("impact", "free"):
         name = run.impact if role == "impact" else run.free
@@ -109,6 +104,22 @@ def motions(
         order = np.argsort(times, kind="stable")
         found.append(_motion(role, times[order], heights[order], model))
     return tuple(found)
+
+
+def as_table(edges: Iterable[Sequence[int]]) -> NDArray[np.int64]:
+    """Take edges as numbers, shape ``(edges, 3)``: tick, channel and state of each."""
+    return np.array([tuple(edge) for edge in edges], dtype=np.int64).reshape(-1, 3)
+
+
+def _table(edges: Table, hz: float, *, thin: bool) -> Edges:
+    """Take edges as arrays; of very many only as many as a picture can show."""
+    table = edges if isinstance(edges, np.ndarray) else as_table(edges)
+    if thin and len(table) > _MOST:
+        kept = np.arange(len(table)) % (1 + len(table) // _MOST) == 0
+        for channel in np.unique(table[:, 1]):  # where counting has to begin
+            kept[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
+        table = table[kept]
+    return Edges(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
 
 
 def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Array, Array]:

@@ -7,12 +7,15 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.tui.app import Options, RigApp
-from rig.tui.findings import Book
-from rig.tui.flow import Flow, Stage
+from rig.tui.app import RigApp
+from rig.tui.book import Book
+from rig.tui.flow import Flow
+from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import State
 from rig.tui.still import QUIET, Still
+from rig.tui.turns import Stage
+from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -102,7 +105,7 @@ async def _picture(scene: Scene, session: Path, keys: Mapping[str, str]) -> str:
     app = RigApp(Options(session=session), keys, wire)
     app.flow = scene.flow
     async with app.run_test(size=SIZE) as pilot:
-        while app.findings is None or not app.lamps.known:
+        while app.findings is None or app.findings.lagging or not app.lamps.known:
             wire.changed = True
             await pilot.pause()
         if scene.name == "history":
@@ -110,8 +113,11 @@ async def _picture(scene: Scene, session: Path, keys: Mapping[str, str]) -> str:
             end = end_of(app.findings.drops[first], app.findings.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             await app.go("history")
-        await pilot.pause(1.0)  # figures wait a moment from one drawing to the next
-        return portable(app.export_screenshot(title="chainrig"))
+        before, now = "", app.export_screenshot(title="chainrig")
+        while now != before:  # figures are drawn again when their place is known
+            await pilot.pause(1.2 * PAUSE_S)
+            before, now = now, app.export_screenshot(title="chainrig")
+        return portable(now)
 
 
 def portable(svg: str) -> str:

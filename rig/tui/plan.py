@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.runner import ATTEMPTS
-
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
@@ -38,6 +36,8 @@ def next_job(runs: Sequence[RunLine], voids: Mapping[int, int]) -> Job | None:
 
 def done(line: RunLine, voids: int) -> bool:
     """Whether a run is done with: settled, or void too often."""
+    from rig.runner import ATTEMPTS  # noqa: PLC0415 - not before the first paint
+
     return line.state in SETTLED or voids >= ATTEMPTS
 
 

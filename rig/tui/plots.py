@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.report.numbers import expanded, value_of
 from rig.tui.findings import good
 from rig.tui.motion import motions, separation
+from rig.tui.plan import Job
 from rig.tui.widgets.figure import Picture, Series
 
 if TYPE_CHECKING:
@@ -14,17 +15,17 @@ if TYPE_CHECKING:
 
     from rig.protocol.scene import Protocol, Run
     from rig.tui.findings import Findings
-    from rig.tui.motion import Motion
+    from rig.tui.motion import Motion, Table
 
 _MARKS = {"impact": ("•", "primary"), "free": ("+", "secondary")}
 _BEFORE_S = 0.02
-_POINTS = 300  # of one chain: more would fall on the same characters
+_WITH_BARS = 40  # numbers in a chart: the bars of more stand in each other's way
 
 
 def chain_pictures(
     protocol: Protocol | None,
     run: Run | None,
-    edges: Sequence[Sequence[int]],
+    edges: Table,
     hz: float,
     matches: Mapping[int, int] | None,
 ) -> tuple[Picture | None, Picture | None]:
@@ -43,8 +44,7 @@ def chain_pictures(
         series.append(Series("line", times * 1e3, heights * 1e2, "accent", label=label))
     for one in reversed(found):  # the struck chain above the free one
         mark, color = _MARKS[one.role]
-        thin = slice(None, None, 1 + one.times.size // _POINTS)
-        series.append(Series("dots", one.times[thin] * 1e3, one.heights[thin] * 1e2, color, mark,
+        series.append(Series("dots", one.times * 1e3, one.heights * 1e2, color, mark,
                              f"{one.role} side"))  # fmt: skip
     chains = Picture("z (cm), t (ms)", tuple(series), (0.0, end * 1e3))
     if len(found) < 2:
@@ -106,41 +106,66 @@ def incline_pictures(findings: Findings, hidden: int | None) -> list[Picture]:
     return found
 
 
-def control_picture(findings: Findings, hidden: int | None) -> Picture | None:
-    """Draw skew, or g, of every run in order, with the protocol's limits or the expected value."""
+def control_pictures(findings: Findings, hidden: int | None) -> list[Picture]:
+    """Draw the control charts: of skew with its limits, and of gravity beside the expected one.
+
+    Parameters
+    ----------
+    hidden
+        A run whose numbers must not be seen yet.
+
+    Returns
+    -------
+    list of Picture
+        Those of quantities that this scene has.
+    """
     runs = [run for run in findings.analysis["runs"] if run["run"] != hidden]
-    name, scale, title = ("release_skew_s", 1e3, "release skew (ms), run")
-    if not findings.protocol.two_chains:
-        name, scale, title = "gravity_m_s2", 1.0, "g (m/s²), run"
-    points = [(run["run"], value_of(run.get(name)), good(run)) for run in runs]
-    points = [point for point in points if point[1] is not None]
-    if not points and findings.protocol.surface is not None and not findings.protocol.two_chains:
-        return None
-    ends = [0.5, len(findings.plan) + 0.5]
-    if name == "release_skew_s":
-        limit = findings.protocol.accept.release_skew * scale
-        lines = [Series("line", ends, [level, level], "warning", label=label)
-                 for level, label in ((limit, f"limit ±{limit:g}"), (-limit, ""))]  # fmt: skip
-        middle = Series("line", ends, [0.0, 0.0], "foreground")
-    else:
-        lines = []
-        g = findings.protocol.gravity.value
-        middle = Series("line", ends, [g, g], "accent", label="expected")
-    counted = [(x, y) for x, y, ok in points if ok]
-    void = [(x, y) for x, y, ok in points if not ok]
-    return Picture(
-        title,
-        (
-            middle,
-            *lines,
-            Series("dots", [x for x, _ in counted], _scaled([y for _, y in counted], scale),
-                   "primary", "●", "counts"),
-            Series("dots", [x for x, _ in void], _scaled([y for _, y in void], scale), "error", "×",
-                   "void"),
-        ),
-        (0.5, len(findings.plan) + 0.5),
-        x_ticks=_whole(len(findings.plan)),
-    )  # fmt: skip
+    found = []
+    if findings.protocol.two_chains:
+        limit = findings.protocol.accept.release_skew * 1e3
+        lines = ((0.0, "foreground", ""), (limit, "warning", f"limit ±{limit:g}"),
+                 (-limit, "warning", ""))  # fmt: skip
+        points = [(run, _measured(run.get("release_skew_s"), 1e3)) for run in runs]
+        found.append(_chart("release skew (ms), run", findings, lines, points))
+    points = [(run, _gravity(findings, run)) for run in runs]
+    if findings.gravity or any(point for _, point in points):
+        expected = ((findings.protocol.gravity.value, "accent", "protocol"),)
+        found.append(_chart("g of the free chain (m/s²), run", findings, expected, points))
+    return found
+
+
+def _measured(told: Mapping[str, float] | None, scale: float = 1.0) -> tuple[float, float] | None:
+    """Take value and U95 out of a number of ``rig analyze --json``."""
+    value = value_of(told)
+    return None if value is None else (value * scale, (expanded(told) or 0.0) * scale)
+
+
+def _gravity(findings: Findings, run: Mapping[str, Any]) -> tuple[float, float] | None:
+    own = _measured(run.get("gravity_m_s2"))
+    seen = findings.gravity.get(Job(run["run"], run["attempt"]))
+    return own or (None if seen is None else (seen.value, seen.expanded))
+
+
+def _chart(
+    title: str,
+    findings: Findings,
+    lines: Sequence[tuple[float, str, str]],
+    points: Sequence[tuple[Mapping[str, Any], tuple[float, float] | None]],
+) -> Picture:
+    """Draw one number a run, with U95, in order of the runs."""
+    ends = (0.5, len(findings.plan) + 0.5)
+    series = [Series("line", ends, (level, level), color, label=label)
+              for level, color, label in lines]  # fmt: skip
+    for counts, color, mark, label in ((True, "primary", "●", "counts ± U"),
+                                       (False, "error", "×", "void")):  # fmt: skip
+        some = [(run["run"], *point) for run, point in points if point and good(run) is counts]
+        bars = len(points) <= _WITH_BARS
+        series.append(
+            Series("bars" if bars else "dots", [x for x, *_ in some], [y for _, y, _ in some],
+                   color, mark, label if bars else label.removesuffix(" ± U"),
+                   [u for *_, u in some] if bars else ())
+        )  # fmt: skip
+    return Picture(title, tuple(series), ends, x_ticks=_whole(len(findings.plan)))
 
 
 def _whole(count: int) -> list[float]:

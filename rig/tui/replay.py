@@ -29,31 +29,48 @@ class Player:
         Since the release fired.
     speed
         Seconds of the drop in a second.
+    back
+        Whether time goes back.
     """
 
     at: int = 0
     time_s: float = 0.0
     speed: float = 2.0**-4
     playing: bool = False
+    back: bool = False
 
     def turned(self, factor: float) -> Player:
         """Change the speed."""
         return replace(self, speed=min(FASTEST, max(SLOWEST, self.speed * factor)))
 
-    def moved(self, steps: int) -> Player:
+    def turned_round(self) -> Player:
+        """Play in the other direction."""
+        return replace(self, back=not self.back)
+
+    def moved(self, steps: int, end_s: float) -> Player:
         """Go back or on a little and stand still."""
-        return replace(self, time_s=max(0.0, self.time_s + steps * _STEP_S), playing=False)
+        return replace(self, time_s=self._within(steps * _STEP_S, end_s), playing=False)
 
     def other(self, by: int, count: int) -> Player:
         """Take another drop, from its beginning."""
         return replace(self, at=(self.at + by) % max(1, count), time_s=0.0)
 
+    def started(self, end_s: float) -> Player:
+        """Play, or stand still; at the end, from the other one."""
+        if self.playing:
+            return replace(self, playing=False)
+        first, last = (end_s, 0.0) if self.back else (0.0, end_s)
+        return replace(self, time_s=first if self.time_s == last else self.time_s, playing=True)
+
     def ticked(self, seconds: float, end_s: float) -> Player:
         """Let time pass; it stops at the end."""
         if not self.playing:
             return self
-        time = self.time_s + seconds * self.speed
-        return replace(self, time_s=min(time, end_s), playing=time < end_s)
+        time = self._within(seconds * self.speed * (-1.0 if self.back else 1.0), end_s)
+        return replace(self, time_s=time, playing=time != (0.0 if self.back else end_s))
+
+    def _within(self, more: float, end_s: float) -> float:
+        return min(end_s, max(0.0, self.time_s + more))
 
 
 def end_of(drop: Drop, hz: float) -> float:

@@ -125,7 +125,7 @@ class Wire:
                 try:
                     await self._once()
                 except RigError as error:
-                    self.silence = " ".join(filter(None, [error.message, error.hint]))
+                    self.silence = f"{error.message}\n{error.hint}"
                 self.changed = True
                 await asyncio.sleep(_AGAIN_S)
         finally:
@@ -139,6 +139,7 @@ class Wire:
         except DeviceError as error:
             self._start(error)
             return
+        reached = None
         try:
             await self._check(client)
             client.changed = self._note
@@ -147,15 +148,21 @@ class Wire:
             if self._wants_control and client.mirror.state.get("control") is None:
                 with suppress(RigError):
                     await self.take_control()
-            await self._connected()
+            # Beside the signs of life: to open a session may take longer than control lasts.
+            reached = asyncio.get_running_loop().create_task(self._going_on())
             while not client.lost.is_set():
                 client.renew()
                 with suppress(TimeoutError):
                     await asyncio.wait_for(client.lost.wait(), LEASE_S / 4)
             self.silence = "it is gone"
         finally:
+            if reached is not None:
+                reached.cancel()
             self._had_control = False
             await client.close()
+
+    async def _going_on(self) -> None:
+        await self._connected()
 
     async def _check(self, client: AsyncClient) -> None:
         """See that it is the daemon of the port that was asked for."""

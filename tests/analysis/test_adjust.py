@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.analysis.adjust import adjust, uncertainty
-from rig.analysis.drop_model import Equations
+from rig.analysis.equations import Equations
 from tests.analysis.drops import SCENES, case
 
 HUBER = 4.0
@@ -40,8 +40,9 @@ class Linear:
         sigma = self.sigma[role][match]
         ones = np.ones_like(sigma)
         return Equations(
-            residuals[match], self.jacobian[role][match], sigma, ones, ones.astype(np.bool_)
-        )
+            residuals[match], self.jacobian[role][match], sigma, ones, ones.astype(np.bool_),
+            np.arange(5), 5,
+        )  # fmt: skip
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """All rows in standard deviations: J/σ and r(0)/σ."""
@@ -140,7 +141,7 @@ def test_edges_that_scatter_more_count_less(factor):
     assert u == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-9)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.tuples(*[st.floats(-3, 3)] * 5))
 def test_squares_of_the_parts_add_up(seed, gradient):
     found = adjust(Linear(seed), ALL, np.zeros(5))

@@ -75,7 +75,7 @@ def cheapest(observed, expected) -> float:
     return rest(0, 0)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(gates)
 def test_no_matching_is_cheaper(drawn):
     built = [build(number, *one) for number, one in enumerate(drawn)]

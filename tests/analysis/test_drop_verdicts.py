@@ -314,6 +314,25 @@ def test_the_last_attempt_counts_and_the_rejected_do_not():
     rejected = found.runs[2]
     assert (rejected.verdict, rejected.reasons[0]) == ("rejected", "the door slammed")
     assert [line.n for line in found.summary] == [2]
+    assert [line.n for line in found.with_rejected] == [3]
+    said = found.json()
+    assert said["summary_with_rejected"][0]["n"] == 3
+    (first, second), third = ((run.quantities["speed_m_s"] for run in found.runs[:2]), rejected)
+    both = [found.summary[0], found.with_rejected[0]]
+    values = [first.value, second.value, third.quantities["speed_m_s"].value]
+    assert [line.means["speed_m_s"].value for line in both] == pytest.approx(
+        [sum(values[:2]) / 2, sum(values) / 3], rel=1e-12
+    )
+
+
+def test_what_was_void_anyway_is_in_no_summary():
+    """A rejected run counts in neither summary when its limits would not have let it count."""
+    drops = attempts((1, 1), (2, 1))
+    broken = replace(drops[1], edges=drops[1].edges[:50])
+    found = analyze(SINGLE, [drops[0], broken], scale, {(2, 1): ["the door slammed"]})
+    assert found.runs[1].verdict == "rejected"
+    assert found.with_rejected == ()
+    assert "summary_with_rejected" not in found.json()
 
 
 def test_a_run_that_is_not_planned_or_a_scene_without_gates_is_bad_input():

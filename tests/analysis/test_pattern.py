@@ -94,7 +94,7 @@ def test_a_pile_of_edges_looks_like_no_chain(share, seed):
     assert any("does not look like this chain falling" in reason for reason in result.reasons)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.sampled_from([RECORD, case(FENCE, Dials.quiet())]),
     st.lists(st.tuples(st.integers(-HZ, 3 * HZ), st.integers(0, 15), st.booleans()), max_size=25),

@@ -40,7 +40,7 @@ def test_the_factor_covers_what_it_says(degrees, probability):
     assert_covers(degrees, probability)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.floats(0, 5).map(lambda exponent: 10.0**exponent))
 def test_any_real_number_of_degrees(degrees):
     assert_covers(degrees, 0.95)

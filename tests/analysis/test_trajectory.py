@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
@@ -152,7 +152,6 @@ paths = st.one_of(
 )
 
 
-@settings(deadline=None)
 @given(paths, st.lists(st.floats(-1.0, 1.99), min_size=1, max_size=8))
 def test_heights_and_times_are_inverse(path, fractions):
     heights = path.height[0] * (1 - np.array(fractions) ** 2)  # from the start to below contact
@@ -161,7 +160,6 @@ def test_heights_and_times_are_inverse(path, fractions):
     np.testing.assert_allclose(found, heights, atol=1e-13)
 
 
-@settings(deadline=None)
 @given(paths, st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=8))
 def test_times_and_heights_are_inverse(path, since):
     times = path.time[0] + np.array(since)
@@ -170,7 +168,6 @@ def test_times_and_heights_are_inverse(path, since):
     assert np.all(np.abs(path.times(heights) - times) < 1e-15 * (4 + 20 / speeds))
 
 
-@settings(deadline=None)
 @given(paths, st.floats(0, 10))
 def test_nothing_is_above_the_start(path, above):
     (when,) = path.times(np.array([path.height[0] + above]))

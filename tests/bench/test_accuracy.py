@@ -8,11 +8,15 @@ from dataclasses import asdict
 import pytest
 
 from rig.bench.accuracy import Errors
-from rig.bench.dials import DOUBLED, doubled
+from rig.bench.dials import DOUBLED, STACK, doubled, with_setting
+from rig.bench.proof import failures, proof_table
+from rig.bench.quick import _falls, _sessions, quick_accuracy
 from rig.bench.rivals import plain_fit, two_gate_timer
+from rig.errors import RigError
+from rig.protocol.plan import runs
 from sim.dials import Dials, read_dials
 from sim.scene import read_settings
-from tests.analysis.drops import UNIFORM, case
+from tests.analysis.drops import PROTOCOLS, SINGLE, UNIFORM, case
 
 
 @pytest.mark.parametrize("dial", DOUBLED)
@@ -44,3 +48,74 @@ def test_bias_and_coverage_are_as_sure_as_there_are_rigs():
     assert found["coverage"] == pytest.approx(4 / 6)
     assert found["coverage_se"] == pytest.approx(math.sqrt(1 / 3) / math.sqrt(3))
     assert found["bias_se"] == pytest.approx(math.sqrt((0 + 0.09 + 0.09) / 2) / math.sqrt(3))
+
+
+SOURCE = str(PROTOCOLS / "single-chain.yaml")
+
+
+def test_falls_without_a_device_are_the_simulation_s():
+    one = case(SINGLE, Dials(skew_sd=4e-3), seed=2, run=3)
+    url = with_setting(doubled("sim://", "skew_sd"), "protocol", SOURCE)
+    found = dict(_falls(url, [[1], [2, 3]]))
+    assert [len(told) for told in found.values()] == [1, 2]
+    told = found[2][1]
+    assert told["truth"]["run"] == 3
+    assert [tuple(edge) for edge in told["edges"]] == [tuple(edge[:3]) for edge in one.truth.edges]
+    assert told["truth"]["speed_m_s"] == one.truth.speed_m_s
+
+
+def test_a_simulation_that_gives_up_is_said(capfd):
+    url = with_setting("sim://?no_such_dial=1", "protocol", SOURCE)
+    with pytest.raises(RigError, match="exit code 1"):
+        list(_falls(url, [[1]]))
+    assert "no_such_dial" in capfd.readouterr().err
+
+
+def test_every_planned_run_has_its_turn():
+    sessions = _sessions(UNIFORM, 27)
+    planned = {run.number: run for run in runs(UNIFORM)}
+    assert sorted(number for one in sessions for number in one) == sorted(planned)
+    for one in sessions:
+        assert "".join(str(planned[number].impact) for number in one) == "ABBA"
+        assert len({planned[number].incline_deg for number in one}) == 1
+
+
+def test_a_rig_s_drops_are_judged_by_their_truth():
+    found = quick_accuracy(SOURCE, "sim://", 1)
+    assert found["verdicts"].keys() <= {"accepted", "marginal"}
+    assert found["edges_matched"] > 1000
+    assert found["edges_given_to_a_wrong_rod"] == 0
+    assert 0.0 < found["speed_rms_relative"] < 3e-3
+    assert found["quantities"]["speed_m_s"]["n"] == sum(found["verdicts"].values()) == 4
+    lines = proof_table({"default": found})
+    assert len(lines) == 2  # a heading, and nothing beyond a limit
+    assert lines[1].split()[:2] == ["default", "4"]
+
+
+GOOD = {
+    "n": 100, "rms": 0.05e-3, "bias": 0.0, "worst": 1e-4, "mean_U95": 1e-4, "bias_over_U": 0.05,
+    "coverage": 0.95, "bias_se": 1e-6, "coverage_se": 0.01,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({}, []),
+        ({"rms": 0.6e-3}, ["rms error of Δz"]),
+        ({"bias_over_U": -0.13}, ["bias of Δz is -0.13 U"]),
+        ({"bias_over_U": -0.13, "bias_se": 2e-6}, []),
+        ({"coverage": 0.90}, ["coverage of Δz is 90.0%"]),
+        ({"coverage": 0.995}, ["coverage of Δz is 99.5%"]),
+        ({"coverage": 0.98}, []),
+    ],
+)
+def test_what_is_beyond_a_limit_by_more_than_chance_is_said(change, said):
+    found = {"edges_given_to_a_wrong_rod": 0, "quantities": {"separation_m": GOOD | change}}
+    assert list(failures(found)) == said
+    wrong = list(failures(found | {"edges_given_to_a_wrong_rod": 2}))
+    assert wrong == ["2 edges given to a wrong rod", *said]
+
+
+def test_dials_that_only_a_device_shows_are_dials():
+    assert set(STACK) < set(DOUBLED)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from rig.bench import link
+from rig.bench import decoding, link
 from rig.link.messages import EVENTS_PER_FRAME
 from rig.link.transcript import Received, Transcript
 
 
 def test_the_stream_is_what_a_board_sends():
     transcript = Transcript()
-    found = transcript.feed("rx", 0, b"".join(link.frames(3)))
+    found = transcript.feed("rx", 0, b"".join(decoding.frames(3)))
     assert all(isinstance(one, Received) for one in found)
     assert [one.message.first for one in found] == [0, EVENTS_PER_FRAME, 2 * EVENTS_PER_FRAME]
     assert transcript.bad_frames == transcript.unreadable == 0
@@ -20,3 +20,19 @@ def test_every_edge_arrives_and_takes_its_time():
     assert len(latencies) == 20
     assert min(latencies) > 0.0
     assert 0.0 < rate < EVENTS_PER_FRAME / 2e-3 * 1.1
+
+
+def test_all_decoders_find_the_same_edges():
+    data = b"".join(decoding.frames(4))
+    edges = decoding.to_edges(data)
+    wanted = [(n * decoding.TICKS, 0, n % 2 == 0) for n in range(4 * EVENTS_PER_FRAME)]
+    assert edges == wanted == decoding.bytewise(data)
+    assert decoding.bytewise(data[:-2] + b"?" + data[-1:]) == wanted[:-EVENTS_PER_FRAME]
+    assert decoding.speed(decoding.checked, 4) > 0.0
+
+
+def test_reading_alone_is_the_same_stream():
+    rate, latencies = link.read_alone(10, 2e-3)
+    assert len(latencies) == 10
+    assert min(latencies) > 0.0
+    assert 0.0 < rate < EVENTS_PER_FRAME / 2e-3 * 1.2

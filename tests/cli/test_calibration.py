@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from rig.calibration import calibration
+from rig.calibration import Calibrator, calibration
 from rig.daemon.station import Station
 from rig.link import messages as wire
 from rig.link.clock import SystemClock
@@ -54,6 +54,27 @@ def test_every_result_says_its_calibration_and_says_it_again(measure, call):
     line = call("analyze", session).out.splitlines()[-1]
     assert line.startswith("time scale: board −1")
     assert line.endswith(f"from {said['pings']} clock samples by the host's clock")
+
+
+def test_looking_again_and_again_gives_what_looking_once_gives(measure, tmp_path):
+    session, _ = measure("?reference=0.05ppm")
+    calibrator = Calibrator()
+    with Session.open(session, readonly=True) as whole:
+        pings, text = whole.pings(), whole.protocol_text
+        identities, pulses = whole.identities(), whole.pulses()
+    with Session.create(tmp_path / "grows", text, "p", simulated=True, origin="o") as grows:
+        for host_ns, identity in identities:
+            grows.add_identity(identity, host_ns)
+        for n, ping in enumerate(pings):
+            grows.add_ping(ping)
+            if n == len(pings) // 2:
+                for pulse in pulses:
+                    grows.add_pulse(pulse)
+            if n % 5 == 0:
+                seen, afresh = calibrator.look(grows), calibration(grows)
+                assert (seen.said, seen.device) == (afresh.said, afresh.device)
+        assert calibrator.look(grows).said == calibration(grows).said
+        assert len(pings) > 8
 
 
 def test_a_long_session_stands_on_its_reference_and_on_what_the_protocol_says_of_it(

@@ -9,7 +9,10 @@ from contextlib import closing
 import pytest
 
 from rig.daemon.station import Station
+from rig.link import messages as wire
+from rig.link.frames import Decoder
 from rig.session.store import Session
+from sim.board import VirtualBoard
 
 GUARDED = ("bytes", "ping", "reference", "drop", "edge", "identity", "protocol", "run_state")
 
@@ -138,3 +141,24 @@ def test_a_session_without_results_says_how_to_get_them(call, finished, tmp_path
     done = call("replay", session)
     assert done.code == 0
     assert "results: none stored yet; rig analyze keeps them" in done.out
+
+
+def test_a_drop_whose_acknowledgement_was_lost_is_replayed_once(call, tmp_path, fence, monkeypatch):
+    """The host stored it and said so into a dead cable: the next connection says it again."""
+    receive, lost = VirtualBoard.receive, []
+
+    def losing(board, start_ns, data):
+        frames = Decoder().feed(data)
+        if len(lost) < 8 and frames and frames[0].type == wire.CODES[wire.Acknowledge]:
+            lost.append(data)
+        else:
+            receive(board, start_ns, data)
+
+    monkeypatch.setattr(VirtualBoard, "receive", losing)
+    command = ("run", fence, "--port", "sim://", "--session", tmp_path / "s")
+    assert call(*command).code == 4
+    assert len(lost) == 8
+    assert call(*command).code == 0
+    with Session.open(tmp_path / "s", readonly=True) as session:
+        assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1), (2, 1)]
+    assert call("replay", tmp_path / "s").out.splitlines()[0] == "drops: 2 identical"

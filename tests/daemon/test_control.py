@@ -8,6 +8,7 @@ import time
 import pytest
 
 from rig.bench.invariants import broken, longest_on
+from rig.daemon import rpc
 from rig.daemon.faults import ControlError, StoppedError
 from rig.daemon.lease import LEASE_S
 from rig.errors import DeviceError, InputError
@@ -135,6 +136,34 @@ def test_any_client_stops_a_recording_and_what_there_is_is_kept(stand, armed, cl
     assert states(stand)[-1] == (1, 1, "recorded")
     one.close()
     gone_on_with(stand)
+
+
+def test_a_stop_does_not_wait_for_answers_that_are_lost(stand, armed, client):
+    """The board hears and is not heard: what the daemon repeats keeps it armed."""
+    two = client("two")
+    stand.hand("mute 1")
+    time.sleep(0.4)
+    assert list(stand.happened())[-1]["phase"] == Phase.ARMED
+    begun = time.monotonic()
+    two._send(rpc.request("stop", {"reason": "no answer"}, None))
+    assert stand.await_phase(Phase.IDLE) - begun < SOON_S + BUSY_S
+    stand.hand("mute 0")
+    two.stop("answered now")
+    assert states(stand) == [(1, 1, "armed"), (1, 1, "interrupted")]
+
+
+def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(stand, armed, client):
+    one, token = armed
+    two = client("two")
+    stand.hand("mute fall")
+    time.sleep(0.1)
+    one._send(rpc.request("fire", {"token": token}, 99))
+    stand.await_phase(Phase.RECORDING)
+    begun = time.monotonic()
+    two._send(rpc.request("stop", {"reason": "no answer"}, None))
+    assert stand.await_phase(Phase.HOLDING) - begun < SOON_S + BUSY_S
+    stand.await_phase(Phase.IDLE)
+    assert states(stand) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
 
 
 def test_a_stop_ends_a_wait(stand, client):

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from rig.bench.faults import KINDS, NOISE, disturbed
+from rig.bench.faults import CROWD, KINDS, NOISE, OFF_S, disturbed
 from rig.bench.invariants import broken
 from rig.errors import SessionError
 from rig.link.messages import Phase
@@ -15,13 +15,21 @@ from rig.session.store import Session
 
 
 def test_nothing_is_lost_whatever_dies():
-    with ThreadPoolExecutor(len(KINDS) + 1) as pool:
-        noise = pool.submit(disturbed, "daemon", 0, 5, runs=2, dials=NOISE)
-        made = [pool.submit(disturbed, kind, 2, 7, runs=2, longest_s=5.0) for kind in KINDS]
-        for tally in (noise.result(), *(one.result() for one in made)):
+    with ThreadPoolExecutor(len(KINDS) + len(CROWD) + 1) as pool:
+        noise = pool.submit(disturbed, "daemon", 0, 5, runs=1, dials=NOISE)
+        made = [pool.submit(disturbed, kind, 2, 7, runs=1) for kind in KINDS]
+        crowd = [pool.submit(make, 1, 9) for make in CROWD.values()]
+        for tally in (one.result() for one in (noise, *made, *crowd)):
             assert tally.broken == []
-            assert tally.longest_on_s < 0.25
-        assert [one.result().disturbed for one in made] == [2] * len(KINDS)
+            assert max(tally.longest_on_s, tally.off_after_s) < OFF_S
+        assert [sum(one.result().fell_upon.values()) for one in made] == [2] * len(KINDS)
+        assert noise.result().bad_frames > 0
+
+
+def test_nothing_is_lost_with_the_real_firmware():
+    pytest.importorskip("rig_emulator")
+    tally = disturbed("cable", 1, 3, runs=1, board="emu")
+    assert (tally.broken, tally.runs, tally.disturbed) == ([], 1, 1)
 
 
 def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(stand, client):

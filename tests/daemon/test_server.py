@@ -17,14 +17,15 @@ from rig.bench.stand import Stand
 from rig.daemon import rpc
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
+from rig.daemon.doorway import notify_systemd
 from rig.daemon.faults import VersionError
 from rig.daemon.place import default_socket, prepare_folder
-from rig.daemon.server import Server, notify_systemd
+from rig.daemon.server import Server
 from rig.errors import DeviceError, InputError, RigError
 
 _SECTIONS = {
     "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
-    "runs", "control", "clients", "error",
+    "runs", "control", "clients", "error", "release_test",
 }  # fmt: skip
 
 
@@ -158,7 +159,9 @@ def test_a_snapshot_has_every_section_that_is_promised(door):
         client = await AsyncClient.connect(path, "tui")
         await client.subscribe()
         assert set(client.mirror.state) == _SECTIONS
-        assert client.mirror.state["port"] == {"url": "sim://", "simulated": True}
+        assert client.mirror.state["port"] == {
+            "url": "sim://", "simulated": True, "path": "sim://",
+        }  # fmt: skip
         assert client.mirror.state["clients"] == 1
         await client.close()
 
@@ -250,6 +253,22 @@ def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
         assert stand.socket.exists()
         stand.start_daemon()
         stand.client().close()
+
+
+def test_over_tcp_too_a_second_daemon_is_refused_and_a_run_goes_through():
+    with Stand(runs=1) as stand:
+        stand.start_daemon("--tcp")
+        first = stand.daemon
+        for options in (["--tcp"], []):
+            with pytest.raises(DeviceError, match="another daemon answers"):
+                stand.start_daemon(*options)
+            stand.kill(stand.daemon)
+        assert stand.run() == 0
+        assert "through the daemon" in stand.told
+        stand.kill(first)
+        assert stand.socket.with_suffix(".tcp").exists()
+        stand.start_daemon()
+        assert not stand.socket.with_suffix(".tcp").exists()
 
 
 def test_no_daemon_is_said_so(tmp_path):

@@ -57,6 +57,7 @@ def edges(gate, times_s):
                 board_checks.held_drop,
                 board_checks.clock,
                 board_checks.round_trip,
+                board_checks.emergency_stop,
                 board_checks.stuck_gates,
                 board_checks.flickering_gates,
             )
@@ -107,6 +108,18 @@ def test_what_is_well_needs_no_advice(check, facts):
             replace(BOARD, pings=pings(trip_ns=130_000_000)),
             "130.0 ms",
             "busy",
+        ),
+        (
+            board_checks.emergency_stop,
+            replace(BOARD, edges=None, unwatched="it is open", stopped=True),
+            "open",
+            "close it",
+        ),
+        (
+            board_checks.flickering_gates,
+            replace(BOARD, states=GateStates(0, 4)),
+            "gate 2",
+            "clear the beam",
         ),
         (
             board_checks.stuck_gates,

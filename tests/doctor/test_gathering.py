@@ -110,6 +110,7 @@ def test_quiet_gates_are_recorded_and_nothing_is_driven():
     port = port_of(board)
     facts = look_at_board(port, port.clock)
     assert facts.edges == ()
+    assert not facts.stopped
     assert facts.held is None
     assert len(facts.pings) > 30
     assert board.outputs() == 0
@@ -142,6 +143,7 @@ def test_an_open_stop_leaves_a_glance():
     port = port_of(board)
     facts = look_at_board(port, port.clock)
     assert facts.edges is None
+    assert facts.stopped
     assert "emergency stop" in facts.unwatched
 
 

@@ -66,7 +66,7 @@ steps = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(steps, max_size=60).map(b"".join))
 def test_no_input_breaks_the_core_or_holds_the_release(survivor, script):
     assert survivor(script) >= 0

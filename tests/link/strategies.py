@@ -5,7 +5,8 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Event, Raw, Scalar, Tail
+from rig.link.records import Event, Scalar, Tail
+from rig.link.wiretypes import Chars, Raw
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from rig.link import frames
 from rig.link import messages as wire
 from rig.link.cheader import header
-from rig.link.wiretypes import Chars, Raw, Scalar, Tail
+from rig.link.records import Scalar, Tail
+from rig.link.wiretypes import Chars, Raw
 from tests.link.strategies import MESSAGES
 
 COMMITTED = Path(__file__).parents[2] / "firmware/core/wire.h"

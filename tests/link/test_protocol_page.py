@@ -12,8 +12,9 @@ from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import BAUDRATE
+from rig.link.records import Event, Scalar, Tail
 from rig.link.transcript import Transcript
-from rig.link.wiretypes import Chars, Event, Raw, Scalar, Tail
+from rig.link.wiretypes import Chars, Raw
 from rig.records import Drop
 
 PAGE = (Path(__file__).parents[2] / "firmware/PROTOCOL.md").read_text("utf-8")

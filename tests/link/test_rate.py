@@ -111,7 +111,7 @@ SAMPLES = compared(Clock(4, last=100), 4, 50.0)
 RATE = tick_rate(SAMPLES, HZ)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     shift=st.integers(-(10**16), 10**17),
     offset=st.integers(0, 2**32 - 1),

@@ -56,7 +56,6 @@ def test_it_is_the_papers_camera():
     assert (FRAME_RATE_HZ, SPEED_FRAMES) == (480.0, 4)
 
 
-@settings(deadline=None)
 @given(st.floats(0.0, 1.0), RATES)
 def test_the_last_frames_before_the_impact(phase, rate):
     times = frame_times(0.5, phase, rate)
@@ -66,7 +65,6 @@ def test_the_last_frames_before_the_impact(phase, rate):
     assert max(times) <= 0.5
 
 
-@settings(deadline=None)
 @given(SPEEDS, st.floats(-2.0, 2.0), st.floats(0.0, 1.0), RATES)
 def test_a_straight_line_gives_the_exact_speed(speed, separation, phase, rate):
     times = frame_times(0.5, phase, rate)
@@ -76,7 +74,7 @@ def test_a_straight_line_gives_the_exact_speed(speed, separation, phase, rate):
     assert reading.separation_m == pytest.approx(1.0 + separation - speed * phase / rate, abs=1e-13)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(SPEEDS, st.floats(-1.0, 1.0), st.floats(0.01, 0.2))
 def test_a_film_of_straight_lines(speed, parting, separation):
     """V is exact and does not scatter; Δz is half a frame's parting low, spread evenly over one."""
@@ -94,7 +92,7 @@ def test_a_film_of_straight_lines(speed, parting, separation):
     assert seen.separation_bar == pytest.approx(steps / 2, abs=1e-13)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-0.1, 0.1), min_size=4, max_size=4), st.floats(0.0, 1.0))
 def test_the_line_is_that_of_least_squares(heights, phase):
     times = frame_times(0.5, phase)

@@ -83,7 +83,7 @@ def test_the_papers_chain_from_a_nanosecond_to_ten_milliseconds(tau):
     assert_close(end, wanted, 2e-15)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(most=8), ALPHAS, GAMMAS, DROPS, GRAVITIES, CONTACTS, SPEEDS)
 def test_agrees_with_the_reference(chain, alpha, gamma, drop, gravity, tau, speed):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -91,7 +91,7 @@ def test_agrees_with_the_reference(chain, alpha, gamma, drop, gravity, tau, spee
     assert_close(end, superposed_fall(chain.heights, gains, drop, gravity, tau, speed))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(chains(most=6), decades(-250, -12), GAMMAS, DROPS, GRAVITIES, CONTACTS)
 def test_keeps_its_digits_however_small_alpha(chain, alpha, gamma, drop, gravity, tau):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -99,7 +99,7 @@ def test_keeps_its_digits_however_small_alpha(chain, alpha, gamma, drop, gravity
     assert_close(end, superposed_fall(chain.heights, gains, drop, gravity, tau))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(chains(most=6), ALPHAS, GAMMAS, st.floats(0.0, 3.0), decades(-2, 8), SPEEDS)
 def test_keeps_its_digits_where_legs_are_short_against_the_contact_time(
     chain, alpha, gamma, drop, tau, speed
@@ -109,7 +109,7 @@ def test_keeps_its_digits_where_legs_are_short_against_the_contact_time(
     assert_close(end, superposed_fall(chain.heights, gains, drop, GRAVITY, tau, speed))
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.one_of(decades(-9, 6), st.floats(0.5 * _SERIES, 2.0 * _SERIES)))
 def test_series_and_closed_form_of_the_response(x):
     assert_ramp(x)
@@ -156,7 +156,7 @@ def test_first_order_towards_the_discrete_fall(incline):
     assert abs(math.log2(off(0.02)[0] / off(0.01)[0]) - 1.0) > 0.1
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(chains(most=6, mass_decades=0.5), st.floats(0.02, 0.5), st.floats(0.5, 3.0), decades(-3, 1))
 def test_random_chains_come_to_the_discrete_fall(chain, alpha, gamma, drop):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -171,7 +171,7 @@ def test_random_chains_come_to_the_discrete_fall(chain, alpha, gamma, drop):
         assert abs(end.separation_m - instant.separation_m) < 10.0 * instant.speed_m_s * tau
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(decades(-12, 3), decades(-3, 3), decades(-2, 1), st.floats(1e-9, 0.02))
 def test_one_pull_without_gravity(gain, speed, gap, share):
     """Over in time, a pull ΔV that is late by τ leaves Δz = ΔV (d − v τ)/(v + ΔV)."""
@@ -204,7 +204,7 @@ def test_without_pull_the_contact_time_is_nothing():
     assert close(one.speed_m_s, free_fall_speed(PAPERS, DROP, GRAVITY), TIGHT)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, CONTACTS, SPEEDS)
 def test_units_do_not_matter(chain, alpha, gamma, drop, gravity, tau, speed):
     """Four times the gravity in half the time, or sixteen times the size: to the last bit."""

@@ -135,7 +135,7 @@ def test_without_pulls_it_is_free_fall(method):
     assert close(found.fall.time_s, wanted.time_s, 1e-14)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(decades(-9, -1), decades(-9, 0), st.floats(1e-3, 2.0), st.floats(0.1, 5.0))
 def test_random_pulls_by_lsoda(tau, alpha, drop, speed):
     chain = Chain((3.0, 2.0, 1.0, 1.0), (0.0, 0.2, 0.25, 0.9))

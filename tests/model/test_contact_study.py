@@ -56,7 +56,7 @@ def change(measurand, tau, incline_deg=40.0):
     return getattr(end, name) / getattr(instant, name) - 1.0
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_the_discrete_fall_from_gains(chain, alpha, gamma, drop, gravity, speed):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -100,7 +100,7 @@ def test_the_order_is_another_once_they_are_not():
     assert abs(overlapping.speed - 1.0) > 0.1
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(decades(-12, 3), decades(-12, 3), decades(-9, -1), st.floats(-3.0, 3.0), st.floats(1.1, 9.0))
 def test_orders_of_known_powers(separation, speed, tau, power, ratio):
     found = [

@@ -26,7 +26,7 @@ def test_an_even_density_has_its_length_above(length, share, reach):
     assert Exponential(length, 0.0).mass_over_density(z) == z
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(
     decades(-3, 3),
     SHARES,
@@ -69,7 +69,7 @@ def exact_mass_over_density(table, z):
     raise AssertionError
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(tables(), SHARES)
 def test_a_table_is_joined_by_straight_lines(table, share):
     z = share * table.length_m
@@ -79,7 +79,6 @@ def test_a_table_is_joined_by_straight_lines(table, share):
         assert close(table.mass_over_density(kink), wanted, 1e-14)
 
 
-@settings(deadline=None)
 @given(tables(), SHARES, decades(-100, 100))
 def test_the_unit_of_density_does_not_matter(table, share, unit):
     other = Tabulated(table.distances, tuple(unit * value for value in table.densities))

@@ -34,7 +34,7 @@ def check(found, wanted, relative):
     assert close(found.time_s, wanted.time_s, relative)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     decades(-12, 0).filter(lambda alpha: alpha <= 0.5),
     decades(-9, 3),
@@ -156,7 +156,7 @@ def test_a_kinked_density_without_gravity():
     assert close(found.speed_m_s, float(wanted), TIGHT)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.floats(-5.0, 15.0), decades(-3, 1), st.one_of(st.just(0.0), decades(-6, 2)))
 def test_separation_does_not_depend_on_gravity(powers, reach, drop):
     density = Exponential(LENGTH, powers)
@@ -165,7 +165,7 @@ def test_separation_does_not_depend_on_gravity(powers, reach, drop):
     assert close(here.speed_m_s / there.speed_m_s, math.sqrt(9.81 / 1.62), TIGHT)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.floats(-5.0, 10.0), decades(-3, 1), st.one_of(st.just(0.0), decades(-6, 2)))
 def test_a_bottom_heavy_chain_gains_more(powers, reach, drop):
     flat, steep = (ode(Exponential(LENGTH, p), 0.2, reach, drop) for p in (powers, powers + 1.0))

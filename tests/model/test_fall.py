@@ -30,7 +30,7 @@ from tests.model.reference import reference_fall
 TIGHT = 1e-13
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_agrees_with_the_second_implementation(chain, alpha, gamma, drop, gravity, speed):
     end = fall(chain, alpha, gamma, drop, gravity, speed)
@@ -40,7 +40,7 @@ def test_agrees_with_the_second_implementation(chain, alpha, gamma, drop, gravit
     assert close(end.time_s, wanted.time, TIGHT)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(), GAMMAS, DROPS, decades(-200, 3))
 def test_keeps_its_digits_however_small_alpha_and_gravity(chain, gamma, drop, gravity):
     end = fall(chain, 1e-12, gamma, drop, gravity)
@@ -62,7 +62,7 @@ def test_a_long_irregular_chain():
     assert all(close(one, other, TIGHT) for one, other in zip(found, wanted, strict=True))
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(most=6), ALPHAS, GAMMAS, DROPS, decades(-3, 3))
 def test_without_gravity_it_is_a_product_of_speeds(chain, alpha, gamma, drop, start):
     speed, time, before = Fraction(start), Fraction(0), -Fraction(drop)
@@ -87,7 +87,7 @@ def test_without_gravity_or_speed_there_is_no_fall(drop):
         fall(even_chain(3), 0.1, 1.0, drop, 0.0)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(), GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_without_impulse_it_is_free_fall(chain, gamma, drop, gravity, speed):
     end = fall(chain, 0.0, gamma, drop, gravity, speed)
@@ -98,7 +98,7 @@ def test_without_impulse_it_is_free_fall(chain, gamma, drop, gravity, speed):
     assert close(end.speed_m_s, free, TIGHT)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(), GAMMAS, st.data())
 def test_kicks_are_equation_9_to_the_last_digits(chain, gamma, data):
     size = chain.rods
@@ -112,7 +112,7 @@ def test_kicks_are_equation_9_to_the_last_digits(chain, gamma, data):
         assert close(gain, float(impulse / rest), 4e-15)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_hits_tell_the_same_fall(chain, alpha, gamma, drop, gravity, speed):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -136,7 +136,7 @@ def test_hits_tell_the_same_fall(chain, alpha, gamma, drop, gravity, speed):
         assert close(other.speed_before**2, grown, 1e-14)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES)
 def test_separation_is_the_height_at_which_the_twin_still_is(chain, alpha, gamma, drop, gravity):
     end = fall(chain, alpha, gamma, drop, gravity)

@@ -12,7 +12,7 @@ from rig.model.fall import fall
 from tests.model.chains import DROPS, GAMMAS, GRAVITIES, chains, close, even_chain
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(chains(mass_decades=2), GAMMAS, DROPS, GRAVITIES)
 def test_small_alpha_is_linear(chain, gamma, drop, gravity):
     """To first order rod j, struck at free-fall speed V_j, gives ΔV_j (T − t_j) of separation.

@@ -92,7 +92,7 @@ def check(text: str, wanted: tuple[mp.mpf, ...], relative: float) -> None:
         assert close(line[key], value, relative), key
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(scenes())
 def test_a_scene_is_predicted_to_the_last_digits(scene):
     alpha, gamma = scene.coefficients()
@@ -103,7 +103,7 @@ def test_a_scene_is_predicted_to_the_last_digits(scene):
     check(scene.text(), wanted, TIGHT)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(scenes(), decades(0, 3))
 def test_a_scene_in_air_too(scene, terminal):
     alpha, gamma = scene.coefficients()

@@ -189,7 +189,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 @given(st.binary(max_size=300))
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_bytes_give_an_input_error(tmp_path, data):
     path = tmp_path / "any"
     path.write_bytes(data)
@@ -205,7 +205,7 @@ PIECES = [
 
 
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=8))
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
     text = GOOD[:start] + "".join(pieces) + GOOD[start + cut :]
     found = ()

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.beam import NOT_A_ROD, Shadow, receive, union
@@ -36,7 +36,6 @@ shadows = st.lists(
 )
 
 
-@settings(deadline=None)
 @given(shadows)
 def test_union_covers_the_same_instants(given_shadows):
     def dark(things):
@@ -48,7 +47,6 @@ def test_union_covers_the_same_instants(given_shadows):
     assert all(a.end < b.start for a, b in pairwise(merged))
 
 
-@settings(deadline=None)
 @given(shadows)
 def test_union_names_who_begins_and_who_ends(given_shadows):
     for shadow, end_rod in union(given_shadows):
@@ -68,7 +66,6 @@ def test_a_quiet_receiver_shows_every_shadow_exactly():
     ]
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.floats(0, 0.5), st.floats(0, 0.05), st.integers(-1, 30)), max_size=40),
     st.integers(0, 2**32),

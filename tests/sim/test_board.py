@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 import serial
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.link.client import Device
@@ -132,7 +132,6 @@ def test_a_pulse_too_short_to_be_seen_leaves_one_snapshot_of_nothing_new():
     assert take_snapshots(changes, 0, 3, 16e6) == [(16000, 0), (32000, 2)]
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.floats(0, 0.01), st.integers(0, 3)), max_size=60).map(sorted),
     st.integers(0, 15),

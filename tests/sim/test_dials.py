@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 
 import pint
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
@@ -66,7 +66,6 @@ def test_a_dial_with_its_unit_changes_nothing_else(name, text, value):
     assert all(dials[other] == getattr(Dials(), other) for other in dials if other not in UNSET)
 
 
-@settings(deadline=None)
 @given(
     st.sampled_from(
         [(name, unit) for name in TIMES for unit in ("s", "ms", "µs", "ns")]

@@ -166,7 +166,7 @@ def test_hanging_chains_leave_the_beams_free_unless_hung_too_low():
 labels = st.tuples(st.integers(1, 108), st.integers(1, 3))
 
 
-@settings(deadline=None, max_examples=6)
+@settings(max_examples=6)
 @given(st.lists(labels, min_size=1, max_size=3), st.randoms(use_true_random=False))
 def test_a_drop_depends_on_seed_run_and_attempt_alone(asked, order: random.Random):
     lab = ChainLab(UNIFORM, Dials(), 3)
@@ -193,7 +193,7 @@ def test_a_run_the_plan_does_not_have_is_bad_input():
             ask(pack_label(109, 1))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     st.builds(
         Dials,

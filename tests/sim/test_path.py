@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.model.chain import Chain
@@ -37,7 +37,6 @@ def end(path: Path) -> float:
     return path.release_s + path.hits[-1].time_s
 
 
-@settings(deadline=None)
 @given(paths(), st.floats(0, 1))
 def test_height_undoes_time(path, part):
     low, high = path.hit_heights[-1] - 0.3, path.start
@@ -45,7 +44,6 @@ def test_height_undoes_time(path, part):
     assert path.height_at(path.time_at(height)) == pytest.approx(height, abs=1e-12)
 
 
-@settings(deadline=None)
 @given(paths(), st.floats(0, 1.3))
 def test_time_undoes_height(path, part):
     # In the first millisecond the speed is too small for a height to tell the time.
@@ -53,7 +51,6 @@ def test_time_undoes_height(path, part):
     assert path.time_at(path.height_at(time)) == pytest.approx(time, abs=1e-11)
 
 
-@settings(deadline=None)
 @given(paths())
 def test_each_hit_is_on_the_way(path):
     for hit, height in zip(path.hits, path.hit_heights, strict=True):
@@ -62,7 +59,6 @@ def test_each_hit_is_on_the_way(path):
         assert path.height_at(when) == pytest.approx(height, abs=1e-12)
 
 
-@settings(deadline=None)
 @given(paths())
 def test_the_speed_steps_at_each_hit_and_only_there(path):
     g, e = path.gravity, 1e-4
@@ -77,7 +73,6 @@ def test_the_speed_steps_at_each_hit_and_only_there(path):
         assert arriving == pytest.approx(after.speed_before, abs=1e-8)
 
 
-@settings(deadline=None)
 @given(paths(), st.lists(st.floats(-0.5, 1.5), min_size=2).map(sorted))
 def test_it_never_rises_and_hangs_still_before(path, parts):
     span = path.hits[-1].time_s
@@ -86,7 +81,6 @@ def test_it_never_rises_and_hangs_still_before(path, parts):
     assert all(z == path.start for z, part in zip(heights, parts, strict=True) if part <= 0)
 
 
-@settings(deadline=None)
 @given(st.floats(0, 1), st.floats(0.1, 3), st.floats(0.5, 30), st.floats(0, 3))
 def test_free_fall_is_half_g_t_squared(release, start, gravity, since):
     path = Path(release, start, gravity)

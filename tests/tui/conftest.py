@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from rig.bench.stand import Stand
 from tests.tui.lab import Lab, short_folder
 
 if TYPE_CHECKING:
@@ -38,6 +39,16 @@ def lab() -> Iterator[Lab]:
     yield bench
     bench.stop()
     shutil.rmtree(folder)
+
+
+@pytest.fixture
+def wired() -> Iterator[tuple[Stand, Lab]]:
+    """A board behind a cable, and a daemon that owns its port."""
+    with Stand(runs=2, seed=3) as stand:
+        bench = Lab(stand.folder, stand.protocol, str(stand.port))
+        bench.start()
+        yield stand, bench
+        bench.stop()
 
 
 @pytest.fixture

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.tui.actions import ACTIONS
-from rig.tui.app import Options, RigApp
+from rig.tui.app import RigApp
 from rig.tui.flow import Stage
+from rig.tui.options import Options
 from tests.cli.lab import ROOT
 from tests.tui.screen import text_of
 
@@ -84,7 +85,7 @@ class Lab:
         )
         self.daemons.append(daemon)
         assert daemon.stderr is not None
-        assert daemon.stderr.readline().startswith(b"rig daemon: sim://")
+        assert daemon.stderr.readline().startswith(b"rig daemon: ")
 
     def kill(self) -> None:
         """Kill it as a crash would."""
@@ -102,11 +103,19 @@ class Lab:
 
     @asynccontextmanager
     async def operator(
-        self, size: tuple[int, int] = (80, 24), countdown_s: float = 0.2, name: str = ""
+        self,
+        size: tuple[int, int] = (80, 24),
+        countdown_s: float = 0.2,
+        name: str = "",
+        files: tuple[Path, ...] = (),
     ) -> AsyncIterator[Operator]:
         """Sit down at a screen."""
         options = Options(
-            (self.protocol,), self.url, self.session, socket=self.socket, countdown_s=countdown_s
+            files or (self.protocol,),
+            self.url,
+            self.session,
+            socket=self.socket,
+            countdown_s=countdown_s,
         )
         app = RigApp(options, KEYS)
         if name and app.wire:

@@ -47,7 +47,10 @@ def test_f9_always_stops():
         ('note = "escape"', "escape always means STOP"),
         ('note = "k"\nreject = "k"', "reject: k is the key of note"),
         ('note = "x"', "reject has no key left"),
-        ("note", "keys.toml: "),
+        ("note", "keys.toml:1:5: "),
+        ('reject = "r"\n\nfly = "x"', "keys.toml:3: fly"),
+        ('note = "rr"', "keys.toml:1: note: rr is no key"),
+        ('note = "hyper+r,."', "hyper+r is no key"),
     ],
 )
 def test_a_wrong_key_file_says_what_is_wrong(tmp_path, text, said):

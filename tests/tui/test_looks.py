@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 
 from rig.session.store import Session
-from rig.tui.app import Options, RigApp
-from rig.tui.findings import Book
+from rig.tui.app import RigApp
+from rig.tui.book import Book
 from rig.tui.flow import Flow, Stage
+from rig.tui.options import Options
 from rig.tui.plan import Job
 from rig.tui.still import QUIET, Still
 from tests.cli.lab import short
@@ -65,6 +66,6 @@ async def _screen(moment, size, path):
             await pilot.press("n", *"warm")
         before, text = "", text_of(app)
         while before != text:
-            await pilot.pause(0.4)  # figures are drawn at most four times a second
+            await pilot.pause(0.6)  # figures are drawn at most twice a second
             before, text = text, text_of(app)
         return text

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.records import Drop, Edge
 from rig.tui.motion import motions, separation
 from rig.tui.replay import FASTEST, SLOWEST, Player, end_of, lamps_at, until
+from rig.tui.widgets.figure import ticks
 from tests.cli.lab import short
 
 HZ = 1e6
@@ -78,8 +83,15 @@ def test_the_tape_goes_forwards_and_back_at_any_speed():
     player = Player(speed=0.5, playing=True).ticked(0.3, end)
     assert (player.time_s, player.playing) == (0.15, True)
     assert player.ticked(9.0, end) == Player(0, end, 0.5, playing=False)
-    assert player.moved(-1).time_s == pytest.approx(0.14)
-    assert Player().moved(-1).time_s == 0.0
+    assert player.moved(-1, end).time_s == pytest.approx(0.14)
+    assert Player().moved(-1, end).time_s == 0.0
+    assert player.moved(99, end).time_s == end
+    back = player.turned_round()
+    assert back.ticked(0.1, end).time_s == pytest.approx(0.1)
+    assert back.ticked(9.0, end) == Player(0, 0.0, 0.5, playing=False, back=True)
+    assert back.started(end).playing is False
+    assert Player(back=True).started(end).time_s == end
+    assert Player(time_s=end).started(end) == Player(playing=True)
     assert Player().turned(1e9).speed == FASTEST
     assert Player().turned(1e-9).speed == SLOWEST
     assert Player(at=2).other(1, 3) == Player(at=0)
@@ -87,3 +99,12 @@ def test_the_tape_goes_forwards_and_back_at_any_speed():
     assert lamps_at((3, 5), drop, seen).blocked == (3, 5)
     assert lamps_at((3, 5), drop, drop.edges).blocked == (5,)
     assert [lamp.edges for lamp in lamps_at((3, 5), drop, drop.edges).lamps] == [2, 0]
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(0, 12))
+def test_numbers_at_an_axis_are_round_inside_and_not_too_many(low, span, most):
+    found = ticks(low, low + span, most)
+    assert len(found) <= max(1, most) + 1
+    assert all(low - 1e-6 * span <= one <= low + span * (1 + 1e-6) for one in found)
+    gaps = {f"{b - a:.6g}" for a, b in pairwise(found)}
+    assert {gap.lstrip("0.")[:1] for gap in gaps} <= {"1", "2", "5"} or len(found) < 2

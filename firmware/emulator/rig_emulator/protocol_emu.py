@@ -9,7 +9,7 @@ firmware than the built one.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rig.errors import InputError
 from rig_emulator.board import EmulatedBoard
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from rig_emulator.wiring import Wiring
     from sim.board_interface import Board
     from sim.scene import Scene
+
+Made = TypeVar("Made", bound=EmulatedBoard)
 
 _PATIENCE_NS = 10**9  # how far a read without a time-out looks ahead at once
 
@@ -57,7 +59,14 @@ class Serial(EmulatedSerial):
 
 
 def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> EmulatedBoard:
-    """Put a board before a scene.
+    """Put a board before a scene, see `put_before`."""
+    return put_before(scene, wiring, program, baudrate, EmulatedBoard)
+
+
+def put_before(
+    scene: Scene, wiring: Wiring, program: Path, baudrate: int, kind: type[Made]
+) -> Made:
+    """Put a board of some kind before a scene.
 
     Raises
     ------
@@ -74,6 +83,6 @@ def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> 
     if dials.drift or dials.wander:
         raise InputError("emu://: this clock is steady", "drift and wander are dials of sim://")
     ppm = dials.clock * 1e6
-    board = EmulatedBoard(wiring, program, scene.lab, scene.seed, ppm=ppm, baudrate=baudrate)
+    board = kind(wiring, program, scene.lab, scene.seed, ppm=ppm, baudrate=baudrate)
     board.second_ns = scene.second_ns()
     return board

@@ -8,6 +8,7 @@ from textual.content import Content
 
 from rig.report.numbers import fixed
 from rig.tui.screens.page import Page
+from rig.tui.turns import Stage
 from rig.tui.widgets.lamps import LampBoard, named
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
@@ -26,18 +27,22 @@ class DevicePage(Page):
     DEFAULT_CSS = """
     DevicePage #facts { height: auto; padding: 0 1 1 1; }
     DevicePage #wave { height: auto; padding: 1 1 0 1; }
+    DevicePage #release { height: auto; padding: 0 1; }
+    .-low DevicePage #facts { padding: 0 1; }
     """
 
     def compose(self) -> ComposeResult:
         yield Words(id="facts")
         yield LampBoard(id="lamps")
         yield Words(id="wave")
+        yield Words(id="release")
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
         self.query_one("#facts", Words).say_content(_facts(model))
         self.query_one(LampBoard).show(model.protocol, model.lamps, model.now_s)
         self.query_one("#wave", Words).say_content(_wave(model))
+        self.query_one("#release", Words).say_content(_release(model))
 
 
 def _facts(model: Model) -> Content:
@@ -65,6 +70,26 @@ def _facts(model: Model) -> Content:
     return Content("\n").join(
         Content.assemble((f"{name:11}", "bold $primary"), text) for name, text in lines
     )
+
+
+def _release(model: Model) -> Content:
+    """Say what the test of the release saw."""
+    if model.flow.stage is Stage.TESTING:
+        return Content.styled("the release is tested; any key stops", "bold $warning")
+    seen = model.state.section("release_test")
+    if not seen:
+        return Content.styled("Release not tried yet, without chains.", "$foreground 70%")
+    sense = seen["release_sense_s"]
+    felt = "no release sense" if sense is None else f"release sense after {sense * 1e3:.1f} ms"
+    told = f"release driven for {seen['pulse_s'] * 1e3:g} ms, {felt}"
+    gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
+    if not seen["edges"]:
+        return Content.assemble(("✓ ", "bold $success"), f"{told}, and no gate saw anything")
+    where = ", ".join(named(gates, channel) for channel in seen["gates"][:2])
+    return Content.assemble(
+        ("✗ ", "bold $error"), f"{told}, but {seen['edges']} edges at {where}: "
+        "something fell, or the release shakes or disturbs the gates"
+    )  # fmt: skip
 
 
 def _clock(model: Model) -> str:

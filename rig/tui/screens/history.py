@@ -42,6 +42,9 @@ class HistoryPage(Page):
     def __init__(self) -> None:
         super().__init__()
         self.player = Player()
+        self.other: Findings | None = None
+        """Of another session than the one in hand."""
+        self._findings: Findings | None = None
 
     def compose(self) -> ComposeResult:
         yield Words(id="which")
@@ -53,55 +56,78 @@ class HistoryPage(Page):
                 yield Figure(id="z")
                 yield Figure(id="dz")
 
-    def tick(self, seconds: float, findings: Findings | None) -> None:
+    # ------------------------------------------------------------------ the tape
+
+    @property
+    def findings(self) -> Findings | None:
+        """What is played; `None` without a drop."""
+        return self._findings if self._findings and self._findings.jobs else None
+
+    @property
+    def job(self) -> Job | None:
+        """The drop that is played."""
+        found = self.findings
+        return found.jobs[self.player.at % len(found.jobs)] if found else None
+
+    def tick(self, seconds: float) -> None:
         """Let time pass while playing."""
-        if self.player.playing and findings is not None and findings.jobs:
-            self.player = self.player.ticked(seconds, self._end(findings))
+        if self.player.playing:
+            self.player = self.player.ticked(seconds, self._end_s)
 
-    def play(self, findings: Findings | None) -> None:
-        """Play, or stand still; at the end, from the beginning."""
-        if findings is None or not findings.jobs:
-            return
-        player = self.player
-        at_end = player.time_s >= self._end(findings)
-        start = 0.0 if at_end else player.time_s
-        self.player = Player(player.at, start, player.speed, not player.playing)
+    def play(self) -> None:
+        """Play, or stand still; at an end, from the other one."""
+        self.player = self.player.started(self._end_s)
 
-    def _end(self, findings: Findings) -> float:
-        job = self._job(findings)
-        return end_of(findings.drops[job], findings.scales[job].hz)
+    def turn(self, steps: int) -> None:
+        """Go back or on a little."""
+        self.player = self.player.moved(steps, self._end_s)
 
-    def _job(self, findings: Findings) -> Job:
-        return findings.jobs[self.player.at % len(findings.jobs)]
+    def pace(self, factor: float) -> None:
+        """Change the speed."""
+        self.player = self.player.turned(factor)
+
+    def turn_round(self) -> None:
+        """Play in the other direction."""
+        self.player = self.player.turned_round()
+
+    def move(self, by: int) -> None:
+        """Take another drop."""
+        if self.findings:
+            self.player = self.player.other(by, len(self.findings.jobs))
+
+    def choose(self, at: int) -> None:
+        """Take one drop of the list."""
+        self.move(at - self.player.at)
+
+    @property
+    def _end_s(self) -> float:
+        found, job = self.findings, self.job
+        return end_of(found.drops[job], found.scales[job].hz) if found and job else 0.0
+
+    # ------------------------------------------------------------------ drawing
 
     def show(self, model: Model) -> None:
         """Draw the drop at its moment."""
-        findings = model.findings
-        words, z, dz = (
-            self.query_one("#which", Words), self.query_one("#z", Figure),
-            self.query_one("#dz", Figure),
-        )  # fmt: skip
-        numbers = self.query_one("#numbers", Words)
-        if findings is None or not findings.jobs:
-            words.say("No drop is recorded yet.")
-            z.show(None)
-            dz.show(None)
+        self._findings = self.other or model.findings
+        findings, job = self.findings, self.job
+        said = self.query_one("#which", Words)
+        if findings is None or job is None:
+            self._blank()
+            waiting = model.offline and self._findings is None and not model.unreadable
+            said.say(f"Reading the session: {model.read} drops so far …" if waiting
+                     else "No drop is recorded yet. o lists other sessions.")  # fmt: skip
             return
-        job = self._job(findings)
-        if model.blindfold and job == model.flow.job:
-            words.say("This drop is blind: its numbers come with your decision.")
-            numbers.say("")
-            z.show(None)
-            dz.show(None)
+        if model.blindfold and self.other is None and job == model.flow.job:
+            self._blank()
+            said.say("This drop is blind: its numbers come with your decision.")
             return
-        words.say_content(_which(findings, job, self.player))
+        said.say_content(_which(findings, job, self.player))
         drop, hz = findings.drops[job], findings.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
-        channels = tuple(lamp.channel for lamp in model.lamps.lamps) or tuple(
-            gate.channel for gate in findings.protocol.gates.gates
-        ) if findings.protocol.gates else ()  # fmt: skip
-        board = self.query_one(LampBoard)
-        board.show(findings.protocol, lamps_at(channels, drop, seen), 0.0)
+        self.query_one(LampBoard).show(
+            findings.protocol, lamps_at(findings.channels, drop, seen), 0.0
+        )
+        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
         key = (findings.path, job, hz, len(seen))
         if z.wants(key):
             matches = findings.results[job].matches or None
@@ -109,7 +135,13 @@ class HistoryPage(Page):
             first, second = chain_pictures(findings.protocol, run, seen, hz, matches)
             z.show(first, key)
             dz.show(second, key)
-        numbers.say_content(number_table(findings, job, wide=False))
+        self.query_one("#numbers", Words).say_content(number_table(findings, job, wide=False))
+
+    def _blank(self) -> None:
+        self.query_one("#numbers", Words).say("")
+        self.query_one(LampBoard).say("")
+        for name in ("#z", "#dz"):
+            self.query_one(name, Figure).show(None)
 
 
 def _which(findings: Findings, job: Job, player: Player) -> Content:
@@ -117,11 +149,15 @@ def _which(findings: Findings, job: Job, player: Player) -> Content:
     symbol, colour = LOOKS.get(result.verdict, ("?", "$foreground"))
     hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
     place = findings.jobs.index(job) + 1
-    state = "▶ playing" if player.playing else "‖ still"
-    speed = f"×{player.speed:g}" if player.speed >= 1 else f"1/{1 / player.speed:g} of"
+    arrow = "◀" if player.back else "▶"
+    state = f"{arrow} playing" if player.playing else f"‖ still {arrow}"
+    speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} of"
+    stamp = "  ▲ SIMULATED" if findings.simulated else ""
     return Content.assemble(
         (f"drop {place} of {len(findings.jobs)}", "bold $primary"),
         f"  run {job.run}, attempt {job.attempt} · {hung} · ",
         (f"{symbol} {result.verdict}", colour),
-        f"\n{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms",
+        f"\n{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · ",
+        (plain(findings.path.name, 60), "$foreground 70%"),
+        (stamp, "bold $warning"),
     )

@@ -22,3 +22,12 @@ class Page(Vertical):
     def show(self, model: Model) -> None:
         """Draw what holds now; called on the app's tick when something changed."""
         raise NotImplementedError
+
+    def move(self, by: int) -> None:
+        """Go to the previous or next of whatever this page lists."""
+
+    def other_chart(self) -> None:
+        """Show another quantity where there is a choice."""
+
+    def choose(self, at: int) -> None:
+        """Take one line of whatever this page lists."""

@@ -12,8 +12,8 @@ from rig.errors import InputError
 from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.measurable import check_measurable
-from rig.tui.flow import Stage
 from rig.tui.screens.page import Page
+from rig.tui.turns import Stage
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
 
@@ -68,6 +68,10 @@ class ProtocolPage(Page):
             self.chosen = (self.chosen + by) % len(self.files)
             self.query_one(VerticalScroll).scroll_home(animate=False)
 
+    def choose(self, at: int) -> None:
+        """Choose a file by mouse."""
+        self.move(at - self.chosen)
+
     def show(self, model: Model) -> None:
         """Draw the list, and the running session's protocol once there is one."""
         running = model.flow.stage is not Stage.PROTOCOL and model.protocol is not None
@@ -80,7 +84,7 @@ class ProtocolPage(Page):
         rows = []
         for at, file in enumerate(self.files):
             mark = "▸ " if at == self.chosen else "  "
-            press = Style.from_meta({"@click": f"app.choose({at})"})
+            press = Style.from_meta({"@click": f"app.choose('protocol', {at})"})
             style = "bold $primary" if at == self.chosen else "$foreground"
             rows.append(Content.assemble((mark + plain(file.stem, 25), style)).stylize(press))
         if not rows:

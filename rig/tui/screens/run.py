@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.widgets import Digits
 
-from rig.tui.flow import Stage
+from rig.tui.motion import as_table
 from rig.tui.plots import chain_pictures
 from rig.tui.screens.page import Page
+from rig.tui.turns import Stage
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.lamps import LampBoard, named
 from rig.tui.widgets.text import Words
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
 
     from rig.tui.model import Model
+    from rig.tui.plan import Job
 
 _FALLING = (Stage.LIVE, Stage.JUDGING)
 _WAITING = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
@@ -43,6 +46,11 @@ class RunPage(Page):
     .-low RunPage #checks { padding: 0 1; }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._of: Job | None = None
+        self._table = as_table(())  # its edges
+
     def compose(self) -> ComposeResult:
         with Horizontal():
             with Vertical(id="left"):
@@ -59,7 +67,7 @@ class RunPage(Page):
         stage = model.stage
         self.set_class(stage in _FALLING, "-live")
         self.set_class(stage is Stage.COUNTDOWN and model.driving, "-count")
-        self.query_one("#card", Words).say_content(_card(model))
+        self.query_one("#card", Words).say_content(_card(model, low=self.screen.has_class("-low")))
         self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
         checks = self.query_one("#checks", Words)
         checks.say_content(_checks(model))
@@ -75,12 +83,17 @@ class RunPage(Page):
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
         if not z.wants(key):
             return
-        first, second = chain_pictures(model.protocol, model.run, edges, hz, None)
+        if model.job != self._of or len(edges) < len(self._table):
+            self._of, self._table = model.job, as_table(())
+        # Only what is new is taken over: there may be thousands, and they come every tick.
+        self._table = np.concatenate([self._table, as_table(edges[len(self._table) :])])
+        first, second = chain_pictures(model.protocol, model.run, self._table, hz, None)
         z.show(first, key)
         dz.show(second, key)
 
 
-def _card(model: Model) -> Content:
+def _card(model: Model, *, low: bool) -> Content:
+    """Say what to hang where; on a low screen in few lines."""
     run, job, protocol = model.run, model.job, model.protocol
     if job is None or run is None or protocol is None:
         if model.state.runs and model.flow.stage is not Stage.PROTOCOL:
@@ -88,21 +101,20 @@ def _card(model: Model) -> Content:
         return Content("No session is open: choose a protocol first.")
     attempt = f" · attempt {job.attempt}" if job.attempt > 1 else ""
     head = Content.assemble((f"RUN {job.run} of {len(model.state.runs)}{attempt}", "bold $primary"))
-    lines = [head]
-    if run.impact is None:
-        lines += [_fact("let fall", plain(run.free, 40))]
-    else:
-        lines += [_fact("impact side", plain(run.impact, 40))]
-        if run.free is not None:
-            lines += [_fact("free side", plain(run.free, 40))]
-        lines += [_fact("incline", f"{run.incline_deg:g}°")]
+    facts = [("let fall", plain(run.free, 40))]
+    if run.impact is not None:
+        free = [("free side", plain(run.free, 40))] if run.free is not None else []
+        incline = ("incline", f"{run.incline_deg:g}°")
+        facts = [("impact side", plain(run.impact, 40)), *free, incline]
     datum = "contact point" if protocol.surface is not None else "datum of the gates"
-    lines += [_fact("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {datum}")]
-    return Content("\n").join(lines)
+    start = ("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {datum}")
+    width, between = (0, "   ") if low else (12, "\n")
+    hung = Content(between).join(_fact(*fact, width) for fact in facts)
+    return Content("\n").join([head, hung, _fact(*start, width)])
 
 
-def _fact(name: str, value: str) -> Content:
-    return Content.assemble((f"{name:13}", "$foreground 70%"), (value, "bold"))
+def _fact(name: str, value: str, width: int) -> Content:
+    return Content.assemble((f"{name:{width}} ", "$foreground 70%"), (value, "bold"))
 
 
 def _checks(model: Model) -> Content:

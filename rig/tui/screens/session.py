@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from textual.containers import Grid, VerticalScroll
 from textual.content import Content
 
+from rig.analysis.learn import FEWEST
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plan import done, void_counts
-from rig.tui.plots import control_picture, incline_pictures
+from rig.tui.plots import control_pictures, incline_pictures
 from rig.tui.screens.page import Page
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.figure import Figure
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     from rig.tui.state import RunLine
 
 
+_FIGURES = ("separation", "speed", "control", "second")
+
+
 class SessionPage(Page):
     """Plan, results against incline, control chart."""
 
@@ -37,12 +41,17 @@ class SessionPage(Page):
     SessionPage #progress { height: auto; padding: 0 1; }
     SessionPage #plan { height: auto; max-height: 8; padding: 0 1; }
     .-wide SessionPage #plan { max-height: 24; }
-    SessionPage #figures { height: 1fr; grid-size: 2 2; grid-rows: 2fr 1fr; }
+    SessionPage #figures { height: 1fr; grid-size: 2 2; grid-rows: 3fr 2fr; }
     SessionPage #control { column-span: 2; }
     .-low SessionPage #figures { grid-size: 2 1; grid-rows: 1fr; }
-    .-low SessionPage #control { column-span: 1; }
+    .-low SessionPage #control, .-wide SessionPage #control { column-span: 1; }
+    .-wide SessionPage #figures { grid-rows: 1fr 1fr; }
     .-low SessionPage #plan { max-height: 5; }
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._chart = 0
 
     def compose(self) -> ComposeResult:
         yield Words(id="progress")
@@ -52,26 +61,39 @@ class SessionPage(Page):
             yield Figure(id="separation")
             yield Figure(id="speed")
             yield Figure(id="control")
+            yield Figure(id="second")
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
         self.query_one("#progress", Words).say_content(_progress(model))
         self.query_one("#lines", Words).say_content(_plan(model))
-        figures = [self.query_one(name, Figure) for name in ("#separation", "#speed", "#control")]
+        figures = [self.query_one(f"#{name}", Figure) for name in _FIGURES]
         findings = model.findings
         if findings is None:
             for figure in figures:
                 figure.show(None)
             return
         hidden = model.job.run if model.blindfold and model.job else None
-        key = (findings.path, findings.reading, hidden)
+        key = (findings.path, findings.reading, hidden, self._chart)
         if not any(figure.wants(key) for figure in figures):
             return
-        pictures = incline_pictures(findings, hidden)
-        low = self.screen.has_class("-low")  # no room for both; Δz says more
-        figures[0].show(pictures[0] if pictures else None, key)
-        figures[1].show(pictures[1] if len(pictures) > 1 and not low else None, key)
-        figures[2].show(control_picture(findings, hidden), key)
+        low, wide = self.screen.has_class("-low"), self.screen.has_class("-wide")
+        means, charts = incline_pictures(findings, hidden), control_pictures(findings, hidden)
+        turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
+        shown = {
+            "separation": means[:1],
+            "speed": means[1:2] if not low else [],  # no room for both; Δz says more
+            "control": turned[:1],
+            "second": charts[:2][1:] if wide else [],
+        }
+        if wide:
+            shown["control"] = charts[:1]
+        for figure, name in zip(figures, _FIGURES, strict=True):
+            figure.show(next(iter(shown[name]), None), key)
+
+    def other_chart(self) -> None:
+        """Show the other quantity in the control chart."""
+        self._chart += 1
 
     def move(self, by: int) -> None:
         """Scroll the plan."""
@@ -94,6 +116,7 @@ def _progress(model: Model) -> Content:
     return Content.assemble(
         ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
         (f"  {over} of {len(runs)} runs", "bold"), f"{left}  ", (session, "$foreground 60%"),
+        _taught(model),
     )  # fmt: skip
 
 
@@ -106,10 +129,19 @@ def _plan(model: Model) -> Content:
     lines = []
     for incline, group in groupby(ordered, key=lambda line: line.incline_deg):
         lines.append(_incline(incline, list(group), summary.get(incline, {}), model))
-    if summary:
-        note = "means of drops analysed one by one; rig analyze adjusts all of them together"
-        lines.append(Content.styled(note, "$foreground 60%"))
     return Content("\n").join(lines)
+
+
+def _taught(model: Model) -> tuple[str, str]:
+    """Say whether the drops have taught each other what they have in common."""
+    findings = model.findings
+    if findings is None or model.blindfold or not findings.analysis["summary"]:
+        return "", ""
+    more = " · learning from the newest …" if findings.lagging else ""
+    if findings.learned:
+        return f"\nafter learning from {findings.learned} runs{more}", "$foreground 70%"
+    few = f"; they teach each other from {FEWEST} good ones on" if not more else ""
+    return f"\neach drop by itself{few}{more}", "$foreground 70%"
 
 
 def _incline(

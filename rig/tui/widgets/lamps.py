@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _WIDE, _SHORT = 50, 34
 """Widths of one lamp with all words, and with the needed ones."""
+_MOST = 8
+"""Lamps above each other: more would not fit a low screen."""
 
 
 class LampBoard(Words):
@@ -34,21 +36,22 @@ def board(protocol: Protocol | None, lamps: Lamps, now_s: float, width: int) -> 
     if protocol is None or protocol.gates is None:
         return Content("no gates in this scene")
     by_channel = {lamp.channel: lamp for lamp in lamps.lamps}
-    sides = [gates for gates in (protocol.gates.on("impact"), protocol.gates.on("free")) if gates]
-    column = width // len(sides)
-    rows: list[Content] = []
-    titles = [f"{gates[0].side} side" for gates in sides]
-    rows.append(Content.assemble(*[(title.ljust(column), "bold") for title in titles]))
-    ordered = [sorted(gates, key=lambda gate: -gate.height) for gates in sides]
-    for at in range(max(map(len, ordered))):
-        parts = []
-        for gates in ordered:
-            if at < len(gates):
-                parts.append(_lamp(gates[at], by_channel.get(gates[at].channel), lamps, now_s,
-                                   column))  # fmt: skip
-            else:
-                parts.append(Content(" " * column))
-        rows.append(Content.assemble(*parts))
+    columns: list[tuple[str, list[Gate]]] = []
+    for side in ("impact", "free"):
+        gates = sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
+        for begin in range(0, len(gates), _MOST):
+            title = "" if begin else f"{side} side"
+            columns.append((title, gates[begin : begin + _MOST]))
+    wide = width // len(columns)
+    rows = [Content.styled("".join(title.ljust(wide) for title, _ in columns).rstrip(), "bold")]
+    for at in range(max(len(gates) for _, gates in columns)):
+        cells = [
+            _lamp(gates[at], by_channel.get(gates[at].channel), lamps, now_s, wide)
+            if at < len(gates)
+            else Content(" " * wide)
+            for _, gates in columns
+        ]
+        rows.append(Content.assemble(*cells))
     return Content("\n").join(rows)
 
 

@@ -6,13 +6,18 @@ from typing import TYPE_CHECKING
 
 from textual.containers import Vertical
 from textual.content import Content
+from textual.style import Style
 
+from rig.tui.actions import shown_key
 from rig.tui.model import alarm
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from textual.app import ComposeResult
+    from textual.geometry import Size
 
     from rig.tui.model import Model
 
@@ -26,8 +31,11 @@ _NAMES = {
 class Status(Vertical):
     """One line, and below it what is wrong with what to do."""
 
+    SCOPED_CSS = False  # how much is shown depends on the screen
     DEFAULT_CSS = """
     Status { dock: top; height: auto; }
+    Status #tabs { height: 1; padding: 0 1; background: $panel; display: none; }
+    .-high Status #tabs { display: block; }
     Status #headline { height: 1; padding: 0 1; background: $panel; }
     Status #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
                     background: $error 20%; color: $foreground; }
@@ -35,17 +43,30 @@ class Status(Vertical):
 
     def compose(self) -> ComposeResult:
         yield Words(id="headline")
+        yield Words(id="tabs")
         yield Words(id="alarm")
 
-    def show(self, model: Model, page: str, width: int) -> None:
+    def show(self, model: Model, page: str, keys: Mapping[str, str], size: Size) -> None:
         """Draw what holds now."""
-        self.query_one("#headline", Words).say_content(headline(model, page, width - 2))
+        self.query_one("#headline", Words).say_content(headline(model, page, size.width - 2))
+        self.query_one("#tabs", Words).say_content(tabs(page, keys))
         wrong = alarm(model)
         box = self.query_one("#alarm", Words)
         box.display = wrong is not None
         if wrong is not None:
             hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
             box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
+
+
+def tabs(page: str, keys: Mapping[str, str]) -> Content:
+    """Name every page with its key; each can be clicked."""
+    parts: list[Content] = []
+    for name in _NAMES:
+        press = Style.from_meta({"@click": f"app.do('page_{name}')"})
+        text = f" {shown_key(keys[f'page_{name}'])} {name} "
+        look = "bold $background on $primary" if name == page else "$foreground 80%"
+        parts += [Content.styled(text, look).stylize(press), Content(" ")]
+    return Content.assemble(*parts)
 
 
 def headline(model: Model, page: str, width: int) -> Content:

@@ -9,7 +9,8 @@ from textual.content import Content
 from textual.style import Style
 
 from rig.tui.actions import ACTIONS, OFFLINE, possible, shown_key
-from rig.tui.flow import BEFORE_RELEASE, Stage
+from rig.tui.flow import BEFORE_RELEASE
+from rig.tui.turns import Stage
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
@@ -29,7 +30,12 @@ _GO_ON = {
     Stage.DONE: "what is left",
 }
 _PAGES = tuple(action.name for action in ACTIONS if action.name.startswith("page_"))
-_HISTORY = ("play", "earlier", "later", "slower", "faster", "previous", "next")
+_OF_PAGE = {
+    "history": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "sessions"),
+    "device": ("go_on", "wave", "release_test"),
+    "session": ("go_on", "control_chart", "again"),
+}
+"""What is wanted most on some pages."""
 
 
 class StopBar(Vertical):
@@ -64,12 +70,9 @@ class StopBar(Vertical):
 
 def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Content:
     """Write as many keys as fit, the most wanted first."""
-    names = [*_FIRST]
-    if page == "history":
-        names = [*_HISTORY]
-    if page == "device":
-        names.insert(1, "wave")
-    names += [*_ALWAYS, *_PAGES]
+    first = _OF_PAGE.get(page, ())
+    flow = () if page == "history" else _FIRST
+    names = dict.fromkeys((*first, *flow, *_ALWAYS, *_PAGES))
     parts: list[Content] = []
     used = 0
     by_name = {action.name: action for action in ACTIONS}
@@ -85,8 +88,10 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
             break
         used += len(text) + 2
         press = Style.from_meta({"@click": f"app.do('{name}')"})
-        key, _, rest = text.partition(" ")
-        parts += [Content.styled(key, "bold $primary"), Content.assemble((f" {rest}  ", press))]
+        key, _, said = text.partition(" ")
+        parts += [
+            Content.assemble((key, "bold $primary"), f" {said}").stylize(press), Content("  ")
+        ]  # fmt: skip
     return Content.assemble(*parts)
 
 
@@ -102,6 +107,7 @@ def _label(name: str, label: str, model: Model) -> str:
 
 def _doing(model: Model) -> str:
     words = {
+        Stage.TESTING: "RELEASE TEST; any key stops",
         Stage.SETTLING: "chains come to rest; any key stops",
         Stage.ARMING: "arming; any key stops",
         Stage.COUNTDOWN: "ARMED; any key stops" if model.driving else "ARMED by another client",

@@ -30,7 +30,17 @@ class Words(Static):
         self.say_content(Content.assemble(*parts))
 
     def say_content(self, content: Content) -> None:
-        """Show content, unless it is there already."""
+        """Show content, unless it is there already; places everything anew only if it must."""
         if self._said is None or not self._said.is_same(content):
+            same = self._said is not None and self._fits(self._said) and self._fits(content)
+            same = same and _lines(self._said) == _lines(content)
             self._said = content
-            self.update(content)
+            self.update(content, layout=not same)
+
+    def _fits(self, content: Content) -> bool:
+        """Whether no line is broken."""
+        return max(map(len, content.plain.split("\n"))) < self.size.width
+
+
+def _lines(content: Content | None) -> int:
+    return 0 if content is None else content.plain.count("\n")

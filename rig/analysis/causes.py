@@ -1,0 +1,139 @@
+"""Every edge that is not as it should be, named one by one.
+
+What an edge is depends on its neighbours: an expected one that nobody reported left no trace, or
+drowned in a shadow that ran into the next; a reported one that belongs to no rod is part of a
+flicker, a string in a gap, a rod that bounced back, or something else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from rig.analysis.align import EXTRA, MISSED
+from rig.analysis.trains import QUICK
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.fit import Fit
+    from rig.analysis.learn import Taught
+    from rig.analysis.trains import Side, Train
+    from rig.analysis.trajectory import Trajectory
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+
+Kind = Literal["missed", "merged", "dead gate", "chatter", "string", "bounce", "extra"]
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One edge that is missing or belongs to no rod.
+
+    Attributes
+    ----------
+    kind
+        ``missed``: the rod left no trace; ``merged``: its shadow ran into a neighbour's; ``dead
+        gate``: nothing came from there. ``chatter``: of a flicker about a rod's edge; ``string``: a
+        flicker between rods; ``bounce``: a shadow in the lowest beam after a rod has struck;
+        ``extra``: none of these.
+    channel
+        Of the gate.
+    time_s
+        When it came or should have come, s since the release fired.
+    blocked
+        The state after it.
+    rod
+        Whose edge it is; `None` for what is no rod.
+    edge
+        Its number in the drop; `None` for what did not come.
+    cost
+        What it cost the matching, in units of ½ (residual/scale)², see `rig.analysis.align`.
+    """
+
+    kind: Kind
+    channel: int
+    time_s: float
+    blocked: bool
+    rod: int | None
+    edge: int | None
+    cost: float
+
+    def json(self) -> dict[str, Any]:
+        """One member of ``causes``."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+
+def causes(drop: Fit | Taught) -> tuple[Cause, ...]:
+    """Name everything that is not as it should be, in order of time.
+
+    Parameters
+    ----------
+    drop
+        As adjusted, by itself or with the session.
+    """
+    model, x = drop.model, drop.x
+    assert model.protocol.gates is not None
+    clock = 1.0 + float(x[model.unknowns["clock"]][0])
+    found: list[Cause] = []
+    for role, side in model.sides.items():
+        path = model.trajectory(role, x)
+        lowest = min(model.protocol.gates.gates[train.gate].height for train in side.trains)
+        for train, levels, match in zip(
+            side.trains, model.levels(role, x), drop.matches[role], strict=True
+        ):
+            gate = model.protocol.gates.gates[train.gate]
+            if (match < 0).any():
+                found += _absent(gate.channel, train, match, path.times(levels) / clock)
+            if train.times.size > (match >= 0).sum():
+                after = _first_hit(side, path) / clock if gate.height == lowest else np.inf
+                found += _surplus(gate.channel, train, match, after)
+    return tuple(sorted(found, key=lambda cause: cause.time_s))
+
+
+def _first_hit(side: Side, path: Trajectory) -> float:
+    """When the first rod strikes, s; never on the free side."""
+    return float(path.time[1]) if side.ratios is not None else np.inf
+
+
+def _absent(channel: int, train: Train, match: Index, expected: Array) -> Iterator[Cause]:
+    """Expected edges that nobody reported."""
+    for at in np.flatnonzero(match < 0).tolist():
+        blocks, when = bool(train.blocks[at]), float(expected[at])
+        yield Cause(_why(train, when), channel, when, blocks, int(train.rods[at]), None, MISSED)
+
+
+def _why(train: Train, when: float) -> Kind:
+    """Say why there is no edge, by the level that the gate kept.
+
+    While a rod leaves no trace the beam stays bright, while a gap leaves none it stays dark.
+    """
+    if not train.times.size:
+        return "dead gate"
+    before = int(np.searchsorted(train.times, when))
+    dark = bool(train.blocked[before - 1]) if before else False
+    return "merged" if dark else "missed"
+
+
+def _surplus(channel: int, train: Train, match: Index, hit: float) -> Iterator[Cause]:
+    """Reported edges that belong to no rod."""
+    rods = np.full(train.times.size, -1)
+    rods[match[match >= 0]] = train.rods[match >= 0]
+    flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
+    for at in np.flatnonzero(rods < 0).tolist():
+        when, blocked = float(train.times[at]), bool(train.blocked[at])
+        near = rods[(flicker == flicker[at]) & (rods >= 0)]
+        kind: Kind = "extra"
+        if near.size:
+            kind = "chatter"
+        elif train.burst[at] > 0.0:
+            kind = "string"
+        elif when > hit:
+            kind = "bounce"
+        rod = int(near[0]) if near.size else None
+        yield Cause(kind, channel, when, blocked, rod, int(train.edge[at]), EXTRA)

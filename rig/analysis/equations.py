@@ -1,0 +1,108 @@
+"""One side's observation equations, and the edges they are made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.trains import Train
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Index = NDArray[np.intp]
+
+
+class Equations(NamedTuple):
+    """Observation equations of one side, one a matched edge.
+
+    Attributes
+    ----------
+    residuals
+        Where the beam saw the rod's side less where the beam is, m.
+    slopes
+        Derivatives by the unknowns that this side knows of, shape ``(edges, columns)``.
+    sigma
+        Standard deviation of each residual, m.
+    speed
+        Of the chain at each edge, m/s.
+    clean
+        Whether each edge is no part of a flicker.
+    columns
+        Which unknowns these are; shape ``(columns,)``.
+    unknowns
+        Number of all.
+    """
+
+    residuals: Array
+    slopes: Array
+    sigma: Array
+    speed: Array
+    clean: Flags
+    columns: Index
+    unknowns: int
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivatives by all unknowns, shape ``(edges, unknowns)``."""
+        found = np.zeros((self.residuals.size, self.unknowns))
+        found[:, self.columns] = self.slopes
+        return found
+
+
+class Expected(NamedTuple):
+    """All gates of a side one after another.
+
+    Attributes
+    ----------
+    times, burst
+        Of every observed edge, see `rig.analysis.trains.Train`.
+    rods, gate, levels
+        Of every expected edge.
+    sign
+        By how much its height follows the rods' width: −½ where it darkens the beam, else ½.
+    turn
+        Which way its rod is tilted: +1 for even rods, −1 for odd ones.
+    begins, ends
+        Number of observed edges before each gate, and of expected ones after each but the last.
+    """
+
+    times: Array
+    burst: Array
+    rods: Index
+    gate: Index
+    levels: Array
+    sign: Array
+    turn: Array
+    begins: Index
+    ends: Index
+
+    @classmethod
+    def of(cls, trains: Sequence[Train]) -> Expected:
+        """Join the gates of a side."""
+        observed = np.array([train.times.size for train in trains])
+        expected = [train.rods.size for train in trains]
+        rods = np.concatenate([train.rods for train in trains])
+        return cls(
+            np.concatenate([train.times for train in trains]),
+            np.concatenate([train.burst for train in trains]),
+            rods,
+            np.repeat([train.gate for train in trains], expected),
+            np.concatenate([train.levels for train in trains]),
+            np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
+            np.where(rods % 2, -1.0, 1.0),
+            np.cumsum(observed) - observed,
+            np.cumsum(expected)[:-1],
+        )
+
+    def chosen(self, matches: Sequence[Index]) -> tuple[Index, Index]:
+        """Expected edges that are matched, and the observed edge of each."""
+        match = np.concatenate(matches)
+        begins = np.repeat(self.begins, [one.size for one in matches])
+        pick = np.flatnonzero(match >= 0)
+        return pick, (match + begins)[pick]

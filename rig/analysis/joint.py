@@ -1,0 +1,132 @@
+"""One Gauss–Newton step of many drops together, each one's own unknowns eliminated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rig.analysis.normal import STRAY, Normal, normal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.drop_model import DropModel
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+    Matches = dict[str, list[Index]]
+
+
+@dataclass(slots=True)
+class Joint:
+    """One drop on the way.
+
+    Attributes
+    ----------
+    model, matches, x
+        Its equations and unknowns.
+    own, common, here
+        As in `rig.analysis.learn.Taught`.
+    centre
+        Prior means of its own unknowns, zero if not given.
+    part
+        Its equations at the last step.
+    """
+
+    model: DropModel
+    matches: Matches
+    x: Array
+    own: Index
+    common: Index
+    here: Index
+    centre: Array | None = None
+    part: Part | None = None
+
+
+class Part(NamedTuple):
+    """A drop's equations with its own unknowns o eliminated, all in units of prior uncertainties.
+
+    Attributes
+    ----------
+    inverse
+        A⁻¹ of the drop's own unknowns, prior included.
+    gain
+        G = A⁻¹B: o = o₀ − G c.
+    reduced, vector
+        What the drop says of c: N_cc − BᵀG, and the right-hand side.
+    own
+        o₀.
+    """
+
+    inverse: Array
+    gain: Array
+    reduced: Array
+    vector: Array
+    own: Array
+
+
+def joint_step(
+    drops: Sequence[Joint], x: Array, sd: Array, centre: Array | None = None
+) -> tuple[Array, Array, list[Normal]]:
+    """Take one Gauss–Newton step of all drops together; moves their own unknowns in place.
+
+    Parameters
+    ----------
+    x, sd
+        Common unknowns and their prior uncertainties.
+    centre
+        Prior means of the common unknowns, zero if not given.
+
+    Returns
+    -------
+    covariance, step
+        Of the common unknowns, in units of `sd`.
+    normals
+        Of each drop, where the step began.
+    """
+    total = np.eye(x.size)
+    vector = scaled(-x if centre is None else centre - x, sd)
+    normals = []
+    for drop in drops:
+        found = normal(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=STRAY)
+        drop.part = part = _eliminate(drop, found)
+        total[np.ix_(drop.here, drop.here)] += part.reduced
+        vector[drop.here] += part.vector
+        normals.append(found)
+    covariance = np.linalg.inv(total).astype(np.float64, copy=False)
+    step = covariance @ vector
+    for drop in drops:
+        assert drop.part is not None
+        scale = drop.model.unknowns.sd[drop.own]
+        drop.x[drop.own] += scale * (drop.part.own - drop.part.gain @ step[drop.here])
+        drop.x[drop.common] = (x + step * sd)[drop.here]
+    return covariance, step, normals
+
+
+def _eliminate(drop: Joint, found: Normal) -> Part:
+    """Solve for the drop's own unknowns, given the common ones."""
+    own, common = drop.own, drop.common
+    sd = drop.model.unknowns.sd
+    inverse = np.linalg.inv(found.matrix[np.ix_(own, own)] + np.eye(own.size)).astype(
+        np.float64, copy=False
+    )
+    cross = found.matrix[np.ix_(own, common)]
+    gain = inverse @ cross
+    off = drop.x[own] if drop.centre is None else drop.x[own] - drop.centre
+    pull = -found.vector[own] - scaled(off, sd[own])
+    return Part(
+        inverse,
+        gain,
+        found.matrix[np.ix_(common, common)] - cross.T @ gain,
+        -found.vector[common] - gain.T @ pull,
+        inverse @ pull,
+    )
+
+
+def scaled(x: Array, sd: Array) -> Array:
+    """In units of the prior uncertainty; what is known exactly stays."""
+    return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)

@@ -1,0 +1,158 @@
+"""What it changes which chain strikes: paired differences over blocks of A, B, B, A.
+
+The mean of runs 1 and 4 less that of runs 2 and 3 is free of any drift that is linear in time, and
+of everything that both chains have in common. Half of the release skew's difference goes with the
+chains; what stays when they change places goes with the sides.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.result import GOOD, Measured
+from rig.protocol.plan import runs as planned_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rig.analysis.result import DropResult
+    from rig.protocol.scene import Protocol
+
+SIGNS = (0.5, -0.5, -0.5, 0.5)
+"""Of the four runs of a block, in the difference."""
+MEANS = (0.25, 0.25, 0.25, 0.25)
+"""The same in the mean."""
+_REST = np.array([-1.0, 3.0, -3.0, 1.0])
+_CHAIN = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
+_SIDE = ("release_skew_s",)
+_CHAINS_OWN = ("rod places", "rod width")  # lines of a budget that are not the same for both
+
+Block = tuple["DropResult", "DropResult", "DropResult", "DropResult"]
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """Effects at one incline.
+
+    Attributes
+    ----------
+    first, second
+        The chains: A and B.
+    blocks
+        Number of complete blocks of good runs.
+    chain
+        By JSON name: the quantity when the first chain strikes less that when the second does.
+    side
+        By JSON name: what stays when the chains change places, where without any effect of the
+        sides there would be nothing: how much later the free side lets go.
+    """
+
+    incline_deg: float
+    first: str
+    second: str
+    blocks: int
+    chain: Mapping[str, Measured]
+    side: Mapping[str, Measured]
+
+    def json(self) -> dict[str, Any]:
+        """One member of ``effects``."""
+        return {
+            "incline_deg": self.incline_deg,
+            "chains": [self.first, self.second],
+            "blocks": self.blocks,
+            "chain": {name: found.json() for name, found in self.chain.items()},
+            "side": {name: found.json() for name, found in self.side.items()},
+        }
+
+
+def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects, ...]:
+    """Find the effects of chains and sides at each incline.
+
+    Parameters
+    ----------
+    results
+        The last attempt at each run; blocks that lack a good one do not count.
+
+    Returns
+    -------
+    tuple of Effects
+        In order of incline; none where the plan is no ABBA or one chain does everything.
+    """
+    if protocol.plan.order != "ABBA" or len(protocol.chains) < 2 or protocol.surface is None:
+        return ()
+    first, second = list(protocol.chains)[:2]
+    good = {result.run.number: result for result in results if result.verdict in GOOD}
+    planned: dict[float, list[int]] = {}
+    for run in planned_runs(protocol):
+        planned.setdefault(run.incline_deg, []).append(run.number)
+    found = []
+    for incline, numbers in sorted(planned.items()):
+        blocks = _blocks([good.get(number) for number in numbers], first)
+        if blocks:
+            names = [name for name in _CHAIN if name in blocks[0][0].quantities]
+            chain = {name: _contrast(blocks, name, SIGNS) for name in names}
+            side = {name: _contrast(blocks, name, MEANS) for name in _SIDE if name in names}
+            found.append(Effects(incline, first, second, len(blocks), chain, side))
+    return tuple(found)
+
+
+def _blocks(runs: Sequence[DropResult | None], first: str) -> list[Block]:
+    """Cut an incline's runs in fours, and keep those that are whole."""
+    found = []
+    for at in range(0, len(runs) - 3, 4):
+        one, two, three, four = runs[at : at + 4]
+        if one is None or two is None or three is None or four is None:
+            continue
+        struck = [run.run.impact == first for run in (one, two, three, four)]
+        if struck == [True, False, False, True]:  # all runs shuffled leave no blocks
+            found.append((one, two, three, four))
+    return found
+
+
+def _contrast(blocks: Sequence[Block], name: str, signs: Sequence[float]) -> Measured:
+    """Average a weighted sum over blocks.
+
+    Its uncertainty is the scatter between blocks and within them, or what the runs' own
+    uncertainties make of it where that is larger, and what blocks share and the weights do not
+    cancel. Degrees of freedom are effective ones (GUM G.4).
+    """
+    weights = np.array(signs)
+    measured = [[run.quantities[name] for run in block] for block in blocks]
+    runs = np.array([[one.value for one in block] for block in measured])
+    values = runs @ weights
+    n = len(blocks)
+    size = float(weights @ weights)
+    # Within a block one sum is left that knows of no chain and no linear drift.
+    squares = float(np.sum((values - values.mean()) ** 2))
+    squares += size * float(np.sum((runs @ _REST) ** 2)) / float(_REST @ _REST)
+    seen = math.sqrt(squares / (2 * n - 1))
+    common = _common(measured, weights)
+    owns = [one.u**2 - _shared(one) ** 2 for block in measured for one in block]
+    own = math.sqrt(max(0.0, fmean(owns)) * size)
+    single = max(own, seen) / math.sqrt(n)
+    u = math.hypot(single, common)
+    degrees = (2 * n - 1) * (u / single) ** 4 if seen > own else math.inf
+    return Measured(float(values.mean()), u, degrees, {"runs": single, "common": common})
+
+
+def _common(measured: Sequence[Sequence[Measured]], weights: np.ndarray) -> float:
+    """What the blocks share, as far as the weights do not cancel it."""
+    vectors = [[one.shared for one in block] for block in measured]
+    if all(one is not None for block in vectors for one in block):
+        mean = np.mean(np.array(vectors, dtype=float), axis=0)
+        return float(np.linalg.norm(weights @ mean))
+    # Of runs by themselves only the sources are known; of these, two chains share none.
+    each = fmean(_shared(one) ** 2 for block in measured for one in block)
+    return math.sqrt(each) * math.hypot(weights[0] + weights[3], weights[1] + weights[2])
+
+
+def _shared(one: Measured) -> float:
+    """What of a run's uncertainty other runs share, as far as it does not cancel."""
+    if one.shared is not None:
+        return float(np.linalg.norm(one.shared))
+    return math.hypot(*(one.budget.get(name, 0.0) for name in _CHAINS_OWN))

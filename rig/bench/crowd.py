@@ -1,0 +1,110 @@
+"""Clients that get into each other's way: two that want control at once, some that never read."""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.bench.invariants import broken, longest_on
+from rig.bench.stand import Stand
+from rig.bench.tally import Tally
+from rig.daemon import rpc
+from rig.errors import DeviceError
+
+if TYPE_CHECKING:
+    from rig.bench.stand import Process
+
+_RUNS = 2
+_DEAF = 4  # clients that never read, in each session
+_ASKED = 20_000  # snapshots, by each of them, as far as it may
+_GROWTH = 24 << 20
+"""Bytes by which a daemon may grow in a session, whoever does not read."""
+
+
+def raced(count: int, seed: int, board: str = "sim") -> Tally:
+    """Start two runners at once on one session, so many times.
+
+    Parameters
+    ----------
+    count, seed, board
+        As for `rig.bench.faults.disturbed`.
+    """
+    tally = Tally()
+    for n in range(count):
+        with Stand(_RUNS, seed + n, board=board) as stand:
+            stand.start_daemon()
+            runners = [stand.start_runner() for _ in range(2)]
+            told = [_ended(one) for one in runners]
+            codes = sorted(code for code, _ in told)
+            refused = any("has control" in said for _, said in told)
+            # One that comes late finds the session finished, and has nothing to do.
+            if codes not in ([0, DeviceError.exit_code], [0, 0]) or (codes[1] and not refused):
+                tally.broken.append(f"both or none of two runners: {told}")
+            tally.disturbed += bool(codes[1])
+            _look(stand, tally)
+    return tally
+
+
+def deaf(count: int, seed: int, board: str = "sim") -> Tally:
+    """Make sessions beside clients that ask for everything and never read.
+
+    Parameters
+    ----------
+    count, seed, board
+        As for `rig.bench.faults.disturbed`.
+    """
+    tally = Tally()
+    for n in range(count):
+        with Stand(_RUNS, seed + n, board=board) as stand, ExitStack() as lines:
+            stand.start_daemon()
+            stand.client().close()
+            before = _most_memory(stand.daemon)
+            for _ in range(_DEAF):
+                _ask_and_never_read(lines.enter_context(socket.socket(socket.AF_UNIX)), stand)
+                tally.disturbed += 1
+            if (code := stand.run()) != 0:
+                tally.broken.append(f"a runner ended with {code}: {stand.told}")
+            tally.memory_bytes = max(tally.memory_bytes, _most_memory(stand.daemon) - before)
+            if tally.memory_bytes > _GROWTH:
+                tally.broken.append(f"the daemon grew by {tally.memory_bytes} bytes")
+            _look(stand, tally)
+    return tally
+
+
+def _ended(runner: Process) -> tuple[int, str]:
+    try:
+        _, told = runner.communicate(timeout=120)
+    except subprocess.TimeoutExpired:
+        runner.kill()
+        return -1, "it does not end"
+    return runner.returncode, told
+
+
+def _look(stand: Stand, tally: Tally) -> None:
+    happened = list(stand.happened())
+    tally.broken += broken(stand.session, happened, stand.runs)
+    tally.longest_on_s = max(tally.longest_on_s, longest_on(happened))
+    tally.sessions += 1
+    tally.runs += stand.runs
+    tally.drops += sum("drop" in seen for seen in happened)
+
+
+def _ask_and_never_read(line: socket.socket, stand: Stand) -> None:
+    line.connect(str(stand.socket))
+    line.sendall(rpc.request("hello", {"api": rpc.API, "client": "deaf"}, 1))
+    line.settimeout(0.2)
+    with suppress(TimeoutError):  # the daemon does not take more than it can answer
+        line.sendall(rpc.request("subscribe", {}, 2) * _ASKED)
+
+
+def _most_memory(process: Process | None) -> int:
+    """Give the largest resident size of a process so far, bytes (proc(5), VmHWM)."""
+    assert process is not None
+    status = Path(f"/proc/{process.pid}/status").read_text("ascii")
+    found = re.search(r"VmHWM:\s+(\d+) kB", status)
+    assert found is not None
+    return int(found[1]) * 1024

@@ -1,0 +1,117 @@
+"""Accuracy over many rigs: falls straight from the simulation into the analysis, without a device.
+
+Drops on one rig share errors, so many rigs with few drops each tell most about intervals. The
+simulation runs in a process of its own and hands over edges; what is true goes to the tally alone.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from itertools import groupby
+from pathlib import Path
+from subprocess import PIPE, Popen
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.drop import TimeScale
+from rig.analysis.session import analyze
+from rig.bench.accuracy import Tally
+from rig.bench.dials import with_setting
+from rig.errors import RigError
+from rig.protocol import reader
+from rig.protocol.plan import runs
+from rig.records import Drop, Edge
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from rig.protocol.scene import Protocol
+
+BLOCK = 4
+"""Drops in a block: A, B, B, A."""
+HZ = 16_000_000
+CLOCK_U = 1e-6
+"""How well the time scale is known, relative: a few minutes of clock samples."""
+
+
+def quick_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
+    """Simulate and analyse one short session on each of many rigs: one block of drops.
+
+    Parameters
+    ----------
+    protocol
+        The protocol file.
+    url
+        ``sim://``, with dials if wanted. Those of the clock and the line change nothing here.
+    rigs
+        How many, with `BLOCK` drops each.
+
+    Returns
+    -------
+    dict
+        As `rig.bench.accuracy.Tally.json` gives it.
+
+    Raises
+    ------
+    RigError
+        The simulation gave up.
+    """
+    scene = reader.read(protocol)
+    tally = Tally()
+    source = with_setting(url, "protocol", str(Path(protocol).resolve()))
+    for seed, told in _falls(source, _sessions(scene, rigs)):
+        begin = time.perf_counter()
+        _session(scene, seed, told, tally)
+        tally.seconds.append(time.perf_counter() - begin)
+    return tally.json()
+
+
+def _sessions(protocol: Protocol, rigs: int) -> list[list[int]]:
+    """Choose the runs of each rig: a whole block, and over the rigs all of the plan's alike."""
+    by_incline: dict[float, list[int]] = {}
+    for run in runs(protocol):
+        by_incline.setdefault(run.incline_deg, []).append(run.number)
+    most = max(map(len, by_incline.values()))
+    blocks = [
+        numbers[first : first + BLOCK]
+        for first in range(0, most, BLOCK)
+        for numbers in by_incline.values()
+        if numbers[first : first + BLOCK]
+    ]
+    return [blocks[rig % len(blocks)] for rig in range(rigs)]
+
+
+def _falls(url: str, sessions: Sequence[Sequence[int]]) -> Iterator[tuple[int, list[Any]]]:
+    """Let the simulation make the drops of one rig after another."""
+    seeds = list(range(1, len(sessions) + 1))
+    command = [sys.executable, "-m", "sim.edges", url, json.dumps(seeds), json.dumps(sessions)]
+    with Popen(command, stdout=PIPE, text=True) as simulation:  # noqa: S603 - our own
+        assert simulation.stdout is not None
+        lines = map(json.loads, simulation.stdout)
+        for seed, told in groupby(lines, key=lambda line: int(line["seed"])):
+            yield seed, list(told)
+    if simulation.returncode:
+        raise RigError(f"the simulation {url} ended with exit code {simulation.returncode}")
+
+
+def _session(protocol: Protocol, seed: int, told: Iterable[dict[str, Any]], tally: Tally) -> None:
+    """Analyse one rig's drops and judge the results."""
+    # A calibration is off by chance, as far as it says.
+    known = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
+    scale = TimeScale(float(known), CLOCK_U)
+    drops, truths = [], {}
+    for one in told:
+        truth = one["truth"]
+        edges = tuple(Edge(round(when * HZ), channel, dark) for when, channel, dark in one["edges"])
+        drops.append(Drop(truth["run"], truth["attempt"], HZ, edges))
+        truths[truth["run"], truth["attempt"]] = truth
+    by_key = {(drop.run, drop.attempt): drop for drop in drops}
+    begin = time.process_time()
+    found = analyze(protocol, drops, lambda _: scale)
+    tally.analysis_s += time.process_time() - begin
+    for result in (*found.runs, *found.superseded):
+        key = result.run.number, result.attempt
+        tally.add(protocol, result, by_key[key], scale.hz, truths[key])

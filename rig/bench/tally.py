@@ -1,0 +1,62 @@
+"""What happened to sessions that were disturbed, counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(slots=True)
+class Tally:
+    """What happened.
+
+    Attributes
+    ----------
+    disturbed
+        How often.
+    fell_upon
+        How often upon each of `rig.bench.moments.STATES`.
+    sessions, runs, drops
+        Finished, done, and recorded (an attempt more for each that was spoiled).
+    frames, bad_frames
+        Received by the host, and those of them that the line had garbled.
+    longest_on_s, off_after_s
+        The longest time the release was on for certain; the longest after a disturbance that
+        something was armed or on for certain.
+    memory_bytes
+        By how much a daemon grew while somebody did not read what it sent.
+    full_disk
+        What stood for a full disk, see `rig.bench.small_disk.SmallDisk`.
+    broken
+        Promises that were not kept, see `rig.bench.invariants.broken`.
+    """
+
+    disturbed: int = 0
+    fell_upon: Counter[str] = field(default_factory=Counter)
+    sessions: int = 0
+    runs: int = 0
+    drops: int = 0
+    frames: int = 0
+    bad_frames: int = 0
+    longest_on_s: float = 0.0
+    off_after_s: float = 0.0
+    memory_bytes: int = 0
+    full_disk: str = ""
+    broken: list[str] = field(default_factory=list)
+
+    def add(self, other: Tally) -> None:
+        """Take another tally's counts."""
+        for name in ("disturbed", "sessions", "runs", "drops", "frames", "bad_frames"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name in ("longest_on_s", "off_after_s", "memory_bytes"):
+            setattr(self, name, max(getattr(self, name), getattr(other, name)))
+        self.full_disk = self.full_disk or other.full_disk
+        self.fell_upon += other.fell_upon
+        self.broken += other.broken
+
+    def json(self) -> dict[str, Any]:
+        """Counts by name."""
+        return {name: getattr(self, name) for name in self.__slots__} | {
+            "fell_upon": dict(self.fell_upon)
+        }

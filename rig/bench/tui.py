@@ -1,0 +1,209 @@
+"""What the screen costs: its share of a core, how late it is, and when it is there.
+
+The real program in a real terminal: ``rig tui`` as a process of its own behind a pseudo-terminal, a
+client of a daemon's server, whose view is told of edges as by a board's stream. The share is
+processor time, which other programs on the machine do not change; lateness does depend on them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import os
+import pty
+import re
+import select
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Self
+
+from rig.bench.link import cpu_s
+from rig.daemon.client import Client
+from rig.daemon.server import Server
+from rig.daemon.view import View
+from rig.link.messages import Fired
+from rig.link.transcript import Received
+from rig.session.schema import RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+RATE = 5000.0
+"""Edges a second."""
+SIZE = (120, 36)
+_LASTING_S = 8.0
+_TOGETHER_S = 0.01  # a board sends what waited for so long
+_GATES = 16
+_TICK_HZ = 16_000_000
+_THERE = b"STOP"
+_COUNTED = re.compile(rb"FALLING  (\d+) edges")
+_PATIENCE_S = 60.0
+
+
+class Terminal:
+    """A terminal with ``rig tui`` in it.
+
+    Parameters
+    ----------
+    socket
+        Of the daemon.
+
+    Attributes
+    ----------
+    written
+        What the program wrote, and when, s (monotonic).
+    """
+
+    def __init__(self, socket: Path) -> None:
+        self.written: list[tuple[float, bytes]] = []
+        self._far, near = pty.openpty()
+        columns, rows = SIZE
+        fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        self.begun = time.monotonic()
+        self.process = subprocess.Popen(  # noqa: S603 - our own program
+            [sys.executable, "-m", "rig", "tui", "--socket", str(socket)],
+            stdin=near,
+            stdout=near,
+            stderr=near,
+            start_new_session=True,
+            env=os.environ | {"TERM": "xterm-256color", "OPENBLAS_NUM_THREADS": "1"},
+        )
+        os.close(near)
+        self._over = threading.Event()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.process.terminate()
+        self.process.wait()
+        self._over.set()
+        self._reader.join()
+        os.close(self._far)
+
+    def press(self, keys: bytes) -> None:
+        """Press keys."""
+        os.write(self._far, keys)
+
+    def until(self, text: bytes) -> float:
+        """Wait until something was written; return when, s (monotonic)."""
+        end = time.monotonic() + _PATIENCE_S
+        while time.monotonic() < end:
+            for at, data in list(self.written):
+                if text in data:
+                    return at
+            time.sleep(0.01)
+        raise TimeoutError(f"{text!r} does not appear on the screen")
+
+    def _read(self) -> None:
+        while not self._over.is_set():
+            if select.select([self._far], [], [], 0.05)[0]:
+                try:
+                    self.written.append((time.monotonic(), os.read(self._far, 1 << 16)))
+                except OSError:
+                    return  # it has left
+
+
+def tui(protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
+    """Measure the first paint, a quiet screen, and one of a drop with `RATE` edges a second.
+
+    Parameters
+    ----------
+    protocol
+        File with the scene.
+    say
+        Narration.
+    """
+    with TemporaryDirectory(prefix="rig-") as folder:
+        return asyncio.run(_measure(Path(folder), str(Path(protocol).resolve()), say))
+
+
+async def _measure(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
+    loop = asyncio.get_running_loop()
+    server, ready = Server("sim://", folder / "door" / "rig.sock"), asyncio.Event()
+    serving = loop.create_task(server.run(ready.set))
+    await ready.wait()
+    try:
+        return await loop.run_in_executor(None, _in_terminal, folder, protocol, server, say)
+    finally:
+        server.end()
+        await serving
+
+
+def _in_terminal(
+    folder: Path, protocol: str, server: Server, say: Callable[[str], None]
+) -> dict[str, Any]:
+    client = Client(server.path, "bench")
+    client.take_control()
+    client.open_session(protocol, str(folder / "bench.session"))
+    try:
+        with Terminal(server.path) as terminal:
+            say("first paint …")
+            there = terminal.until(_THERE)
+            first = {"wall_s": there - terminal.begun, "cpu_s": cpu_s(terminal.process.pid)}
+            terminal.until(b"clear")  # the session is read, and shown
+            time.sleep(2.0)
+            say("a quiet screen …")
+            quiet = _share(terminal, lambda: time.sleep(_LASTING_S / 2))
+            say(f"{RATE:.0f} edges a second …")
+            shown = len(terminal.written)
+            sent: list[tuple[float, int]] = []
+            live = _share(terminal, lambda: _feed(server, sent))
+            return {
+                "first_paint": first,
+                "quiet_cpu": quiet,
+                "edges_per_s": sent[-1][1] / (sent[-1][0] - sent[0][0]),
+                "live_cpu": live,
+                **_lateness(terminal.written[shown:], sent, live),
+            }
+    finally:
+        client.close()
+
+
+def _share(terminal: Terminal, work: Callable[[], object]) -> float:
+    """Processor time of the screen's process over time gone by."""
+    before, begun = cpu_s(terminal.process.pid), time.monotonic()
+    work()
+    return (cpu_s(terminal.process.pid) - before) / (time.monotonic() - begun)
+
+
+def _feed(server: Server, sent: list[tuple[float, int]]) -> None:
+    """Let a drop's edges come as a stream; note how many there were when, s (monotonic)."""
+    view = View(server.hub)
+    view.state(1, 1, RunState.ARMED, ())
+    view.know(Received(0, 1, Fired(0)))
+    begun, count = time.monotonic(), 0
+    while (now := time.monotonic() - begun) < _LASTING_S:
+        wanted = int(now * RATE)
+        server.hub.edges(
+            (round(n / RATE * _TICK_HZ), n % _GATES, n // _GATES % 2) for n in range(count, wanted)
+        )
+        count = wanted
+        sent.append((time.monotonic(), count))
+        time.sleep(_TOGETHER_S)
+
+
+def _lateness(
+    written: Sequence[tuple[float, bytes]], sent: Sequence[tuple[float, int]], share: float
+) -> dict[str, Any]:
+    """Compare the counts on the screen with those that were true then."""
+    late: list[float] = []
+    for at, data in written:
+        for told in _COUNTED.findall(data):
+            newer = next((when for when, count in sent if count > int(told)), at)
+            late.append(max(0.0, at - newer))
+    late.sort()
+    frames = len(late) / _LASTING_S
+    return {
+        "frames_per_s": frames,
+        "cpu_per_frame_s": share / frames,
+        "lag_s": {"median": late[len(late) // 2], "p99": late[len(late) * 99 // 100]},
+    }

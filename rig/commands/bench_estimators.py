@@ -1,0 +1,57 @@
+"""``rig bench estimators``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from rig.bench.estimators import as_json, estimators
+from rig.commands.output import print_json, say
+from rig.files import make_folder, write_atomic
+from rig.report.columns import Column
+from rig.report.estimators import estimators_figure
+from rig.report.table import aligned
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+_COLUMNS = (
+    Column("estimator", lambda one: one["name"], numeric=False),
+    Column("M", lambda one: f"{one['trials']:.0e}" if one["trials"] else ""),
+    Column("runs", lambda one: str(one["runs"])),
+    Column("ms per run", lambda one: f"{1e3 * one['seconds']:.3g}" if one["seconds"] else ""),
+    Column("Δz rms (mm)", lambda one: f"{1e3 * one['separation_rms_m']:.3f}"),
+    Column("median", lambda one: f"{1e3 * one['separation_median_m']:.3f}"),
+    Column("V rms (mm/s)", lambda one: f"{1e3 * one['speed_rms_m_s']:.2f}"),
+    Column("median", lambda one: f"{1e3 * one['speed_median_m_s']:.2f}"),
+)  # fmt: skip
+
+
+def main(arguments: Namespace) -> int:
+    """Measure every estimator on the same drops."""
+    folder = make_folder(arguments.output)
+    found, left_out = estimators(
+        arguments.protocol,
+        arguments.port,
+        arguments.seed,
+        arguments.repeats,
+        arguments.budget,
+        say,
+    )
+    whole = as_json(found, left_out)
+    table = io.StringIO()
+    writer = csv.DictWriter(table, list(asdict(found[0])), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(whole["estimators"])
+    write_atomic(folder / "estimators.csv", table.getvalue())
+    write_atomic(folder / "estimators.json", json.dumps(whole, indent=2, ensure_ascii=False))
+    write_atomic(folder / "estimators.svg", estimators_figure(whole["estimators"]))
+    if arguments.json:
+        print_json(whole)
+    else:
+        lines = ["SIMULATED DATA", *aligned(_COLUMNS, whole["estimators"])]
+        print("\n".join([*lines, *(f"left out: {one}" for one in left_out)]))
+    return 0

@@ -1,0 +1,115 @@
+"""``rig design``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.components import STATED
+from rig.commands.output import print_json, say
+from rig.design.cases import beams_of, cases
+from rig.design.outlook import outlook
+from rig.design.readable import readable
+from rig.design.search import better, room
+from rig.errors import InputError
+from rig.estimate.coefficients import KNOWN
+from rig.protocol import reader
+from rig.protocol.measurable import check_measurable
+from rig.report.design import design_text
+from rig.units import Dimension, UnitError, parse
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Sequence
+
+    from rig.analysis.components import Components
+    from rig.design.outlook import Outlook
+    from rig.protocol.scene import Protocol, Side
+
+SPACING_M = 0.01
+
+
+def main(arguments: Namespace) -> int:
+    """Predict what a layout will tell, and look for a better one."""
+    protocol = reader.read(arguments.protocol)
+    check_measurable(protocol)
+    there = beams_of(protocol)
+    if arguments.repeats is not None:
+        protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
+    components = STATED if arguments.learned is None else _learned(arguments.learned)
+    limits = room(
+        protocol,
+        _length("--lowest", arguments.lowest),
+        _length("--highest", arguments.highest),
+        _length("--spacing", arguments.spacing) or SPACING_M,
+    )
+    if limits.lowest > limits.highest:
+        raise InputError("--lowest is above --highest", "the highest is where the top rod hangs")
+    found: dict[str, Any] = {
+        "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
+        "scatter": "stated" if arguments.learned is None else "learned",
+        "current": _said(protocol, there, components),
+    }
+    if not arguments.no_search:
+        proposed = better(protocol, components, limits, say)
+        found["proposed"] = _said(protocol, proposed, components)
+    if arguments.json:
+        print_json(found)
+    else:
+        print(design_text(found))
+    return 0
+
+
+def _learned(path: str) -> Components:
+    """How much everything scatters, as an earlier session of the same rig taught."""
+    from rig.results import detailed  # noqa: PLC0415 - only with --learned
+    from rig.session.store import Session  # noqa: PLC0415
+
+    with Session.open(path, readonly=True) as session:
+        lesson = detailed(session)[0].lesson
+    if lesson is None:
+        raise InputError(f"{path}: too few good drops to learn from", "leave out --learned")
+    return lesson.components
+
+
+def _length(option: str, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        value = parse(text, Dimension.LENGTH).value
+    except UnitError as error:
+        raise InputError(f"{option}: {error}") from None
+    if value <= 0.0:
+        raise InputError(f"{option}: {text} is not above zero")
+    return value
+
+
+def _said(
+    protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
+) -> dict[str, Any]:
+    assert protocol.gates is not None
+    expected: Outlook = outlook(
+        protocol, cases(protocol, beams, components), range(len(beams)), sure=True
+    )
+    return {
+        "gates": [
+            {"channel": gate.channel, "side": side, "height_m": height}
+            for gate, (side, height) in zip(protocol.gates.gates, beams, strict=True)
+        ],
+        "readable": readable(protocol, beams),
+        "measurands": [
+            {
+                "name": name,
+                "u_run": expected.typical(name),
+                "inclines": [
+                    {"incline_deg": incline, "u_run": u, "u_mean": expected.mean[name][incline]}
+                    for incline, u in single.items()
+                ],
+            }
+            for name, single in expected.single.items()
+        ],
+        "coefficients": [
+            {"name": name, "u": u, "identified": u <= KNOWN}
+            for name, u in expected.coefficients.items()
+        ],
+    }

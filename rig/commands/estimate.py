@@ -1,0 +1,35 @@
+"""``rig estimate``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.commands.output import print_json, progress, say
+from rig.estimate.session import estimate
+from rig.files import make_folder, write_atomic
+from rig.report.estimate import estimate_text
+from rig.results import detailed, protocol_of
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Estimate the parameters of the impacts from a session."""
+    with Session.open(arguments.session, readonly=True) as session:
+        analysis, _ = detailed(session, progress("analysing run"))
+        found = {"simulated": session.simulated}
+        found |= estimate(protocol_of(session), analysis)
+    if arguments.json:
+        print_json(found)
+    else:
+        print(estimate_text(found))
+    if arguments.output is not None:
+        from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
+
+        folder = make_folder(arguments.output)
+        for name, picture in estimate_pictures(found).items():
+            write_atomic(folder / f"{name}.svg", picture.svg)
+            say(f"{folder / name}.svg")
+    return 0

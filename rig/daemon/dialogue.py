@@ -1,0 +1,66 @@
+"""A client's side of the conversation with a daemon; without any I/O."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from rig.daemon import rpc
+from rig.errors import DeviceError
+
+
+class Dialogue:
+    """Numbers requests, and finds messages in the bytes that come."""
+
+    def __init__(self) -> None:
+        self._number = 0
+        self._rest = bytearray()  # of a line that has not ended yet
+
+    def ask(self, method: str, params: dict[str, Any]) -> tuple[int, bytes]:
+        """Write a request; give its number, which the answer will have, too."""
+        self._number += 1
+        return self._number, rpc.request(method, params, self._number)
+
+    def feed(self, data: bytes) -> list[dict[str, Any]]:
+        """Take the next bytes, none for the end, and give the messages that are whole.
+
+        Raises
+        ------
+        DeviceError
+            It hung up, or is no daemon of this rig.
+        """
+        if not data:
+            raise gone("it hung up")
+        self._rest += data
+        if b"\n" not in data:
+            lines: list[bytearray] = []
+        else:
+            *lines, self._rest = self._rest.split(b"\n")
+        try:
+            messages = [json.loads(line) for line in lines]
+        except ValueError:
+            messages = [None]
+        if len(self._rest) > rpc.MESSAGE_LIMIT or not all(isinstance(m, dict) for m in messages):
+            raise DeviceError("what answers there is no daemon of this rig")
+        return messages
+
+
+def hello(name: str, token: str) -> dict[str, Any]:
+    """Give the parameters of the first request, see API.md.
+
+    Parameters
+    ----------
+    name
+        What others are told of this client.
+    token
+        From `rig.daemon.place.reach`.
+    """
+    return {"api": rpc.API, "client": name} | ({"token": token} if token else {})
+
+
+def gone(why: object) -> DeviceError:
+    """Make the error that says that a daemon is gone."""
+    return DeviceError(
+        f"the daemon is gone: {why}",
+        "start it again (rig daemon), then give the same command: a drop that fell is fetched",
+    )

@@ -1,0 +1,108 @@
+"""Where a board is now: found again by its serial number, and never taken for another one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import DeviceError
+from rig.usb.listing import path_of, serial_number_at, serial_ports
+
+if TYPE_CHECKING:
+    from rig.link.messages import Identity
+
+SERIAL_NUMBER = "usb_serial_number"
+"""In a session's record of who was there."""
+
+
+class Home:
+    """The port that was named, and the board that was met there.
+
+    Parameters
+    ----------
+    url
+        The port, as the user named it.
+
+    Attributes
+    ----------
+    now
+        Where the board is: the port's name until the board comes back at another one.
+    serial_number
+        Its USB serial number; `None` while unknown, of boards without one and of URLs.
+    bound
+        Whether it must be this board: a session's clock and held drop are one board's.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self.now = url
+        self.serial_number: str | None = None
+        self.bound = False
+        self._unique_id: bytes | None = None
+
+    def look(self) -> str:
+        """Find where the board is now.
+
+        Returns
+        -------
+        str
+            What to open; the name that was given when the board is nowhere to be seen.
+
+        Raises
+        ------
+        DeviceError
+            Another board is at the port that was named, or several have this serial number.
+        """
+        self.now = self.url
+        if self.serial_number is None:
+            return self.now
+        ports = serial_ports()
+        there = serial_number_at(self.url, ports)
+        if there == self.serial_number:
+            return self.now
+        if (found := path_of(self.serial_number, ports)) is not None:
+            self.now = found
+        elif there is not None and self.bound:
+            raise _stranger(f"serial number {there}, not {self.serial_number}", self.url)
+        return self.now
+
+    def seek(self, serial_number: str | None) -> None:
+        """Look for a board that was met in another life, unless something is where the user said.
+
+        Parameters
+        ----------
+        serial_number
+            The board's, as far as it is known.
+        """
+        if self._unique_id is None and "://" not in self.url and not Path(self.url).exists():
+            self.serial_number = serial_number
+
+    def meet(self, identity: Identity) -> dict[str, str]:
+        """Take note of who answers at `now`.
+
+        Returns
+        -------
+        dict
+            What else is known of it, for the record.
+
+        Raises
+        ------
+        DeviceError
+            It is not the board that it must be.
+        """
+        if self.bound and self._unique_id not in {None, identity.unique_id}:
+            raise _stranger(
+                f"id {identity.unique_id.hex()}, not {(self._unique_id or b'').hex()}", self.now
+            )
+        self._unique_id = identity.unique_id
+        if "://" not in self.now:
+            self.serial_number = serial_number_at(self.now)
+        return {} if self.serial_number is None else {SERIAL_NUMBER: self.serial_number}
+
+
+def _stranger(which: str, where: str) -> DeviceError:
+    return DeviceError(
+        f"another board is at {where} ({which})",
+        "plug the board of this session in again; to go on with this one, give the same rig run "
+        "command again",
+    )

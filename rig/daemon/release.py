@@ -1,0 +1,97 @@
+"""The release driven once with nothing hung from it: a drop of no run, of which only bytes stay."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from rig.daemon.faults import StoppedError
+from rig.errors import DeviceError
+from rig.link.messages import TEST_RUN, Phase, pack_label
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rig.daemon.station import Station
+    from rig.protocol.scene import Protocol
+
+_LABEL = pack_label(TEST_RUN, 1)
+_TIMEOUT_MS = 1000  # it is fired at once, or never
+_AFTER_MS = 500  # what falls or trembles because of the pulse has been seen by then
+
+
+def drive(station: Station, protocol: Protocol, halted: Callable[[], bool]) -> dict[str, Any]:
+    """Arm and fire with the protocol's pulse, and look what the gates see of it.
+
+    Parameters
+    ----------
+    station
+        Connected, with nothing armed.
+    protocol
+        Its gates and its release.
+    halted
+        Asked all the time whether everything shall be off.
+
+    Returns
+    -------
+    dict
+        The section `release_test` of the daemon's state, see rig/daemon/API.md.
+
+    Raises
+    ------
+    DeviceRefusedError
+        A gate is blocked, the release is too warm, the emergency stop is open, a drop is held.
+    StoppedError
+        It was stopped; the release is off.
+    """
+    device, release = station.device, protocol.release
+    pulse_ms = round(release.pulse * 1e3)
+    with station.interrupts.held():
+        token = device.arm(
+            label=_LABEL,
+            gates=protocol.gates.mask if protocol.gates else 0,
+            release=1 << release.channel,
+            pulse_us=round(release.pulse * 1e6),
+            timeout_ms=_TIMEOUT_MS,
+            record_ms=pulse_ms + _AFTER_MS,
+        )
+        try:
+            station.interrupts.check()
+            _insist(not halted())
+            device.fire(token)
+            drop = device.collect(_LABEL, stop=halted)
+        except BaseException:
+            with suppress(DeviceError):
+                device.abort()
+                forget(station)
+            raise
+        forget(station)
+    _insist(not halted())
+    sensed = drop.certificate.release_sense if drop.certificate else None
+    return {
+        "pulse_s": release.pulse,
+        "release_sense_s": None if sensed is None else sensed / drop.tick_hz,
+        "edges": len(drop.edges),
+        "gates": sorted({edge.channel for edge in drop.edges}),
+        "faults": list(drop.faults),
+    }
+
+
+def forget(station: Station) -> None:
+    """Let the device forget a test's drop, when it holds one: it would forbid the next."""
+    device = station.device
+    with station.interrupts.held():
+        state = device.status()
+        if state.label != _LABEL or state.phase not in {Phase.RECORDING, Phase.HOLDING}:
+            return
+        if state.phase is Phase.RECORDING:
+            device.abort()
+        certificate = device.collect(_LABEL, timeout=0.0).certificate
+        if certificate is not None:
+            device.acknowledge(_LABEL, certificate.crc32)
+        device.status()  # whoever watches sees that it is at rest again
+
+
+def _insist(wanted: bool) -> None:
+    if not wanted:
+        raise StoppedError("the test of the release was stopped", "the release is off")

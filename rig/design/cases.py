@@ -1,0 +1,286 @@
+"""Drops as they would fall, and what each beam would say of their unknowns."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.drop_model import DropModel
+from rig.analysis.pattern import Guess
+from rig.analysis.quantities import measurands
+from rig.analysis.shared import Shared
+from rig.analysis.sides import sides_of
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.errors import InputError
+from rig.model.rods import rod_impacts
+from rig.protocol.plan import runs
+from rig.protocol.scene import Gate, Gates, Run
+from rig.records import Drop
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.components import Components
+    from rig.analysis.trains import Side, Train
+    from rig.protocol.scene import Protocol
+    from rig.protocol.scene import Side as Role
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+
+CLOCK_U = 1e-6
+"""Of a board's rate after some minutes of comparing it with the computer's clock, relative."""
+_CHANCE = ("impulses", "hang")
+RELEASE_S = 0.02
+"""After the release fired; any will do."""
+_BEAMS = ("beams", "ripple")
+BEAM = len(_BEAMS)
+"""Unknowns that a beam has for itself: its height, and how far off the rods' middle it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """What one beam says of one drop: JᵀWJ in units of prior uncertainties.
+
+    Attributes
+    ----------
+    columns
+        Unknowns of the drop that it knows of.
+    matrix
+        Over these and the beam's own.
+    """
+
+    columns: Index
+    matrix: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One kind of drop: an incline, and which chain strikes.
+
+    Attributes
+    ----------
+    run, count
+        A run of this kind, and how many the plan has.
+    own, struck
+        Number of unknowns of the drop alone, α left out, and of α: 1 where something is struck.
+    here
+        Place of each of the others in the session's vector, beams left out.
+    by_chance
+        Of a drop's own unknowns those that differ from run to run: single impulses, hanging height.
+    gradients
+        Of each measurand by all these unknowns: own, common, α.
+    blocks
+        One a beam.
+    """
+
+    run: Run
+    count: int
+    own: int
+    struck: int
+    here: Index
+    by_chance: Index
+    gradients: dict[str, Array]
+    blocks: tuple[Block, ...]
+
+    @property
+    def core(self) -> int:
+        """Number of unknowns that are no beam's."""
+        return self.own + self.here.size + self.struck
+
+
+@dataclass(frozen=True, slots=True)
+class Cases:
+    """All kinds of drop of a plan.
+
+    Attributes
+    ----------
+    cases
+        In order of incline.
+    shared
+        Number of unknowns that all drops have in common, beams left out.
+    """
+
+    cases: tuple[Case, ...]
+    shared: int
+
+
+def beams_of(protocol: Protocol) -> list[tuple[Role, float]]:
+    """Side and height of each beam of a protocol.
+
+    Raises
+    ------
+    InputError
+        Where it has none.
+    """
+    if protocol.gates is None:
+        raise InputError(
+            f"{protocol.source} has no gates", "add the gates that are there, at any heights"
+        )
+    return [(gate.side, gate.height) for gate in protocol.gates.gates]
+
+
+def with_beams(protocol: Protocol, beams: Sequence[tuple[Role, float]]) -> Protocol:
+    """The protocol with these beams instead of its own."""
+    assert protocol.gates is not None
+    gates = tuple(Gate(n, height, side) for n, (side, height) in enumerate(beams))
+    return replace(protocol, gates=Gates(gates, protocol.gates.height_u))
+
+
+def cases(
+    protocol: Protocol,
+    beams: Sequence[tuple[Role, float]],
+    components: Components,
+    inclines: Sequence[float] | None = None,
+) -> Cases:
+    """Work out what beams at these heights say of every kind of drop.
+
+    Parameters
+    ----------
+    protocol
+        The scene and its plan; where its gates are does not matter.
+    beams
+        Side and height of each.
+    components
+        How much everything scatters.
+    inclines
+        Only these, if given.
+
+    """
+    protocol = with_beams(protocol, beams)
+    planned = [run for run in runs(protocol) if inclines is None or run.incline_deg in inclines]
+    kinds = Counter((run.incline_deg, run.impact, run.free) for run in planned)
+    first = {(run.incline_deg, run.impact, run.free): run for run in reversed(planned)}
+    models = {kind: _model(protocol, first[kind], components) for kind in sorted(kinds, key=str)}
+    shared = Shared(model for model, _ in models.values())
+    kept = np.ones(len(shared), dtype=np.bool_)
+    for name in _BEAMS:
+        if name in shared.blocks:
+            kept[shared.blocks[name]] = False
+    number = np.cumsum(kept) - 1
+    found = [
+        _case(first[kind], kinds[kind], model, x, shared, kept, number)
+        for kind, (model, x) in models.items()
+    ]
+    found.sort(key=lambda one: one.run.incline_deg)
+    return Cases(tuple(found), int(kept.sum()))
+
+
+def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Side, Array]]:
+    """Each chain of a drop as the model predicts it, with every edge seen.
+
+    Parameters
+    ----------
+    lower
+        By how much the chains hang lower than stated, m.
+
+    Returns
+    -------
+    list
+        Sides with their trains, and α of each rod, shape ``(rods,)``; empty for a free chain.
+    """
+    found = []
+    start, gravity = protocol.drop.value - lower, protocol.gravity.value
+    for side in sides_of(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
+        path, alphas = free_trajectory(RELEASE_S, start, gravity), np.zeros(0)
+        if side.ratios is not None:
+            assert protocol.surface is not None
+            impacts = rod_impacts(protocol.surface, side.chain.chain, run.incline_deg)
+            alphas = np.array([one.alpha for one in impacts])
+            places = np.array(side.chain.chain.heights)
+            path = struck_trajectory(RELEASE_S, start, gravity, alphas, side.ratios, places)
+        trains = tuple(_seen(train, path.times(train.levels)) for train in side.trains)
+        found.append((replace(side, trains=trains), alphas))
+    return found
+
+
+def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
+    """The equations of the drop as the model predicts it."""
+    sides = perfect(protocol, run)
+    guesses: dict[str, Guess] = {
+        side.role: Guess(
+            RELEASE_S, protocol.drop.value, float(alphas.mean()) if alphas.size else 0.0
+        )
+        for side, alphas in sides
+    }
+    model = DropModel(protocol, [side for side, _ in sides], guesses, CLOCK_U, components)
+    x = np.zeros(len(model.unknowns))
+    for _, alphas in sides:
+        if alphas.size:
+            x[model.unknowns["impulses"]] = alphas - alphas.mean()
+    return model, x
+
+
+def _seen(train: Train, times: Array) -> Train:
+    return replace(
+        train,
+        times=times,
+        blocked=train.blocks,
+        burst=np.zeros(times.size),
+        edge=np.arange(times.size),
+    )
+
+
+def _case(
+    run: Run,
+    count: int,
+    model: DropModel,
+    x: Array,
+    shared: Shared,
+    kept: NDArray[np.bool_],
+    number: Index,
+) -> Case:
+    at, sd = model.unknowns, model.unknowns.sd
+    mine, here = shared.places(model)
+    beam = np.zeros(len(at), dtype=np.bool_)
+    for name in _BEAMS:
+        if name in at:
+            beam[at[name]] = True
+    alpha = np.arange(at["alpha"].start, at["alpha"].stop) if "alpha" in at else np.zeros(0, int)
+    common = mine[kept[here]]
+    own = np.setdiff1d(np.flatnonzero(~beam), np.append(common, alpha))
+    order = np.concatenate([own, common, alpha])
+    place = np.full(len(at), -1)
+    place[order] = np.arange(order.size)
+    blocks: dict[int, Block] = {}
+    for role, side in model.sides.items():
+        blocks |= _blocks(model, side, role, x, place)
+    chance = [place[at[name]] for name in at.blocks if name.endswith(_CHANCE)]
+    return Case(
+        run,
+        count,
+        own.size,
+        alpha.size,
+        number[here[kept[here]]],
+        np.concatenate(chance),
+        {name: (gradient * sd)[order] for name, (_, gradient) in measurands(model, x).items()},
+        tuple(blocks.get(n, _BLIND) for n in range(at[_BEAMS[0]].stop - at[_BEAMS[0]].start)),
+    )
+
+
+_BLIND = Block(np.zeros(0, dtype=np.intp), np.zeros((BEAM, BEAM)))
+
+
+def _blocks(model: DropModel, side: Side, role: str, x: Array, place: Index) -> dict[int, Block]:
+    """Split the equations of a side by beam."""
+    at, sd = model.unknowns, model.unknowns.sd
+    rows = model.equations(role, x, [np.arange(train.times.size) for train in side.trains])
+    slopes = rows.slopes * (sd[rows.columns] / rows.sigma[:, None])
+    gate = model.expected[role].gate
+    columns = np.flatnonzero(place[rows.columns] >= 0)
+    where = np.full(len(at), -1)
+    where[rows.columns] = np.arange(rows.columns.size)
+    found = {}
+    for train in side.trains:
+        own = [where[at[name].start + train.gate] for name in _BEAMS if name in at]
+        mine = slopes[gate == train.gate]
+        part = np.zeros((mine.shape[0], columns.size + BEAM))
+        part[:, : columns.size] = mine[:, columns]
+        part[:, columns.size : columns.size + len(own)] = mine[:, own]
+        found[train.gate] = Block(place[rows.columns[columns]], part.T @ part)
+    return found

@@ -1,0 +1,186 @@
+"""Better heights for the beams that are there: one beam at a time goes where it tells most."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.design.cases import cases
+from rig.design.outlook import outlook
+from rig.design.readable import MARGIN, margin
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rig.analysis.components import Components
+    from rig.design.cases import Cases
+    from rig.protocol.scene import Protocol, Side
+
+GOALS = ("separation_m", "speed_m_s", "gravity_m_s2", "restitution", "friction")
+"""What a layout is judged by, as far as the scene has it: the mean of the logarithms."""
+FEW = 3
+"""Inclines that the search looks at; the outlook looks at all of them."""
+_GRID_M = 4e-3  # between candidates
+_COARSE = 5  # every so many of them are tried first, then those about the best
+_SWEEPS = 4
+_BEFORE = 2  # beams of a side above the chain's lower end that stay there
+_WORTH = 1e-3  # a gain in the mean logarithm that is worth moving a beam for
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """Where beams may be, m.
+
+    Attributes
+    ----------
+    lowest, highest
+        Limits of height.
+    spacing
+        Least distance of two beams of one side.
+    clearance
+        Least distance of a beam from a rod of a chain that hangs.
+    """
+
+    lowest: float
+    highest: float
+    spacing: float
+    clearance: float
+
+
+def room(protocol: Protocol, lowest: float | None, highest: float | None, spacing: float) -> Room:
+    """Take limits as they are given, else from the gates that are there and the chains."""
+    assert protocol.gates is not None
+    heights = [gate.height for gate in protocol.gates.gates]
+    top = min(protocol.drop.value + one.chain.length for one in protocol.chains.values())
+    return Room(
+        min(heights) if lowest is None else lowest,
+        min(top, max(heights)) if highest is None else min(top, highest),
+        spacing,
+        max(1e-3, protocol.drop.u),
+    )
+
+
+def candidates(protocol: Protocol, limits: Room) -> list[float]:
+    """Heights on a grid at which no hanging rod blocks a beam."""
+    hanging = np.array(
+        [
+            (protocol.drop.value + height, width / 2.0 + limits.clearance)
+            for one in protocol.chains.values()
+            for height, width in zip(one.chain.heights, one.widths, strict=True)
+        ]
+    )
+    n = math.floor((limits.highest - limits.lowest) / _GRID_M + 1e-9)
+    grid = limits.lowest + _GRID_M * np.arange(n + 1)
+    clear = (np.abs(grid[:, None] - hanging[:, 0]) >= hanging[:, 1]).all(axis=1)
+    return [round(float(height), 4) for height in grid[clear]]
+
+
+def better(
+    protocol: Protocol,
+    components: Components,
+    limits: Room,
+    say: Callable[[str], None] = lambda _: None,
+) -> list[tuple[Side, float]]:
+    """Find better heights for a protocol's beams.
+
+    Each beam in turn is tried at candidate heights while the others stay; sweeps go on until none
+    moves. That finds no worse a layout than it begins with, and not always the best of all. A
+    layout whose edges could be given to wrong rods is none, see `rig.design.readable`.
+
+    Parameters
+    ----------
+    components
+        How much everything scatters.
+    limits
+        Where beams may be.
+    say
+        Told how far it is.
+
+    Returns
+    -------
+    list
+        Side and height of each beam, in the protocol's order.
+    """
+    assert protocol.gates is not None
+    gates = protocol.gates.gates
+    heights = candidates(protocol, limits)
+    sides = list(dict.fromkeys(gate.side for gate in gates))
+    beams: list[tuple[Side, float]] = [(gate.side, gate.height) for gate in gates]
+    beams += [(side, height) for side in sides for height in heights]
+    found = cases(protocol, beams, components, _few(protocol.plan.inclines))
+    layout = list(range(len(gates)))
+    # Where the layout that is there is itself hard to read, one that is no harder will do.
+    floor = min(MARGIN, margin(protocol, beams[: len(gates)]))
+    best = score(protocol, found, layout)
+    for sweep in range(1, _SWEEPS + 1):
+        before = best
+        for slot, gate in enumerate(gates):
+            others = [beams[n] for other, n in enumerate(layout) if other != slot]
+            mine = [
+                n
+                for n in range(len(gates), len(beams))
+                if beams[n][0] == gate.side and not _crowded(beams[n], others, limits.spacing)
+            ]
+            for stride, reach in ((_COARSE, len(mine)), (1, _COARSE - 1)):
+                centre = mine.index(layout[slot]) if layout[slot] in mine else len(mine) // 2
+                near = [n for n in mine[::stride] if abs(mine.index(n) - centre) <= reach]
+                for n in near:
+                    trial = score(protocol, found, [*layout[:slot], n, *layout[slot + 1 :]])
+                    if trial >= best - _WORTH:
+                        continue
+                    proposed = [beams[one] for one in (*layout[:slot], n, *layout[slot + 1 :])]
+                    if _held(protocol, proposed) and margin(protocol, proposed) >= floor:
+                        best, layout[slot] = trial, n
+        say(f"sweep {sweep}: uncertainties × {math.exp(best):.3g} in the geometric mean")
+        if before - best < _WORTH:
+            break
+    return _ordered([beams[n] for n in layout])
+
+
+def _held(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
+    """Whether enough beams of each side still see the chain before anything strikes.
+
+    With fewer, one missed edge too many leaves the fall open.
+    """
+    assert protocol.gates is not None
+    start = protocol.drop.value
+    if protocol.surface is None:
+        return True
+    for side in dict.fromkeys(side for side, _ in beams):
+        now = sum(gate.height > start for gate in protocol.gates.on(side))
+        if sum(height > start for one, height in beams if one == side) < min(now, _BEFORE):
+            return False
+    return True
+
+
+def _few(inclines: Sequence[float]) -> list[float]:
+    ordered = sorted(inclines)
+    if len(ordered) <= FEW:
+        return ordered
+    return [ordered[round(n * (len(ordered) - 1) / (FEW - 1))] for n in range(FEW)]
+
+
+def _crowded(
+    beam: tuple[Side, float], others: Sequence[tuple[Side, float]], spacing: float
+) -> bool:
+    side, height = beam
+    return any(side == one and abs(height - at) < spacing - 1e-9 for one, at in others)
+
+
+def score(protocol: Protocol, found: Cases, layout: Sequence[int]) -> float:
+    """Mean of the logarithms of all uncertainties that count; less is better."""
+    wanted = outlook(protocol, found, layout, GOALS, sure=True).wanted()
+    values = [math.log(wanted[name]) for name in GOALS if name in wanted]
+    return sum(values) / len(values)
+
+
+def _ordered(beams: Sequence[tuple[Side, float]]) -> list[tuple[Side, float]]:
+    """Sort each side's beams upwards, sides staying where they are."""
+    found = []
+    rest = {side: sorted(h for s, h in beams if s == side) for side, _ in beams}
+    for side, _ in beams:
+        found.append((side, rest[side].pop(0)))
+    return found

@@ -1,0 +1,148 @@
+"""Whether the drops agree with each other, and their inclines with the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.result import GOOD
+from rig.analysis.student import coverage_factor
+from rig.analysis.summary import MEASURANDS, mean, predicted_run
+from rig.estimate.tail import chi2_tail
+from rig.units import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.result import DropResult, Measured
+    from rig.model.surface import Surface
+    from rig.protocol.scene import Protocol
+
+    Array = NDArray[np.float64]
+
+
+def agreement(protocol: Protocol, results: Iterable[DropResult]) -> list[dict[str, Any]]:
+    """Compare Δz and V with the protocol's model, all inclines at once.
+
+    Means of different inclines share the rig's errors, and predictions share the model's
+    parameters: both stand in the covariance with which χ² is made, so that one wrong β counts once
+    and not nine times.
+
+    Returns
+    -------
+    list of dict
+        One a measurand: ``inclines`` with difference, u, normalized error, χ² and p of each;
+        ``chi2``, ``degrees`` and ``p`` of all together.
+    """
+    by_incline: dict[float, list[DropResult]] = {}
+    for result in results:
+        if result.verdict in GOOD:
+            by_incline.setdefault(result.run.incline_deg, []).append(result)
+    cases = [runs for _, runs in sorted(by_incline.items())]
+    # Outside the model's domain there is nothing to compare with.
+    cases = [runs for runs in cases if _model(protocol, runs, 0) is not None]
+    if not cases:
+        return []
+    names = [name for name in MEASURANDS[:2] if all(name in one.quantities for one in cases[0])]
+    return [_compared(protocol, cases, name) for name in names]
+
+
+def _compared(
+    protocol: Protocol, cases: Sequence[Sequence[DropResult]], name: str
+) -> dict[str, Any]:
+    means = [mean([one.quantities[name] for one in runs]) for runs in cases]
+    shared = _shared([[one.quantities[name] for one in runs] for runs in cases])
+    single = np.array([one.budget["runs"] ** 2 for one in means])
+    which = MEASURANDS.index(name)
+    predicted = np.array([_model(protocol, runs, which) for runs in cases], dtype=float)
+    slopes = np.stack(
+        [
+            np.array([_model(high, runs, which) for runs in cases], dtype=float)
+            - np.array([_model(low, runs, which) for runs in cases], dtype=float)
+            for low, high in _moved(protocol)
+        ]
+        or [np.zeros(len(cases))],
+        axis=1,
+    ) / 2.0  # fmt: skip
+    measured = np.diag(single) + shared @ shared.T
+    covariance = measured + slopes @ slopes.T
+    off = np.array([one.value for one in means]) - predicted
+    chi2 = float(off @ np.linalg.solve(covariance, off))
+    u = np.sqrt(np.diag(covariance))
+    known = coverage_factor(np.inf) * np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
+    widths = [np.hypot(one.expanded, model) for one, model in zip(means, known, strict=True)]
+    return {
+        "quantity": name,
+        "chi2": chi2,
+        "degrees": len(cases),
+        "p": chi2_tail(chi2, len(cases)),
+        "inclines": [
+            {
+                "incline_deg": runs[0].run.incline_deg,
+                "n": len(runs),
+                "difference": float(off[n]),
+                "u": float(u[n]),
+                "normalized_error": float(off[n] / widths[n]),
+                "chi2": float((off[n] / u[n]) ** 2),
+                "p": chi2_tail(float((off[n] / u[n]) ** 2), 1),
+            }
+            for n, runs in enumerate(cases)
+        ],
+    }
+
+
+def _shared(values: Sequence[Sequence[Measured]]) -> Array:
+    """What the means have in common, a row each: products of rows are covariances."""
+    vectors = [[one.shared for one in runs if one.shared is not None] for runs in values]
+    if all(len(found) == len(runs) for found, runs in zip(vectors, values, strict=True)):
+        return np.array([np.mean(found, axis=0) for found in vectors])
+    # Of drops by themselves only the size is known: taken as fully common.
+    return np.array([[mean(runs).budget["common"]] for runs in values])
+
+
+def _model(protocol: Protocol, runs: Sequence[DropResult], which: int) -> float | None:
+    """Mean prediction for these runs; `None` outside the domain."""
+    known: dict[tuple[str | None, str | None], float | None] = {}
+    for one in runs:
+        case = one.run.impact, one.run.free
+        if case not in known:
+            found = predicted_run(protocol, one.run)[which]
+            known[case] = found.value if found is not None else None
+    values = [known[one.run.impact, one.run.free] for one in runs]
+    numbers = [value for value in values if value is not None]
+    return fmean(numbers) if len(numbers) == len(values) else None
+
+
+def _moved(protocol: Protocol) -> Iterator[tuple[Protocol, Protocol]]:
+    """The protocol with one of the model's inputs at a time moved down and up by its u."""
+    surface = protocol.surface
+    assert surface is not None
+    pile = surface.pile
+    inputs: list[tuple[Quantity, Callable[[Quantity], Protocol]]] = [
+        (protocol.drop, lambda to: replace(protocol, drop=to)),
+        (protocol.gravity, lambda to: replace(protocol, gravity=to)),
+        (surface.restitution, lambda to: _on(protocol, replace(surface, restitution=to))),
+        (surface.friction, lambda to: _on(protocol, replace(surface, friction=to))),
+    ]
+    if pile is not None:
+        softer = partial(replace, pile)
+        inputs.append(
+            (
+                pile.restitution,
+                lambda to: _on(protocol, replace(surface, pile=softer(restitution=to))),
+            )
+        )
+    for stated, moved in inputs:
+        if stated.u:
+            low, high = (Quantity(stated.value + sign * stated.u) for sign in (-1, 1))
+            yield moved(low), moved(high)
+
+
+def _on(protocol: Protocol, surface: Surface) -> Protocol:
+    return replace(protocol, surface=surface)

@@ -1,0 +1,192 @@
+"""β, μ and the pile's β by least squares on the edges, where these can tell them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.estimate.hypotheses import (
+    ALPHA,
+    BETA,
+    MU,
+    PILE,
+    coefficients,
+    one_alpha,
+    with_contact,
+    with_drag,
+)
+from rig.estimate.joint import Parameter, fit
+from rig.model.impact import impact_on
+from rig.units import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.estimate.forms import Form
+    from rig.estimate.joint import Hypothesis, Outcome
+    from rig.model.chain import Chain
+    from rig.protocol.scene import Protocol
+
+CONTACT_U = 1e-3
+"""How far the contact point may move when the board is inclined anew, m."""
+KNOWN = 0.2
+"""A coefficient less sure than this is not identified: all of them are within about one."""
+FOUND = 0.5
+"""Share of its prior uncertainty that a nuisance must lose to the edges to count as found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What there is to be estimated.
+
+    Attributes
+    ----------
+    forms
+        Of like drops, added up; only those that the model describes.
+    parameters
+        Coefficients that the edges tell, and those they do not, these with a prior.
+    held
+        Names of the latter.
+    stated
+        What the protocol says of each coefficient, by name.
+    left_out
+        Sentences on what is not fitted, and why.
+    """
+
+    forms: tuple[Form, ...]
+    parameters: tuple[Parameter, ...]
+    held: tuple[str, ...]
+    stated: dict[str, Quantity]
+    left_out: tuple[str, ...]
+
+    @property
+    def inclines(self) -> list[float]:
+        """Inclines that the model describes, ascending."""
+        return sorted({form.run.incline_deg for form in self.forms})
+
+
+def scene(protocol: Protocol, forms: Sequence[Form]) -> Scene:
+    """Find out what drops at these inclines can tell.
+
+    Parameters
+    ----------
+    forms
+        Of like drops, see `rig.estimate.forms.merged`.
+    """
+    ordered = sorted(forms, key=lambda one: one.run.incline_deg)
+    kept, stated, left_out = described(
+        protocol, [(one.chain, one.run.incline_deg) for one in ordered]
+    )
+    parameters = [Parameter(name, quantity.value) for name, quantity in stated.items()]
+    told = tuple(one for one, said in zip(ordered, kept, strict=True) if said)
+    found = Scene(told, tuple(parameters), (), stated, tuple(left_out))
+    return _identified(protocol, found) if told else found
+
+
+def described(
+    protocol: Protocol, drops: Sequence[tuple[Chain, float]]
+) -> tuple[list[bool], dict[str, Quantity], list[str]]:
+    """Find the coefficients that drops of these chains at these inclines depend on.
+
+    Returns
+    -------
+    kept, stated, left_out
+        Whether the model describes each; the protocol's coefficients by name; and sentences on
+        inclines outside its domain.
+    """
+    surface = protocol.surface
+    assert surface is not None
+    stated: dict[str, Quantity] = {}
+    left_out: list[str] = []
+    kept = []
+    for chain, incline in drops:
+        impact = impact_on(surface, chain, incline)
+        kept.append(impact.basis == "given" or not impact.notes)
+        if not kept[-1]:
+            said = f"{incline:g}° tells no coefficient: {'; '.join(impact.notes)}"
+            left_out += [said] if said not in left_out else []
+        elif chain.alpha is not None:
+            stated[ALPHA] = chain.alpha
+        elif impact.basis == "pile" and surface.pile is not None:
+            stated[PILE] = surface.pile.restitution
+        else:
+            stated[BETA] = surface.restitution
+            if impact.basis == "surface":
+                stated[MU] = surface.friction
+    return kept, stated, left_out
+
+
+def _identified(protocol: Protocol, given: Scene) -> Scene:
+    """Hold μ, and then β, where the edges do not tell them apart."""
+    found = given
+    for name in (MU, BETA, PILE, ALPHA):
+        if name not in given.stated:
+            continue
+        unsure = [one for one, u in sds(best(protocol, found)).items() if u > KNOWN]
+        if not unsure:
+            break
+        if name == MU and BETA not in unsure and MU not in unsure:
+            continue
+        stated = given.stated[name]
+        told = Quantity(stated.value, max(stated.u, 1e-9))
+        said = (
+            f"{name.replace('_', ' ')} is not identified by drops at "
+            f"{', '.join(f'{incline:g}°' for incline in given.inclines)}: held at the protocol's "
+            f"{stated.value:g} ± {stated.u:g}, which the other coefficients allow for"
+        )
+        found = replace(
+            found,
+            parameters=tuple(
+                one._replace(prior=(told.value, told.u)) if one.name == name else one
+                for one in found.parameters
+            ),
+            held=(*found.held, name),
+            left_out=(*found.left_out, said),
+        )
+    return found
+
+
+def model(protocol: Protocol, found: Scene, parameters: Sequence[Parameter]) -> Hypothesis:
+    """Suppose the model with these parameters unknown, and nothing of contact or air."""
+    assert protocol.surface is not None
+    if ALPHA in found.stated:
+        (parameter,) = parameters
+        return one_alpha(found.forms, lambda _: ALPHA)._replace(parameters=(parameter,))
+    return coefficients(protocol.surface, parameters)
+
+
+def nuisances(protocol: Protocol, found: Scene, inner: Hypothesis) -> Hypothesis:
+    """Add where the contact point is at each incline, and drag where a free chain tells it."""
+    added = with_contact(inner, found.inclines, (0.0, CONTACT_U))
+    return with_drag(added) if has_drag(protocol, found) else added
+
+
+def has_drag(protocol: Protocol, found: Scene) -> bool:
+    """Whether drag can be told: by a free chain, of chains that slow down alike."""
+    return protocol.two_chains and all(_even(form.chain) for form in found.forms)
+
+
+def _even(chain: Chain) -> bool:
+    return len(set(chain.masses)) == 1
+
+
+def best(protocol: Protocol, found: Scene) -> Outcome:
+    """Fit the coefficients with all nuisances."""
+    return fit(found.forms, nuisances(protocol, found, model(protocol, found, found.parameters)))
+
+
+def sds(outcome: Outcome) -> dict[str, float]:
+    """Standard uncertainty of each coefficient."""
+    names = (ALPHA, BETA, MU, PILE)
+    return {name: outcome[name][1] for name in names if name in outcome}
+
+
+def correlation(outcome: Outcome, names: Sequence[str]) -> list[list[float]]:
+    """Correlation matrix of some parameters."""
+    at = [outcome.names.index(name) for name in names]
+    part = outcome.covariance[np.ix_(at, at)]
+    sd = np.sqrt(np.diag(part))
+    found: list[list[float]] = (part / np.outer(sd, sd)).tolist()
+    return found

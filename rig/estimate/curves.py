@@ -1,0 +1,140 @@
+"""Δz(t) and V²(z) of a measured drop, with bands (the paper's Fig. 4)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.fit import Fit
+from rig.analysis.student import coverage_factor
+from rig.model.fall import hits, kicks
+from rig.model.motion import Motion
+from rig.model.rods import rod_impacts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.drop_model import DropModel
+    from rig.analysis.learn import Lesson, Taught
+    from rig.protocol.scene import Protocol, Run
+
+    Array = NDArray[np.float64]
+
+POINTS = 120
+_STEP = 1e-3  # of an unknown's prior uncertainty
+
+
+def drop_curves(
+    protocol: Protocol, run: Run, drop: Fit | Taught, lesson: Lesson | None
+) -> dict[str, Any]:
+    """Follow one drop from release to the top rod's hit.
+
+    Returns
+    -------
+    dict
+        ``height_m`` of the top rod above the contact point with ``speed2_m2_s2`` of the impact
+        chain; where a free chain fell, ``time_s`` since the release with ``separation_m`` at
+        simultaneous release. ``…_U95`` are half-widths of 95 % bands, point by point; ``…_model``
+        is the model with the protocol's coefficients.
+    """
+    model, x = drop.model, drop.x
+    end = model.trajectory("impact", x)
+    top = model.sides["impact"].chain.chain.length
+    heights = np.linspace(_top(model, x) - 1e-6, 0.0, POINTS)
+    said: dict[str, Any] = {
+        "run": run.number,
+        "incline_deg": run.incline_deg,
+        "impact_chain": run.impact,
+        "height_m": heights.tolist(),
+    }
+    said |= _with_band("speed2_m2_s2", lambda at: _squares(model, at, heights), drop, lesson)
+    times = np.linspace(0.0, float(end.time[-1] - end.time[0]), POINTS)
+    if "free" in model.sides:
+        said["time_s"] = times.tolist()
+        said |= _with_band("separation_m", lambda at: _separations(model, at, times), drop, lesson)
+    return said | _by_model(protocol, run, heights, times, top)
+
+
+def _top(model: DropModel, x: Array) -> float:
+    """Height of the top rod before the release."""
+    start = model.trajectory("impact", x).height[0]
+    return float(start + _places(model, x, "impact")[-1])
+
+
+def _places(model: DropModel, x: Array, role: str) -> Array:
+    chain = model.sides[role].chain.chain
+    found: Array = np.array(chain.heights) + x[model.unknowns[f"{role} rods"]]
+    return found
+
+
+def _squares(model: DropModel, x: Array, heights: Array) -> Array:
+    """V² of the impact chain when its top rod is at a height."""
+    path = model.trajectory("impact", x)
+    level = heights - _places(model, x, "impact")[-1]
+    leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
+    found: Array = path.speed[leg] ** 2 + 2.0 * path.gravity * (path.height[leg] - level)
+    return found
+
+
+def _separations(model: DropModel, x: Array, times: Array) -> Array:
+    """How far the free chain's top rod is above the other's, each so long after its release."""
+    struck, free = model.trajectory("impact", x), model.trajectory("free", x)
+    apart = _places(model, x, "free")[-1] - _places(model, x, "impact")[-1]
+    found: Array = (
+        free.heights(free.time[0] + times)[0] - struck.heights(struck.time[0] + times)[0] + apart
+    )
+    return found
+
+
+def _with_band(
+    name: str, curve: Callable[[Array], Array], drop: Fit | Taught, lesson: Lesson | None
+) -> dict[str, list[float]]:
+    """Values, and 1.96 standard uncertainties from the covariance of the adjustment."""
+    x, sd = drop.x, drop.model.unknowns.sd
+    slopes = np.stack(
+        [
+            (curve(x + step) - curve(x - step)) / (2.0 * _STEP)
+            for step in _STEP * np.diag(np.where(sd < 1.0, sd, 1e-3))
+        ],
+        axis=1,
+    )
+    slopes[:, sd >= 1.0] *= 1e3 * sd[sd >= 1.0]
+    if isinstance(drop, Fit) or lesson is None:
+        assert isinstance(drop, Fit)
+        variance = np.einsum("ij,jk,ik->i", slopes, drop.estimate.covariance, slopes, optimize=True)
+    else:
+        own, common = slopes[:, drop.own], slopes[:, drop.common]
+        left = common - own @ drop.gain
+        shared = lesson.covariance[np.ix_(drop.here, drop.here)]
+        variance = np.einsum("ij,jk,ik->i", own, drop.inverse, own, optimize=True)
+        variance += np.einsum("ij,jk,ik->i", left, shared, left, optimize=True)
+    band = coverage_factor(np.inf) * np.sqrt(np.maximum(variance, 0.0))
+    return {name: curve(x).tolist(), f"{name}_U95": band.tolist()}
+
+
+def _by_model(
+    protocol: Protocol, run: Run, heights: Array, times: Array, top: float
+) -> dict[str, list[float]]:
+    """The same by the model."""
+    assert protocol.surface is not None
+    assert run.impact is not None
+    chain = protocol.chains[run.impact].chain
+    impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
+    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    drop, gravity = protocol.drop.value, protocol.gravity.value
+    struck = hits(chain, gains, drop, gravity)
+    before = np.array([-drop, *chain.heights[:-1]])
+    after = np.array([0.0, *(hit.speed_after for hit in struck[:-1])])
+    fallen = top - heights
+    leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
+    squares = after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg])
+    found = {"speed2_m2_s2_model": np.maximum(squares, 0.0).tolist()}
+    if protocol.two_chains:
+        motion = Motion(chain, gains, drop, gravity)
+        found["separation_m_model"] = [
+            motion.at(min(time, motion.end_s)).separation_m for time in times.tolist()
+        ]
+    return found

@@ -1,0 +1,176 @@
+"""What may be supposed of the impacts: from the coefficients of the model down to rod by rod."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.estimate.forms import EXTRA
+from rig.estimate.joint import Hypothesis, Parameter
+from rig.model.rods import rod_impacts
+from rig.units import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.estimate.forms import Form
+    from rig.model.chain import Chain
+    from rig.model.surface import Surface
+
+    Array = NDArray[np.float64]
+
+ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
+END, AIR = "end_correction", "drag"
+_STEP = 1e-5  # of a coefficient, for its derivative
+
+
+def coefficients(surface: Surface, parameters: Sequence[Parameter]) -> Hypothesis:
+    """Suppose Eqs. 8 to 13 with these of β, μ and the pile's β unknown, the others as stated."""
+    names = [one.name for one in parameters]
+    known: dict[tuple[float, int, tuple[float, ...]], tuple[Array, Array]] = {}
+
+    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+        key = form.run.incline_deg, id(form.chain), tuple(values.tolist())
+        if key not in known:
+            now = dict(zip(names, values.tolist(), strict=True))
+            known[key] = _padded(*alphas(surface, form.chain, form.run.incline_deg, now))
+        return known[key]
+
+    return Hypothesis(tuple(parameters), targets)
+
+
+def alphas(
+    surface: Surface, chain: Chain, incline_deg: float, values: Mapping[str, float]
+) -> tuple[Array, Array]:
+    """α of every rod by Eqs. 8 to 13, shape ``(rods,)``, with its derivatives by coefficients.
+
+    Parameters
+    ----------
+    values
+        Coefficients by name; others are the surface's.
+    """
+
+    def at(moved: Mapping[str, float]) -> Array:
+        impacts = rod_impacts(with_coefficients(surface, moved), chain, incline_deg)
+        return np.array([one.alpha for one in impacts])
+
+    slopes = np.zeros((chain.rods, len(values)))
+    for n, (name, value) in enumerate(values.items()):
+        low, high = (at({**values, name: value + step}) for step in (-_STEP, _STEP))
+        slopes[:, n] = (high - low) / (2.0 * _STEP)
+    return at(values), slopes
+
+
+def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
+    """Return the surface with some of its coefficients replaced."""
+    pile = surface.pile
+    if pile is not None and PILE in values:
+        pile = replace(pile, restitution=Quantity(values[PILE]))
+    return replace(
+        surface,
+        restitution=Quantity(values[BETA]) if BETA in values else surface.restitution,
+        friction=Quantity(values[MU]) if MU in values else surface.friction,
+        pile=pile,
+    )
+
+
+def one_alpha(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesis:
+    """Suppose one α for all drops that share a key: an incline, or a run."""
+    keys = list(dict.fromkeys(map(key, forms)))
+    starts = [float(np.mean([f.alphas.mean() for f in forms if key(f) == one])) for one in keys]
+
+    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+        n = keys.index(key(form))
+        slopes = np.zeros((form.alphas.size, values.size))
+        slopes[:, n] = 1.0
+        return _padded(np.full(form.alphas.size, values[n]), slopes)
+
+    parameters = (Parameter(f"α {one}", start) for one, start in zip(keys, starts, strict=True))
+    return Hypothesis(tuple(parameters), targets)
+
+
+def each_rod(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesis:
+    """Suppose an α for each rod but the top one, whose impact pulls on nothing."""
+    keys = list(dict.fromkeys(map(key, forms)))
+    starts, first, at = [], {}, 0
+    for one in keys:
+        alphas = np.mean([f.alphas for f in forms if key(f) == one], axis=0)[:-1]
+        first[one] = at
+        at += alphas.size
+        starts += [Parameter(f"α {one}, rod {k}", float(x)) for k, x in enumerate(alphas)]
+
+    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+        rods, begin = form.alphas.size, first[key(form)]
+        slopes = np.zeros((rods, values.size))
+        slopes[np.arange(rods - 1), begin + np.arange(rods - 1)] = 1.0
+        return _padded(np.append(values[begin : begin + rods - 1], 0.0), slopes)
+
+    return Hypothesis(tuple(starts), targets)
+
+
+def ended(inner: Hypothesis, gammas: Callable[[Form], Array], scale: float | None) -> Hypothesis:
+    """Suppose γ to be so many times that of Eq. 10, or (`None`) leave it open.
+
+    Parameters
+    ----------
+    gammas
+        γ of Eq. 10 for every rod of a drop, shape ``(rods,)``.
+    """
+    size = len(inner.parameters)
+
+    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+        target, slopes = inner.targets(form, values[:size])
+        rods = form.alphas.size
+        factor = float(values[size]) if scale is None else scale
+        # m/(M + γm) is here r/(1 + (γ − γ₀)r), with r = m/(M + γ₀m) as in the form.
+        change = gammas(form) * form.ratios
+        ratio = 1.0 / (1.0 + (factor - 1.0) * change)
+        target, slopes = target.copy(), slopes.copy()
+        by_scale = np.zeros(target.size)
+        by_scale[:rods] = -target[:rods] * change * ratio**2
+        target[:rods] *= ratio
+        slopes[:rods] *= ratio[:, None]
+        return target, np.column_stack([slopes, by_scale]) if scale is None else slopes
+
+    added = (Parameter(END, 1.0),) if scale is None else ()
+    return Hypothesis((*inner.parameters, *added), targets)
+
+
+def with_contact(
+    inner: Hypothesis, inclines: Sequence[float], prior: tuple[float, float] | None
+) -> Hypothesis:
+    """Suppose the contact point to be at another height at each incline."""
+    parameters = tuple(Parameter(f"contact {incline:g}", 0.0, prior) for incline in inclines)
+    return _with(inner, parameters, 0, lambda form: inclines.index(form.run.incline_deg))
+
+
+def with_drag(inner: Hypothesis) -> Hypothesis:
+    """Suppose air that slows every rod alike, by κv²."""
+    return _with(inner, (Parameter(AIR, 0.0),), 1, lambda _: 0)
+
+
+def _with(
+    inner: Hypothesis, added: tuple[Parameter, ...], extra: int, which: Callable[[Form], int]
+) -> Hypothesis:
+    size = len(inner.parameters)
+
+    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+        target, slopes = inner.targets(form, values[:size])
+        row, n = form.alphas.size + extra, which(form)
+        target = target.copy()
+        target[row] += values[size + n]
+        wider = np.column_stack([slopes, np.zeros((target.size, len(added)))])
+        wider[row, size + n] = 1.0
+        return target, wider
+
+    return Hypothesis((*inner.parameters, *added), targets)
+
+
+def _padded(target: Array, slopes: Array) -> tuple[Array, Array]:
+    """Add the extras, which are nothing unless supposed."""
+    none = np.zeros((len(EXTRA), slopes.shape[1]))
+    return np.append(target, np.zeros(len(EXTRA))), np.vstack([slopes, none])

@@ -1,0 +1,126 @@
+"""The posterior of the coefficients, with the protocol's own values as prior.
+
+Given μ, everything else enters linearly, so that its posterior is normal; over μ it is a sum on
+evenly spaced nodes, which for a smooth density that vanishes at both ends converges faster than
+any power of their number. Nothing is drawn at random.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.estimate.coefficients import model, nuisances
+from rig.estimate.hypotheses import MU
+from rig.estimate.joint import Parameter, fit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rig.estimate.coefficients import Scene
+    from rig.estimate.joint import Outcome
+    from rig.protocol.scene import Protocol
+
+    Array = NDArray[np.float64]
+
+NODES = 41
+_REACH = 6.0  # standard uncertainties on either side
+_EXACT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Posterior:
+    """A sum of normal distributions.
+
+    Attributes
+    ----------
+    names
+        Of the coefficients.
+    weights
+        Of each node, shape ``(nodes,)``.
+    means, sds
+        Shape ``(nodes, coefficients)``; where the coefficient is that of the nodes, the width of
+        one node.
+    """
+
+    names: tuple[str, ...]
+    weights: Array
+    means: Array
+    sds: Array
+
+    def moments(self, name: str) -> tuple[float, float]:
+        """Mean and standard deviation."""
+        n = self.names.index(name)
+        mean = float(self.weights @ self.means[:, n])
+        variance = self.weights @ (self.sds[:, n] ** 2 + (self.means[:, n] - mean) ** 2)
+        return mean, math.sqrt(float(variance))
+
+    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
+        """Ends of the probabilistically symmetric interval."""
+        tail = 0.5 * (1.0 - probability)
+        return self.quantile(name, tail), self.quantile(name, 1.0 - tail)
+
+    def quantile(self, name: str, probability: float) -> float:
+        """Value that the coefficient stays below with a probability; by bisection."""
+        n = self.names.index(name)
+        mean, sd = self.moments(name)
+        low, high = mean - 20.0 * sd, mean + 20.0 * sd
+        while high - low > 1e-9 * sd:
+            middle = 0.5 * (low + high)
+            z = (middle - self.means[:, n]) / (self.sds[:, n] * math.sqrt(2.0))
+            below = float(self.weights @ [0.5 * math.erfc(-one) for one in z.tolist()])
+            low, high = (middle, high) if below < probability else (low, middle)
+        return 0.5 * (low + high)
+
+
+def posterior(protocol: Protocol, found: Scene, centre: Outcome) -> Posterior:
+    """Work the posterior out.
+
+    Parameters
+    ----------
+    centre
+        The least-squares fit of the same scene, around which the nodes lie.
+    """
+    priors = {
+        name: Parameter(name, centre[name][0], (stated.value, stated.u) if stated.u else None)
+        for name, stated in found.stated.items()
+    }
+    names = tuple(priors)
+    if MU not in priors:
+        only = fit(
+            found.forms, nuisances(protocol, found, model(protocol, found, [*priors.values()]))
+        )
+        pairs = np.array([only[name] for name in names])
+        return Posterior(names, np.ones(1), pairs[None, :, 0], pairs[None, :, 1])
+    nodes = _nodes(*_around(centre[MU], priors[MU].prior))
+    logs, means, sds = [], [], []
+    for mu in nodes.tolist():
+        fixed = {**priors, MU: Parameter(MU, mu, (mu, _EXACT))}
+        at = fit(found.forms, nuisances(protocol, found, model(protocol, found, [*fixed.values()])))
+        prior = priors[MU].prior
+        off = (mu - prior[0]) / prior[1] if prior else 0.0
+        logs.append(at.log_volume - 0.5 * (at.chi2 + off**2))
+        pairs = np.array([at[name] for name in names])
+        means.append(pairs[:, 0])
+        sds.append(pairs[:, 1])
+    weights = np.exp(np.array(logs) - max(logs))
+    widths = np.array(sds)
+    widths[:, names.index(MU)] = 0.5 * (nodes[1] - nodes[0])
+    return Posterior(names, weights / weights.sum(), np.array(means), widths)
+
+
+def _around(found: tuple[float, float], prior: tuple[float, float] | None) -> tuple[float, float]:
+    """Mean and standard uncertainty with the prior; roughly, for it only places the nodes."""
+    if prior is None:
+        return found
+    weights = np.array([found[1] ** -2, prior[1] ** -2])
+    mean = float(weights @ [found[0], prior[0]]) / weights.sum()
+    return float(mean), float(weights.sum()) ** -0.5
+
+
+def _nodes(mean: float, sd: float) -> Array:
+    """Evenly spaced; friction has no negative side."""
+    return np.linspace(max(0.0, mean - _REACH * sd), mean + _REACH * sd, NODES)

@@ -1,0 +1,66 @@
+"""What `rig design` finds, as text."""
+
+from __future__ import annotations
+
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+from rig.report.columns import Column
+from rig.report.estimate import SYMBOLS
+from rig.report.table import aligned
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_MEASURANDS = {
+    "separation_m": ("Δz of one run (mm)", 1e3),
+    "speed_m_s": ("V of one run (mm/s)", 1e3),
+    "release_skew_s": ("release skew of one run (µs)", 1e6),
+    "gravity_m_s2": ("g of one run (mm/s²)", 1e3),
+}
+
+
+def design_text(found: Mapping[str, Any]) -> str:
+    """Write layouts and what they tell, for a terminal."""
+    layouts = [name for name in ("current", "proposed") if name in found]
+    lines = [
+        f"standard uncertainties to be expected of {found['runs']} runs, by the {found['scatter']} "
+        "scatter of the rig",
+        "",
+        *aligned(
+            [
+                Column("quantity", itemgetter("what"), numeric=False),
+                *(Column(name, itemgetter(name)) for name in layouts),
+            ],
+            _records(found, layouts),
+        ),
+    ]
+    for name in layouts:
+        lines.append("")
+        for side in dict.fromkeys(gate["side"] for gate in found[name]["gates"]):
+            heights = ", ".join(
+                f"{gate['height_m'] * 1e3:g}"
+                for gate in found[name]["gates"]
+                if gate["side"] == side
+            )
+            lines.append(f"{name}, {side} side (mm): {heights}")
+        if not found[name]["readable"]:
+            lines.append(
+                f"{name}: edges may be given to wrong rods, and drops be void; beams above the "
+                "drop height see the chain before anything strikes"
+            )
+    return "\n".join(lines)
+
+
+def _records(found: Mapping[str, Any], layouts: list[str]) -> list[dict[str, str]]:
+    rows: dict[str, dict[str, str]] = {}
+    for layout in layouts:
+        for line in found[layout]["measurands"]:
+            if line["name"] in _MEASURANDS:
+                what, scale = _MEASURANDS[line["name"]]
+                row = rows.setdefault(what, {"what": what})
+                row[layout] = f"{line['u_run'] * scale:.3g}"
+        for line in found[layout]["coefficients"]:
+            row = rows.setdefault(line["name"], {"what": SYMBOLS[line["name"]]})
+            row[layout] = f"{line['u']:.2g}" if line["identified"] else "not identified"
+    return list(rows.values())

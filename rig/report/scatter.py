@@ -1,0 +1,72 @@
+"""How the runs of each incline scatter: SD, SE and U side by side, and the paper's bars."""
+
+from __future__ import annotations
+
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+from rig.report.columns import Column
+from rig.report.numbers import expanded, fixed, value_of
+from rig.report.parts import Part
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    Record = Mapping[str, Any]
+
+_QUANTITIES = {
+    "separation_m": ("Δz (mm)", 1e3, 3),
+    "speed_m_s": ("V (mm/s)", 1e3, 2),
+    "gravity_m_s2": ("g (mm/s²)", 1e3, 2),
+}
+_HEADINGS = {"incline": "incline (°)", "n": "n", "quantity": "", "mean": "mean", "sd": "SD"}
+_HEADINGS |= {"se": "SE", "u": "u", "expanded": "U95", "half": "SD/2"}
+_COLUMNS = tuple(
+    Column(heading, itemgetter(key), numeric=key != "quantity")
+    for key, heading in _HEADINGS.items()
+)
+
+
+def scatter_part(found: Mapping[str, Any]) -> Part:
+    """Make the table.
+
+    Parameters
+    ----------
+    found
+        What ``rig analyze --json`` prints.
+    """
+    return Part(
+        "Scatter of the runs",
+        [
+            "SD is the standard deviation of one run, SE that of the mean by scatter alone; u is "
+            "the standard uncertainty of the mean with what all runs have in common, U95 the "
+            "expanded one. SD/2 are the bars of Pantaleone's figures."
+        ],
+        _COLUMNS,
+        [*_records(found.get("summary") or ())],
+    )
+
+
+def _records(summary: Any) -> Iterator[Record]:
+    for line in summary:
+        for name, (label, scale, decimals) in _QUANTITIES.items():
+            if name not in line:
+                continue
+            symbol, _, unit = name.partition("_")
+            sd, se = (value_of(line.get(f"{symbol}_{kind}_{unit}")) for kind in ("sd", "se"))
+            yield {
+                "incline": fixed(line["incline_deg"], 0),
+                "n": fixed(line["n"], 0),
+                "quantity": label,
+                **{
+                    key: "" if value is None else fixed(value * scale, decimals)
+                    for key, value in (
+                        ("mean", value_of(line[name])),
+                        ("sd", sd),
+                        ("se", se),
+                        ("u", line[name]["u"]),
+                        ("expanded", expanded(line[name])),
+                        ("half", None if sd is None else sd / 2.0),
+                    )
+                },
+            }

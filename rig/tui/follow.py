@@ -1,0 +1,216 @@
+"""Following the daemon and the session file: what they say becomes state and events."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.errors import RigError
+from rig.tui.flow import BEFORE_RELEASE
+from rig.tui.gates import Lamps
+from rig.tui.plan import Job, unjudged
+from rig.tui.state import State
+from rig.tui.turns import Closed, Found, Lost, Opened, Stage, Warned
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine, Iterator, Mapping
+
+    from rig.tui.book import Book
+    from rig.tui.findings import Findings
+    from rig.tui.turns import Event
+    from rig.tui.wire import Wire
+
+_CLOCK_S = 3.0
+"""Clock samples come between drops too, so the file is read again so often."""
+
+
+class Follower:
+    """Holds what is known of rig and session.
+
+    Parameters
+    ----------
+    wire
+        `None` to look at a file only.
+    begin
+        Runs a coroutine beside the screens.
+
+    Attributes
+    ----------
+    state
+        What the daemon said last.
+    lamps
+        The gates.
+    findings
+        The session file, as read last.
+    judged
+        Drops that this screen gave a verdict.
+    unreadable
+        Why the session file cannot be read; empty while it can.
+    """
+
+    def __init__(
+        self, wire: Wire | None, begin: Callable[[Coroutine[Any, Any, None]], object]
+    ) -> None:
+        self.state = State()
+        self.lamps = Lamps()
+        self.findings: Findings | None = None
+        self.judged: set[Job] = set()
+        self.unreadable = ""
+        self._wire = wire
+        self._begin = begin
+        self._path: Path | None = None
+        self._book: Book | None = None
+        self._reading = self._learning = False
+        self._wanted: object = None
+        self._read: object = None
+        self._lost: Mapping[str, Any] = {}  # why the port was
+        self._counted: tuple[Job | None, int] = (None, 0)
+
+    @property
+    def done(self) -> int:
+        """How many drops of the file were analysed so far."""
+        return self._book.done if self._book else 0
+
+    def look_at(self, path: Path) -> None:
+        """Look at a file that nobody records."""
+        self._path, self._book, self.findings = path, None, None
+        self._begin(self._read_quietly())
+
+    def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
+        """Take what the daemon says now.
+
+        Parameters
+        ----------
+        stage
+            Where the operator is.
+        now
+            A clock that only goes on, s.
+        reopens
+            Whether a session that is closed will be opened again from here.
+        """
+        wire = self._wire
+        assert wire is not None
+        before, state = self.state, wire.state
+        self.state = state
+        self._look_at_gates(state, now)
+        if not wire.up:
+            return [Lost(f"the line to the daemon broke\n{wire.silence}")]
+        events: list[Event] = [*self._back(state), *_broken(stage, state)]
+        session = state.section("session")
+        if session:
+            self._look_at_session(session, state, now)
+            events.append(Opened())
+        elif before.section("session") and not reopens:
+            self._path = self._book = self.findings = None
+            events.append(Closed())
+        if not wire.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
+            events.append(
+                Lost("control of the rig went to another client\nc takes it when it is free")
+            )
+        missed = unjudged(state.runs)
+        if missed and missed not in self.judged and wire.driving:
+            events.append(Found(missed))
+        return events
+
+    def _back(self, state: State) -> Iterator[Event]:
+        """Say what was wrong with a port that is back: it may have been too short to be read."""
+        if state.section("error"):
+            self._lost = state.section("error") if state.link != "up" else {}
+        elif self._lost and state.link == "up":
+            yield Warned(f"the port was lost and is back: {self._lost['message']}\n"
+                         f"{self._lost['hint']}")  # fmt: skip
+            self._lost = {}
+
+    def _look_at_gates(self, state: State, now: float) -> None:
+        if self.findings and not self.lamps.lamps:
+            self.lamps, self._counted = Lamps.of(self.findings.channels), (None, 0)
+        drop = state.section("drop")
+        job = Job(drop["run"], drop["attempt"]) if drop else None
+        known, counted = self._counted
+        if job != known:
+            counted = 0
+        if len(state.edges) > counted and drop.get("state") == "fired":
+            fresh = tuple(int(edge[1]) for edge in state.edges[counted:])
+            self.lamps = self.lamps.counted(fresh, now)
+        else:
+            self.lamps = self.lamps.seen(state.blocked, now)
+        self._counted = job, len(state.edges)
+
+    def _look_at_session(self, session: Mapping[str, object], state: State, now: float) -> None:
+        path = Path(str(session["path"]))
+        if self._path != path:
+            self._path, self._book, self.lamps = path, None, Lamps()
+        self._wanted = (path, state.runs, int(now / _CLOCK_S))
+        if self._wanted != self._read and not self._reading:
+            self._reading = True
+            self._begin(self._read_quietly())
+
+    # ------------------------------------------------------------------ the file
+
+    async def read(self) -> Findings:
+        """Read the session file as it is now.
+
+        Raises
+        ------
+        RigError
+            It cannot be read.
+        """
+        path, wanted = self._path, self._wanted
+        if path is None:
+            raise RigError("no session is open")
+        self._reading = True
+        try:
+            if self._book is None:
+                self._book = await asyncio.to_thread(_opened, path)
+            book = self._book
+            found = await asyncio.to_thread(book.read)
+        finally:
+            self._reading, self._read = False, wanted
+        if path == self._path:
+            self._take(found)
+        if found.lagging and not self._learning:
+            self._learning = True
+            self._begin(self._learn(book, found))
+        return found
+
+    def _take(self, found: Findings) -> None:
+        self.findings, self.unreadable = found, ""
+        if self._wire is not None:
+            self._wire.changed = True
+        else:
+            self.state = found.state()
+            self.lamps = Lamps.of(found.channels)
+
+    async def _read_quietly(self) -> None:
+        try:
+            await self.read()
+        except RigError as error:
+            self.unreadable = f"{error.message}\n{error.hint}"
+
+    async def _learn(self, book: Book, found: Findings) -> None:
+        try:
+            await asyncio.to_thread(book.learn, found)
+        finally:
+            self._learning = False
+        if book is self._book:
+            await self._read_quietly()
+
+
+def _opened(path: Path) -> Book:
+    from rig.tui.book import Book  # noqa: PLC0415 - the analysis is not needed to paint
+
+    return Book(path)
+
+
+def _broken(stage: Stage, state: State) -> Iterator[Event]:
+    """Say that what was armed, or would be, is not: nothing here waits for an answer then."""
+    if stage not in BEFORE_RELEASE:
+        return
+    if state.link == "down":
+        yield Lost("the port was lost before the release: nothing fell\narm again when it is back")
+    drop = state.section("drop")
+    if stage is Stage.COUNTDOWN and drop.get("state") == "interrupted":
+        line = state.line(drop["run"])
+        why = line.reasons[0] if line and line.reasons else "stopped"
+        yield Lost(f"{why}: nothing fell\narm again when all is well")

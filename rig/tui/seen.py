@@ -1,0 +1,86 @@
+"""What the screens are about now: put together from daemon, session file and flow."""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from rig.tui.model import Model
+from rig.tui.plan import Job, again, void_counts
+from rig.tui.plan import next_job as next_of
+from rig.tui.turns import Stage
+
+if TYPE_CHECKING:
+    from rig.tui.app import RigApp
+    from rig.tui.state import RunLine
+
+_CLOCK_S = 2.0  # of clock samples before the first drop, as the runner takes them
+_CLOCK_U = 1e-4
+_BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
+
+
+def model(app: RigApp) -> Model:
+    """Take everything that is drawn, as it is now."""
+    wire, follower = app.wire, app.follower
+    findings = follower.findings
+    return Model(
+        state=follower.state,
+        flow=app.flow,
+        lamps=follower.lamps,
+        protocol=findings.protocol if findings else None,
+        findings=findings,
+        connected=wire is None or wire.up,
+        driving=app.driving,
+        job=job(app),
+        now_s=monotonic(),
+        silence=wire.silence if wire else "",
+        settle_s=settle_s(app),
+        port=wire.port if wire else "",
+        offline=wire is None,
+        unreadable=follower.unreadable,
+        read=follower.done,
+    )
+
+
+def runs(app: RigApp) -> tuple[RunLine, ...]:
+    """Return the plan as it stands, our own latest verdict in it."""
+    flow = app.flow
+    if flow.stage is not Stage.RESULT or flow.job is None:
+        return app.state.runs
+    mine = flow.job
+    return tuple(
+        line._replace(state=flow.verdict, attempt=mine.attempt) if line.run == mine.run else line
+        for line in app.state.runs
+    )
+
+
+def next_job(app: RigApp) -> Job | None:
+    """Name the attempt that comes next; `None` when the plan is done."""
+    lines, flow = runs(app), app.flow
+    if flow.stage is Stage.PREPARE and flow.job is not None:
+        return again(lines, flow.job.run)
+    known = app.findings.voids if app.findings else frozenset()
+    return next_of(lines, void_counts(known, lines))
+
+
+def job(app: RigApp) -> Job | None:
+    """Name the attempt that the screens are about."""
+    findings = app.findings
+    latest = findings.jobs[-1] if findings and findings.jobs else None
+    if app.wire is None:
+        return latest
+    drop = app.state.section("drop")
+    if drop and not app.driving:
+        return Job(drop["run"], drop["attempt"])
+    if app.flow.stage in _BETWEEN:
+        return latest if app.page == "result" and latest else next_job(app)
+    return app.flow.job
+
+
+def settle_s(app: RigApp) -> float:
+    """Say how long the chains rest before the next drop."""
+    if app.findings is None:
+        return 0.0
+    clock = app.findings.clock.device
+    settle = app.findings.protocol.plan.settle
+    return settle if clock is not None and clock.u <= _CLOCK_U else max(settle, _CLOCK_S)

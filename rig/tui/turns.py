@@ -1,0 +1,174 @@
+"""Stages of a session, what may happen in them, and what may be wanted then."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from rig.tui.plan import Job
+
+
+class Stage(StrEnum):
+    """Where the operator is."""
+
+    PROTOCOL = "protocol"
+    DEVICE = "device"
+    TESTING = "testing"
+    PREPARE = "prepare"
+    SETTLING = "settling"
+    ARMING = "arming"
+    COUNTDOWN = "countdown"
+    FIRING = "firing"
+    LIVE = "live"
+    JUDGING = "judging"
+    RESULT = "result"
+    DONE = "done"
+
+
+# ---------------------------------------------------------------- events
+
+
+class Opened(NamedTuple):
+    """A session is open at the daemon."""
+
+
+class Closed(NamedTuple):
+    """The session was closed."""
+
+
+class GoOn(NamedTuple):
+    """The operator wants the next step; `job` is the attempt it would be at."""
+
+    job: Job | None
+    settle_s: float = 0.0
+
+
+class Try(NamedTuple):
+    """The operator wants the release driven once, with nothing hung."""
+
+
+class Answered(NamedTuple):
+    """An effect was carried out; `token` is of an `Arm`."""
+
+    ticket: int
+    token: int | None = None
+
+
+class Judged(NamedTuple):
+    """The drop was analysed."""
+
+    ticket: int
+    verdict: str
+    reasons: tuple[str, ...]
+
+
+class Refused(NamedTuple):
+    """An effect failed; `trouble` says why and what to do."""
+
+    ticket: int
+    trouble: str
+
+
+class Tick(NamedTuple):
+    """Time went by."""
+
+    seconds: float
+
+
+class Stopped(NamedTuple):
+    """STOP, or any key before the release."""
+
+
+class Lost(NamedTuple):
+    """The daemon is out of reach, or control is somebody else's."""
+
+    trouble: str
+
+
+class Warned(NamedTuple):
+    """Something went wrong that changes nothing here."""
+
+    trouble: str
+
+
+class Found(NamedTuple):
+    """The session has a recorded drop that nobody has judged."""
+
+    job: Job
+
+
+class Reject(NamedTuple):
+    """The operator rejects the drop."""
+
+    cause: str
+
+
+class Note(NamedTuple):
+    """The operator has something to say about the drop."""
+
+    text: str
+
+
+class Again(NamedTuple):
+    """The operator wants another attempt."""
+
+    job: Job
+
+
+Event: TypeAlias = (
+    Opened | Closed | GoOn | Try | Answered | Judged | Refused | Tick | Stopped | Lost | Warned
+    | Found
+    | Reject | Note | Again
+)  # fmt: skip
+
+# ---------------------------------------------------------------- effects
+
+
+class Wait(NamedTuple):
+    """Let the chains come to rest."""
+
+    seconds: float
+
+
+class Arm(NamedTuple):
+    """Prepare the release."""
+
+    job: Job
+
+
+class Fire(NamedTuple):
+    """Let go."""
+
+    token: int
+
+
+class Drive(NamedTuple):
+    """Let go of nothing: a test."""
+
+
+class Collect(NamedTuple):
+    """Wait until the drop is in the session file."""
+
+    job: Job
+
+
+class Judge(NamedTuple):
+    """Analyse the drop."""
+
+    job: Job
+
+
+class Log(NamedTuple):
+    """Put a verdict into the session file."""
+
+    job: Job
+    state: str
+    reasons: tuple[str, ...]
+
+
+class Stop(NamedTuple):
+    """Everything off."""
+
+
+Effect: TypeAlias = Wait | Arm | Fire | Drive | Collect | Judge | Log | Stop

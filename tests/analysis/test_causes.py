@@ -1,0 +1,131 @@
+"""Edges that are missing or belong to no rod, named against the simulation's hidden truth."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from rig.analysis.align import EXTRA, MISSED
+from rig.analysis.result import DropResult
+from sim.dials import Dials
+from tests.analysis.drops import STRAY, UNIFORM, Case, case, with_dials
+
+LOWEST = {min(UNIFORM.gates.on(s), key=lambda gate: gate.height).channel for s in ("impact",)}
+STRING_S = 250e-6  # the simulation's string flickers for up to 200 µs, its rods bounce for 2 ms
+
+
+def kinds(result: DropResult) -> set[str]:
+    return {cause.kind for cause in result.causes}
+
+
+def consistent(result: DropResult) -> None:
+    """One cause for each edge that the audit counts, each with its cost."""
+    absent = [cause for cause in result.causes if cause.edge is None]
+    surplus = [cause for cause in result.causes if cause.edge is not None]
+    assert (len(absent), len(surplus)) == (result.audit.missed, result.audit.spurious)
+    assert {cause.cost for cause in absent} <= {MISSED}
+    assert {cause.cost for cause in surplus} <= {EXTRA}
+    assert not {cause.edge for cause in surplus} & result.matches.keys()
+    times = [cause.time_s for cause in result.causes]
+    assert times == sorted(times)
+
+
+def shadow_s(one: Case, number: int) -> float:
+    """How long the shadow lasted that an edge begins or ends, by the truth."""
+    when, channel, blocked, _ = one.truth.edges[number]
+    same = [edge[0] for edge in one.truth.edges if edge[1] == channel]
+    at = same.index(when)
+    return same[at + 1] - when if blocked else when - same[at - 1]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_each_edge_has_the_cause_that_it_has(seed):
+    """Everything at once, every dial at its default but twice as many faults of edges."""
+    one = case(
+        UNIFORM,
+        Dials(skew_sd=1e-3, missed=0.02, chatter=0.01, string=0.004, bounce=0.1),
+        incline=40.0,
+        seed=seed,
+    )
+    result = one.analyze()
+    consistent(result)
+    hidden = Counter()
+    for cause in result.causes:
+        if cause.edge is None:
+            continue
+        when, channel, blocked, rod = one.truth.edges[cause.edge]
+        assert (cause.channel, cause.blocked) == (channel, blocked)
+        assert cause.time_s == pytest.approx(when, abs=2e-6)
+        if rod != STRAY:
+            true = "chatter"
+            assert cause.rod == rod
+        elif shadow_s(one, cause.edge) < STRING_S:
+            true = "string"
+        else:
+            true = "bounce"
+            assert channel in LOWEST
+        if true == "bounce" and cause.kind == "chatter":
+            hidden["bounce at the very moment of a rod's edge"] += 1
+            continue
+        assert cause.kind == true
+        assert (cause.rod is None) == (true != "chatter")
+    assert hidden.total() <= 1
+    assert {"chatter", "bounce"} <= kinds(result)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_rod_without_a_trace_and_a_gap_without_one(seed):
+    """Of a rod that never darkened a beam both edges are missing, of a gap one of each rod."""
+    one = case(UNIFORM, with_dials(missed=0.04), incline=40.0, seed=seed)
+    result = one.analyze()
+    consistent(result)
+    assert kinds(result) == {"missed", "merged"}
+    there = {(channel, rod, blocked) for _, channel, blocked, rod in one.truth.edges}
+    quiet = case(UNIFORM, Dials.quiet(), incline=40.0, seed=seed).truth.edges
+    due = {(channel, rod, blocked): when for when, channel, blocked, rod in quiet}
+    found = {(c.channel, c.rod, c.blocked): c for c in result.causes}
+    assert found.keys() == due.keys() - there
+    for (channel, rod, blocked), cause in found.items():
+        alone = (channel, rod, not blocked) in there  # its other edge came
+        if alone:
+            assert cause.kind == "merged"
+        assert cause.time_s == pytest.approx(due[channel, rod, blocked], abs=20e-6)
+    # Two gaps in a row leave a rod between them without a trace, but in the dark.
+    missed = [cause for cause in result.causes if cause.kind == "missed"]
+    assert all((c.channel, c.rod, not c.blocked) in found for c in missed)
+
+
+def test_a_dead_gate_is_named():
+    one = case(UNIFORM, Dials.quiet(), incline=40.0)
+    channel = max(gate.channel for gate in UNIFORM.gates.gates)
+    result = one.with_edges([e for e in one.drop.edges if e.channel != channel]).analyze()
+    consistent(result)
+    assert kinds(result) == {"dead gate"}
+    assert {cause.channel for cause in result.causes} == {channel}
+
+
+def test_a_flash_that_nothing_explains_is_extra():
+    one = case(UNIFORM, Dials.quiet(), incline=40.0)
+    train = one.side("free").trains[3]
+    gap = train.times[5], train.times[6] - train.times[5]
+    channel = UNIFORM.gates.gates[train.gate].channel
+    flash = [
+        one.drop.edges[0]._replace(
+            tick=round((gap[0] + share * gap[1]) * one.scale.hz), channel=channel, blocked=dark
+        )
+        for share, dark in ((0.3, True), (0.6, False))
+    ]
+    result = one.with_edges([*one.drop.edges, *flash]).analyze()
+    consistent(result)
+    assert [cause.kind for cause in result.causes] == ["extra", "extra"]
+    assert math.isclose(result.causes[0].time_s, flash[0].tick / one.scale.hz, rel_tol=1e-12)
+
+
+def test_a_perfect_record_has_no_causes():
+    result = case(UNIFORM, Dials.quiet(), incline=40.0).analyze()
+    assert result.causes == ()
+    assert result.json()["causes"] == []
+    assert "causes" not in replace(result, matches={}).json()

@@ -1,0 +1,61 @@
+"""Every estimator on the same simulated drops."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from rig.analysis.drop import fit_drop
+from rig.analysis.quantities import quantities
+from rig.bench.draws import drawn
+from rig.bench.line_fits import line_fit
+from rig.cli import main
+from sim.dials import Dials
+from tests.analysis.drops import UNIFORM, case
+from tests.cli.lab import short
+
+
+def test_line_fits_are_near_on_a_perfect_rig():
+    one = case(UNIFORM, Dials.quiet(), incline=40.0)
+    reading = line_fit(UNIFORM, one.drop, one.scale.hz)
+    assert reading.separation_m == pytest.approx(one.truth.separation_raw_m, rel=0.02)
+    assert reading.speed_m_s == pytest.approx(one.truth.speed_m_s, rel=0.02)
+    assert line_fit(UNIFORM, one.with_edges([]).drop, one.scale.hz) is None
+
+
+def test_draws_have_the_mean_of_the_adjustment():
+    """Within what so many draws allow; what is not linear adds less than that."""
+    one = case(UNIFORM, Dials(skew_sd=1e-3), incline=40.0)
+    fit = fit_drop(UNIFORM, one.run, one.drop, one.scale)[1]
+    known = quantities(fit.model, fit.estimate)
+    reading = drawn(fit, 20_000, 3)
+    for name in ("separation_m", "speed_m_s"):
+        off = getattr(reading, name) - known[name].value
+        assert abs(off) < 5 * known[name].u / np.sqrt(20_000) + 0.01 * known[name].u
+    assert drawn(fit, 20_000, 3) == reading
+
+
+def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("rig.bench.estimators.TRIALS", (10, 10**6))  # the ends only
+    protocol = tmp_path / "p.yaml"
+    protocol.write_text(short("40 deg", 4), "utf-8")
+    arguments = ["bench", "estimators", "-o", str(tmp_path / "o"), "--protocol", str(protocol)]
+    assert main([*arguments, "--repeats", "4", "--budget", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    names = [one["name"] for one in found["estimators"]]
+    assert {"camera reading", "one-run fit", "session fit", "Monte Carlo, draws"} <= set(names)
+    by_name = {one["name"]: one for one in found["estimators"]}
+    assert by_name["camera reading"]["seconds"] is None
+    camera, ours = (by_name[name] for name in ("camera reading", "session fit"))
+    assert ours["separation_median_m"] < camera["separation_median_m"]
+    assert any("M = 1e+06" in one for one in found["left_out"])
+    assert {path.suffix for path in (tmp_path / "o").iterdir()} == {".csv", ".json", ".svg"}
+    assert "SIMULATED" in (tmp_path / "o" / "estimators.svg").read_text("utf-8")
+
+
+def test_only_a_simulation_has_a_truth(tmp_path, capsys):
+    arguments = ["bench", "estimators", "-o", str(tmp_path / "o"), "--port", "/dev/ttyACM0"]
+    assert main(arguments) == 2
+    assert "no simulation" in capsys.readouterr().err

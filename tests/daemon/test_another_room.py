@@ -1,0 +1,27 @@
+"""A board in another room, through a program there that passes its port on."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.bench.invariants import broken
+from rig.bench.stand import Stand
+from rig.link.messages import Phase
+from rig.link.port import BAUDRATE
+from tests.daemon.far_port import FarPort
+
+
+@pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
+def test_a_session_survives_a_connection_that_is_lost_while_chains_fall(scheme):
+    with Stand(1) as stand, FarPort(stand.port, scheme) as far:
+        stand.port = far.url
+        stand.start_daemon()
+        stand.start_runner()
+        stand.await_phase(Phase.RECORDING)
+        far.hang_up()
+        assert stand.waited() == 4
+        assert "connection lost" in stand.told
+        assert stand.run() == 0, stand.told
+        assert broken(stand.session, stand.happened(), 1) == []
+        if scheme == "rfc2217":
+            assert far.baudrates[0] == BAUDRATE, "as it was asked for over there"

@@ -1,0 +1,124 @@
+"""The release tried with nothing hung: really driven, stopped like a drop, and no run of a plan."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from rig.daemon.faults import ControlError, StoppedError
+from rig.errors import DeviceError, InputError
+from rig.link.messages import Phase, Reason
+from rig.link.refusals import DeviceRefusedError
+from rig.replay import replay
+from rig.session.store import Session
+
+
+@pytest.fixture
+def driver(stand, client):
+    """Have a session open and control of it."""
+    one = client("the driver")
+    one.take_control()
+    one.open_session(str(stand.protocol), str(stand.session))
+    return one
+
+
+def section(client):
+    return client.call("subscribe")["state"]["release_test"]
+
+
+def until(true):
+    """Wait for something to become true."""
+    end = time.monotonic() + 20.0
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def driven(stand):
+    """When the release went on and off, s."""
+    seen = [(one["at_s"], one["outputs"]) for one in stand.happened() if "outputs" in one]
+    at = [(when, bool(mask & 1)) for when, mask in seen]
+    changes = [at[n] for n in range(len(at)) if at[n][1] != (at[n - 1][1] if n else False)]
+    return [when for when, _ in changes]
+
+
+def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(stand, driver):
+    found = driver.call("test_release")
+    assert found == section(driver)
+    assert (found["pulse_s"], found["edges"], found["faults"]) == (0.08, 0, [])
+    on, off = driven(stand)
+    assert 0.07 < off - on < 0.12
+    assert driver.call("subscribe")["state"]["phase"] == "idle"
+    token = driver.arm(1, 1)
+    driver.fire(token)
+    driver.collect(1, 1)
+    driver.close_session()
+    assert section(driver) == found
+    with Session.open(stand.session, readonly=True) as session:
+        assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1)]
+        assert {entry.run for entry in session.states()} == {1}
+        assert "DIFFERENT" not in replay(session).lines[0]
+
+
+def test_it_needs_control_a_session_and_nothing_armed(stand, client):
+    one, other = client("one"), client("other")
+    one.take_control()
+    with pytest.raises(InputError, match="not the moment"):
+        one.call("test_release")
+    one.open_session(str(stand.protocol), str(stand.session))
+    with pytest.raises(ControlError):
+        other.call("test_release")
+    one.arm(1, 1)
+    with pytest.raises(InputError, match="not the moment"):
+        one.call("test_release")
+    assert not driven(stand)
+
+
+def test_an_open_emergency_stop_refuses_it(stand, driver):
+    stand.hand("stop 1")
+    time.sleep(0.1)
+    with pytest.raises(DeviceRefusedError) as refused:
+        driver.call("test_release")
+    assert refused.value.reason is Reason.STOPPED
+    assert not driven(stand)
+
+
+def test_stop_ends_it(stand, driver, client):
+    watcher, raised = client("a watcher"), []
+
+    def test():
+        try:
+            driver.call("test_release")
+        except StoppedError as error:
+            raised.append(error)
+
+    testing = threading.Thread(target=test)
+    testing.start()
+    begun = stand.await_phase(Phase.RECORDING)
+    watcher.stop("enough")
+    testing.join()
+    assert raised
+    assert section(driver) is None
+    assert stand.await_phase(Phase.IDLE) - begun < 0.5  # its record alone lasts longer
+    time.sleep(0.25)  # the release rests three times as long as it was on
+    assert driver.arm(1, 1)  # nothing is left behind that forbids it
+
+
+def test_a_cable_pulled_during_it_leaves_nothing_behind(stand, driver):
+    raised = []
+
+    def test():
+        with pytest.raises(DeviceError) as error:
+            driver.call("test_release")
+        raised.append(error)
+
+    testing = threading.Thread(target=test)
+    testing.start()
+    stand.await_phase(Phase.RECORDING)
+    stand.hand("pull 0.8")
+    testing.join()
+    assert raised
+    until(lambda: driver.call("subscribe")["state"]["link"]["state"] == "up")
+    assert driver.arm(1, 1)

@@ -1,0 +1,171 @@
+"""What a layout is said to tell, against what drops do tell, and against better layouts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rig.analysis.components import Components
+from rig.analysis.session import Analysis
+from rig.design.cases import beams_of, cases
+from rig.design.outlook import outlook
+from rig.design.readable import readable
+from rig.design.search import Room, better, candidates, room, score
+from rig.errors import InputError
+from rig.estimate.coefficients import best, scene
+from rig.estimate.forms import merged
+from rig.protocol.plan import runs
+from rig.protocol.scene import Gate, Gates, Plan, Protocol
+from sim.dials import Dials
+from tests.analysis.drops import SINGLE, UNIFORM, Case, case
+from tests.analysis.sessions import analysis as analyzed
+from tests.estimate.sessions import DIALS, analysis, forms
+
+INCLINES = (30.0, 50.0, 70.0)
+TRUE = Components(floor=1e-6, hang=1e-4, beam=5e-4, impulse=0.02, impulse_floor=1e-6, gates=2 / 3)
+"""What the simulation's default dials are, in the analysis' words."""
+
+
+def placed(protocol: Protocol, heights: list[float], **plan) -> Protocol:
+    """The protocol with one side's beams elsewhere."""
+    gates = tuple(Gate(n, height, "impact") for n, height in enumerate(heights))
+    return replace(
+        protocol, gates=Gates(gates, protocol.gates.height_u), plan=replace(protocol.plan, **plan)
+    )
+
+
+@cache
+def dropped(protocol_heights: tuple[float, ...]) -> tuple[tuple[Case, ...], Analysis]:
+    """Sixteen drops of one chain before beams at these heights."""
+    protocol = placed(SINGLE, list(protocol_heights), repeats=16)
+    drops = [case(protocol, Dials(), seed=5, run=run.number) for run in runs(protocol)]
+    return tuple(drops), analyzed(drops)
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """The outlook for the simulated session: its coefficients, its plan, the scatter it taught."""
+    surface = UNIFORM.surface
+    true = replace(
+        surface,
+        restitution=replace(surface.restitution, value=DIALS.restitution),
+        friction=replace(surface.friction, value=DIALS.friction),
+    )
+    protocol = replace(UNIFORM, surface=true, plan=Plan(INCLINES, 2))
+    beams = beams_of(protocol)
+    learned = analysis(INCLINES).lesson.components
+    return outlook(protocol, cases(protocol, beams, learned), range(len(beams)))
+
+
+def test_the_outlook_is_what_a_session_then_states(expected):
+    """Same scatter, same plan: only edges that were missed are in one and not in the other."""
+    for result in analysis(INCLINES).runs:
+        for name, by_incline in expected.single.items():
+            stated = result.quantities[name].u
+            assert by_incline[result.run.incline_deg] == pytest.approx(stated, rel=0.1), name
+
+
+def test_the_outlook_of_coefficients_is_what_the_estimate_then_states(expected):
+    found = best(UNIFORM, scene(UNIFORM, merged(forms(INCLINES))))
+    assert set(expected.coefficients) == {"restitution", "friction"}
+    for name, u in expected.coefficients.items():
+        assert u == pytest.approx(found[name][1], rel=0.2), name
+
+
+def test_more_runs_tell_more_but_not_of_what_is_common():
+    beams = beams_of(UNIFORM)
+    one, many = (
+        outlook(p, cases(p, beams, TRUE), range(len(beams)))
+        for p in (replace(UNIFORM, plan=Plan(INCLINES, n)) for n in (2, 32))
+    )
+    for name in ("restitution", "friction"):
+        assert many.coefficients[name] < 0.5 * one.coefficients[name]
+    for incline in INCLINES:
+        assert many.mean["speed_m_s"][incline] < 0.5 * one.mean["speed_m_s"][incline]
+        assert many.mean["separation_m"][incline] < one.mean["separation_m"][incline]
+        # Beam heights are off by as much in every run.
+        assert many.mean["separation_m"][incline] > 0.2 * one.mean["separation_m"][incline]
+
+
+def test_one_incline_tells_no_friction():
+    protocol = replace(UNIFORM, plan=Plan((40.0,), 12))
+    beams = beams_of(protocol)
+    found = outlook(protocol, cases(protocol, beams, TRUE), range(len(beams)))
+    assert found.coefficients == {}
+
+
+BEFORE = (0.06, 0.07, 0.1, 0.13, 0.16, 0.204, 0.35, 0.69)
+"""No beam below the last rod gap, where V shows."""
+
+
+def speed_errors(layout: tuple[float, ...]) -> np.ndarray:
+    drops, found = dropped(layout)
+    assert sum(result.learned for result in found.runs) >= 14
+    return np.array(
+        [
+            result.quantities["speed_m_s"].value - one.truth.speed_m_s
+            for one, result in zip(drops, found.runs, strict=True)
+            if result.learned
+        ]
+    )
+
+
+def predicted_speed_u(layout: tuple[float, ...]) -> float:
+    protocol = placed(SINGLE, list(layout), repeats=16)
+    beams = beams_of(protocol)
+    found = outlook(protocol, cases(protocol, beams, TRUE), range(len(beams)), ("speed_m_s",))
+    return found.typical("speed_m_s")
+
+
+def test_a_proposed_layout_is_better_as_predicted_and_in_fact():
+    """Root mean square over sixteen drops: χ² of 16 stays within a factor 1.6 of its mean."""
+    protocol = placed(SINGLE, list(BEFORE), repeats=16)
+    proposed = tuple(h for _, h in better(protocol, TRUE, Room(0.02, 0.8, 0.01, 0.002)))
+    assert min(proposed) < 0.048
+    before, after = (float(np.sqrt(np.mean(speed_errors(x) ** 2))) for x in (BEFORE, proposed))
+    assert after < 0.7 * before
+    for layout, realised in ((BEFORE, before), (proposed, after)):
+        assert 0.6 < realised / predicted_speed_u(layout) < 1.6
+
+
+def test_low_beams_alone_tell_much_and_cannot_be_read():
+    """Nothing sees the chain before it strikes, so that many falls fit the same edges."""
+    low = [("impact", h) for h in (0.02, 0.044, 0.056, 0.084)]
+    assert not readable(SINGLE, low)
+    assert readable(SINGLE, beams_of(SINGLE))
+    assert readable(UNIFORM, beams_of(UNIFORM))
+
+
+def test_proposals_respect_limits_and_are_never_worse():
+    there = [0.06, 0.1, 0.35, 0.69]
+    protocol = placed(SINGLE, there, repeats=4)
+    limits = Room(0.05, 0.7, 0.03, 0.002)
+    found = better(protocol, TRUE, limits)
+    heights = sorted(height for _, height in found)
+    assert limits.lowest <= heights[0]
+    assert heights[-1] <= limits.highest
+    assert min(np.diff(heights)) >= limits.spacing - 1e-9
+    hanging = 0.18 + np.array(protocol.chains["A"].chain.heights)
+    moved = [h for h in heights if h not in there]
+    assert all(np.abs(hanging - h).min() >= 0.0127 / 2 for h in moved)
+    every = cases(protocol, [*beams_of(protocol), *found], TRUE)
+    assert score(protocol, every, range(4, 8)) <= score(protocol, every, range(4)) + 1e-9
+
+
+def test_candidates_are_where_a_protocol_may_have_a_gate():
+    limits = room(UNIFORM, None, None, 0.01)
+    found = candidates(UNIFORM, limits)
+    assert (limits.lowest, limits.highest) == (0.020, 1.078)
+    assert found[0] == 0.02
+    hanging = 0.18 + np.array(UNIFORM.chains["A"].chain.heights)
+    width = UNIFORM.chains["A"].widths[0]
+    assert all(np.abs(hanging - h).min() >= width / 2 + 0.002 for h in found)
+    assert room(UNIFORM, 0.03, 9.0, 0.01).highest == pytest.approx(0.18 + 1.165)
+
+
+def test_a_scene_without_gates_has_no_layout():
+    with pytest.raises(InputError, match="no gates"):
+        beams_of(replace(SINGLE, gates=None))

@@ -1,0 +1,37 @@
+"""Short sessions over several inclines, with coefficients that are not the protocol's."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from rig.analysis.session import Analysis
+from rig.analysis.shared import Shared
+from rig.estimate.forms import Form, form
+from rig.protocol.plan import runs
+from sim.dials import Dials
+from tests.analysis.drops import SCENES
+from tests.analysis.sessions import analysis as analyzed
+from tests.analysis.sessions import cases
+
+BETA, MU = 0.42, 0.26
+DIALS = Dials(skew_sd=1e-3, restitution=BETA, friction=MU)
+
+
+@cache
+def analysis(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> Analysis:
+    """So many drops at each of these inclines, half of them with either chain."""
+    planned = runs(SCENES["uniform"])
+    numbers = tuple(
+        run.number
+        for incline in inclines
+        for run in [one for one in planned if one.incline_deg == incline][:each]
+    )
+    return analyzed(cases(numbers, DIALS, seed))
+
+
+@cache
+def forms(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> tuple[Form, ...]:
+    found = analysis(inclines, each, seed)
+    by_number = {run.number: run for run in runs(SCENES["uniform"])}
+    shared = Shared(drop.model for drop in found.adjusted.values())
+    return tuple(form(by_number[run], drop, shared) for (run, _), drop in found.adjusted.items())

@@ -1,0 +1,229 @@
+"""Coefficients of the impacts against the truth that the simulation hides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.result import GOOD
+from rig.analysis.session import analyze
+from rig.errors import InputError
+from rig.estimate.coefficients import best, scene
+from rig.estimate.forms import merged
+from rig.estimate.hypotheses import one_alpha
+from rig.estimate.joint import fit
+from rig.estimate.posterior import posterior
+from rig.estimate.session import estimate
+from rig.model.impact import alpha_inclined
+from rig.protocol.plan import runs
+from rig.units import Quantity
+from sim.dials import Dials
+from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
+from tests.analysis.sessions import analysis as analyzed
+from tests.analysis.sessions import cases
+from tests.estimate.sessions import BETA, MU, analysis, forms
+
+SURFACE = (30.0, 50.0, 70.0)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return estimate(UNIFORM, analysis(SURFACE))
+
+
+def parameter(found, name):
+    return next(one for one in found["parameters"] if one["name"] == name)
+
+
+@pytest.mark.parametrize(("name", "truth"), [("restitution", BETA), ("friction", MU)])
+def test_the_coefficients_are_found_whatever_the_protocol_says(found, name, truth):
+    """The protocol's 0.50 and 0.20 are many standard uncertainties away."""
+    one = parameter(found, name)
+    measured = one["least_squares"]
+    assert one["identified"]
+    assert abs(measured["value"] - truth) < 4 * measured["u"]
+    assert measured["u"] < 0.02
+    assert abs(measured["value"] - one["stated"]["value"]) > 4 * measured["u"]
+
+
+def test_restitution_and_friction_pull_against_each_other(found):
+    names, matrix = found["correlation"]["names"], np.array(found["correlation"]["matrix"])
+    assert matrix[names.index("restitution"), names.index("friction")] < -0.5
+    assert np.diag(matrix) == pytest.approx(np.ones(len(names)))
+
+
+def test_every_incline_has_the_alpha_of_its_truth(found):
+    for line in found["alpha"]["inclines"]:
+        truth = alpha_inclined(BETA, MU, line["incline_deg"])
+        assert abs(line["alpha"]["value"] - truth) < 4 * line["alpha"]["u"]
+        assert line["alpha"]["u"] < 0.01 * truth
+
+
+def test_the_end_correction_is_needed_and_is_that_of_eq_10(found):
+    end = found["end_correction"]
+    assert end["needed"]
+    assert end["delta_aic"]["without"] > 1000
+    assert abs(end["scale"]["value"] - 1) < 4 * end["scale"]["u"]
+    assert end["gamma_eq10"] == pytest.approx(4 / 3)
+
+
+def test_no_test_of_a_true_model_fails(found):
+    """p-values of what is true are anything but tiny."""
+    assert found["tests"]["runs_share_alpha"]["p"] > 1e-4
+    assert found["tests"]["model"]["p"] > 1e-4
+    assert all(line["p"] > 1e-4 for line in found["impulses"]["inclines"])
+
+
+def test_impulses_of_all_rods_are_within_their_uncertainty(found):
+    errors = [
+        group["normalized_error"]
+        for line in found["impulses"]["inclines"]
+        for group in line["groups"]
+    ]
+    assert np.mean(np.abs(errors) < 1.0) > 0.85
+    for line in found["impulses"]["inclines"]:
+        assert [
+            rod for group in line["groups"] for rod in range(group["rods"][0], group["rods"][1] + 1)
+        ] == list(range(24))
+
+
+def test_contact_and_air_are_found_where_they_are(found):
+    """The simulated contact point is where the protocol says, and there is no air."""
+    assert all(abs(one["height_m"]["value"]) < 1e-3 for one in found["contact"])
+    assert abs(found["drag_per_m"]["value"]) < 4 * found["drag_per_m"]["u"]
+
+
+def test_the_posterior_stands_between_edges_and_prior(found):
+    for name in ("restitution", "friction"):
+        one = parameter(found, name)
+        edges, prior, both = one["least_squares"], one["stated"], one["posterior"]
+        assert both["u"] < edges["u"] < prior["u"]
+        assert (
+            min(edges["value"], prior["value"])
+            < both["value"]
+            < max(edges["value"], prior["value"])
+        )
+        assert both["low"] < both["value"] < both["high"]
+        assert both["high"] - both["low"] == pytest.approx(2 * 1.96 * both["u"], rel=0.03)
+
+
+def test_one_incline_does_not_tell_friction_from_restitution():
+    found = estimate(UNIFORM, analysis((50.0,), 4))
+    friction, restitution = parameter(found, "friction"), parameter(found, "restitution")
+    assert not friction["identified"]
+    assert friction["least_squares"]["u"] == pytest.approx(0.02, rel=1e-2)
+    assert any("friction is not identified" in said for said in found["left_out"])
+    # What β says then is only as good as the μ that is held: at 0.20 instead of 0.26.
+    assert restitution["least_squares"]["u"] > 0.02
+    assert "model" not in found["tests"]
+
+
+def test_a_pile_tells_only_its_own_restitution():
+    """The dial of the simulation sets the pile's β too."""
+    found = estimate(UNIFORM, analysis((10.0,), 2))
+    assert [one["name"] for one in found["parameters"]] == ["pile_restitution"]
+    measured = parameter(found, "pile_restitution")["least_squares"]
+    assert abs(measured["value"] - BETA) < 4 * measured["u"]
+
+
+def test_alpha_of_each_run_is_that_of_the_joint_adjustment():
+    """Two ways to the same number: the forms, and the adjustment they were made from."""
+    found = analysis(SURFACE)
+    each = fit(forms(SURFACE), one_alpha(forms(SURFACE), lambda one: one.run.number))
+    for (run, _), drop in found.adjusted.items():
+        at = drop.model.unknowns["alpha"]
+        value, u = each[f"α {run}"]
+        assert abs(drop.model.guesses["impact"].alpha + drop.x[at][0] - value) < 0.1 * u
+
+
+def test_like_drops_added_up_say_the_same():
+    every, like = forms((50.0,), 4), merged(forms((50.0,), 4))
+    assert (len(every), len(like)) == (4, 2)  # A strikes twice, and B
+    key = lambda one: one.run.incline_deg  # noqa: E731
+    one, other = (fit(some, one_alpha(some, key)) for some in (every, like))
+    assert one.names == other.names
+    np.testing.assert_allclose(one.values, other.values, rtol=1e-9)
+    np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-6, atol=1e-18)
+    assert one.chi2 == pytest.approx(other.chi2, rel=1e-6)
+
+
+def test_without_priors_the_posterior_is_the_least_squares_fit():
+    """But for the curvature of α in μ, which is small over so narrow a range."""
+    surface = UNIFORM.surface
+    vague = replace(
+        UNIFORM,
+        surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2)),
+    )
+    found = scene(vague, merged(forms(SURFACE)))
+    centre = best(vague, found)
+    spread = posterior(vague, found, centre)
+    for name in ("restitution", "friction"):
+        (mean, sd), (value, u) = spread.moments(name), centre[name]
+        assert abs(mean - value) < 0.1 * u
+        assert sd == pytest.approx(u, rel=0.05)
+
+
+def test_curves_end_at_the_results():
+    found = analysis(SURFACE)
+    drawn = estimate(UNIFORM, found)["curves"]
+    results = {one.run.number: one for one in found.runs if one.verdict in GOOD}
+    assert [one["incline_deg"] for one in drawn] == list(SURFACE)
+    for curve in drawn:
+        quantities = results[curve["run"]].quantities
+        separation, speed = quantities["separation_m"], quantities["speed_m_s"]
+        assert curve["separation_m"][-1] == pytest.approx(separation.value, abs=1e-6)
+        # The curve is at a fixed time, the result at that of the hit, which is uncertain too.
+        assert curve["separation_m_U95"][-1] == pytest.approx(1.96 * separation.u, rel=0.3)
+        assert curve["speed2_m2_s2"][-1] == pytest.approx(speed.value**2, rel=1e-5)
+        assert curve["speed2_m2_s2_U95"][-1] == pytest.approx(
+            1.96 * 2 * speed.value * speed.u, rel=0.02
+        )
+        assert curve["separation_m"][0] == pytest.approx(0.0, abs=2e-3)
+        assert curve["speed2_m2_s2"][0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_one_chain_and_few_drops_are_estimated_too():
+    found = estimate(SINGLE, analyzed(cases((1, 2), scene="single")))
+    assert found["drops"] == 2
+    assert found["drag_per_m"] is None
+    assert "separation_m" not in found["curves"][0]
+    (line,) = found["alpha"]["inclines"]
+    truth = alpha_inclined(0.5, 0.2, 40.0)
+    assert abs(line["alpha"]["value"] - truth) < 4 * line["alpha"]["u"]
+
+
+def test_where_nothing_strikes_there_is_nothing_to_estimate():
+    with pytest.raises(InputError, match="nothing strikes"):
+        estimate(FENCE, analyzed(cases((1, 2), scene="fence")))
+
+
+def dropped(protocol, numbers):
+    """Drops of a scene of its own, analysed."""
+    drops = [case(protocol, Dials(skew_sd=1e-3), run=number) for number in numbers]
+    return analyze(protocol, [one.drop for one in drops], lambda _: drops[0].scale)
+
+
+def test_an_alpha_that_is_given_is_what_is_estimated():
+    rods = UNIFORM.chains["A"]
+    chain = replace(rods.chain, alpha=Quantity(0.15, 0.02), gamma=1.0)
+    chains = {name: replace(rods, name=name, chain=chain) for name in "AB"}
+    protocol = replace(UNIFORM, chains=chains)
+    found = estimate(protocol, dropped(protocol, (1, 2)))
+    (alpha,) = found["parameters"]
+    assert (alpha["name"], alpha["identified"]) == ("alpha", True)
+    assert abs(alpha["least_squares"]["value"] - 0.15) < 4 * alpha["least_squares"]["u"]
+    assert alpha["least_squares"]["u"] < 0.1 * 0.02  # of what the protocol says
+
+
+def test_inclines_outside_the_model_tell_no_coefficient():
+    """At 10° a rod with μ 0.2 does not slide."""
+    protocol = replace(UNIFORM, surface=replace(UNIFORM.surface, pile=None))
+    first = {run.incline_deg: run.number for run in reversed(runs(protocol))}
+    found = estimate(protocol, dropped(protocol, [first[incline] for incline in (0.0, 10.0, 50.0)]))
+    assert any(said.startswith("10° tells no coefficient") for said in found["left_out"])
+    assert len(found["alpha"]["inclines"]) == 3
+    # With level ground, which has no friction, one incline is enough.
+    assert parameter(found, "friction")["identified"]
+    assert parameter(found, "restitution")["identified"]

@@ -1,0 +1,85 @@
+"""Pieces of the estimate against what can be worked out by other means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from rig.analysis.result import GOOD
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.estimate.agreement import agreement
+from rig.estimate.air import slowed
+from rig.estimate.rods import _groups
+from rig.estimate.tail import chi2_tail
+from rig.model.chain import Chain
+from rig.model.drag import drag_hits, fallen
+from tests.analysis.drops import UNIFORM, impact_ratios
+from tests.estimate.sessions import analysis
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 3, 9, 24, 207, 1001])
+def test_the_tail_of_chi2(degrees):
+    for x in (0.0, 1e-3, 1.0, degrees, 3.0 * degrees, 700.0):
+        assert chi2_tail(x, degrees) == pytest.approx(chi2.sf(x, degrees), rel=1e-9, abs=1e-300)
+    with pytest.raises(ValueError, match="at least 1"):
+        chi2_tail(1.0, 0)
+
+
+def test_a_little_air_by_the_exact_fall_of_a_free_chain():
+    kappa, gravity = 1e-6, 9.81
+    times = np.linspace(0.0, 0.6, 25)
+    path = free_trajectory(0.1, 0.3, gravity)
+    exact = [(0.5 * gravity * t * t - fallen(t, gravity, kappa)) / kappa for t in times]
+    np.testing.assert_allclose(slowed(path, times + 0.1), exact, rtol=1e-4, atol=1e-9)
+
+
+def test_a_little_air_by_the_exact_fall_of_a_struck_chain():
+    """Where each rod strikes later by dt, the chain was higher by v·dt just before."""
+    chain: Chain = UNIFORM.chains["A"].chain
+    ratios, gravity, kappa = impact_ratios(chain), 9.81, 1e-6
+    alphas = np.full(chain.rods, 0.15)
+    path = struck_trajectory(0.0, 0.18, gravity, alphas, ratios, np.array(chain.heights))
+    gains = (alphas * ratios).tolist()
+    plain, air = (drag_hits(chain, gains, [k] * chain.rods, 0.18, gravity) for k in (0.0, kappa))
+    before = np.nextafter(path.time[1:], 0.0)
+    later = np.array([b.time_s - a.time_s for a, b in zip(plain, air, strict=True)]) / kappa
+    speed = np.array([hit.speed_before for hit in plain])
+    np.testing.assert_allclose(slowed(path, before), later * speed, rtol=1e-4)
+
+
+def test_rods_that_are_not_resolved_are_taken_with_their_neighbours():
+    sizes = np.ones(5)
+    sure, unsure = 0.1**2, 1.0
+    assert _groups(np.diag([sure] * 5), sizes) == [(n, n) for n in range(5)]
+    # The two in the middle are known by their sum alone.
+    covariance = np.diag([sure, unsure, unsure, sure, sure])
+    covariance[1, 2] = covariance[2, 1] = -unsure + sure
+    assert _groups(covariance, sizes) == [(0, 0), (1, 2), (3, 3), (4, 4)]
+    # What is left over at the end joins the last group; if nothing is known, all are one.
+    assert _groups(np.diag([sure, sure, sure, sure, unsure]), sizes)[-1] == (3, 4)
+    assert _groups(unsure * np.eye(5), sizes) == [(0, 4)]
+
+
+def test_agreement_with_the_model_counts_what_is_common_once():
+    """Against a model that is wrong by its own β, many inclines are no more than one."""
+    found = analysis((30.0, 50.0, 70.0))
+    good = [one for one in found.runs if one.verdict in GOOD]
+    whole = {one["quantity"]: one for one in agreement(UNIFORM, good)}
+    assert set(whole) == {"separation_m", "speed_m_s"}
+    for one in whole.values():
+        assert one["degrees"] == 3
+        independent = sum(line["chi2"] for line in one["inclines"])
+        assert one["chi2"] != pytest.approx(independent, rel=0.01)
+        assert one["p"] == pytest.approx(chi2.sf(one["chi2"], 3), rel=1e-9)
+    single = [one for one in good if one.run.incline_deg == 50.0]
+    (line,) = agreement(UNIFORM, single)[0]["inclines"]
+    assert agreement(UNIFORM, single)[0]["chi2"] == pytest.approx(line["chi2"])
+    assert line["chi2"] == pytest.approx((line["difference"] / line["u"]) ** 2)
+    by_summary = next(one for one in found.summary if one.incline_deg == 50.0)
+    mine = by_summary.normalized_error("separation_m")
+    assert mine is not None
+    assert math.copysign(1.0, mine) == math.copysign(1.0, line["normalized_error"])
+    assert line["normalized_error"] == pytest.approx(mine, rel=0.05)

@@ -1,0 +1,104 @@
+"""Samples as columns give what going through them one by one gives."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.link.epochs import epochs
+from rig.link.hosttime import one_axis
+from rig.link.samples import samples
+from rig.records import HostBreak, Ping
+from tests.link.clocks import HZ
+
+WRAP = 2**32
+S = 10**9
+GAPS = st.one_of(
+    st.integers(0, 2 * S),  # as the daemon pings
+    st.integers(-100 * S, 20_000 * S),  # a host that began again, and more than can be bridged
+)
+
+
+@st.composite
+def conversations(draw):
+    """Pings of a board that may restart, at times that may go back, and moments among them."""
+    pings, now_ns, count = [], 10**12, draw(st.integers(0, WRAP - 1))
+    off = draw(st.floats(-7e-3, 7e-3))  # beyond tolerance, too
+    for gap_ns in draw(st.lists(GAPS, max_size=12)):
+        now_ns += gap_ns
+        count += round(gap_ns * 1e-9 * HZ * (1.0 + off))
+        if draw(st.integers(0, 7)) == 0:
+            count = draw(st.integers(0, WRAP - 1))
+        trip_ns = draw(st.integers(0, 3_000_000))
+        pings.append(Ping(now_ns, now_ns + trip_ns, (count + trip_ns * HZ // (2 * S)) % WRAP))
+    moments = [p.host_send_ns + d for p in pings for d in (-1, 0, S)] or [0]
+    chosen = st.lists(st.sampled_from(moments), max_size=4)
+    breaks = [HostBreak(at, draw(st.integers(0, 9 * S)), 0) for at in draw(chosen)]
+    return pings, draw(chosen), breaks
+
+
+def middle(ping):
+    return (ping.host_send_ns + ping.host_recv_ns) // 2
+
+
+def one_count(last, ping):
+    """Wide tick of a sample behind another one, or `None`."""
+    expected = (middle(ping) - middle(last)) * 1e-9 * HZ
+    trips_ns = ping.host_recv_ns - ping.host_send_ns + last.host_recv_ns - last.host_send_ns
+    slack = abs(expected) * 0.006 + trips_ns * 1e-9 * HZ / 2 + 2
+    off = (ping.tick - last.tick - round(expected) + WRAP // 2) % WRAP - WRAP // 2
+    return last.tick + round(expected) + off if abs(off) <= slack < WRAP / 2 else None
+
+
+def epochs_one_by_one(pings, cuts_ns):
+    found, cuts = [], sorted(cuts_ns)
+    for ping in sorted(pings):
+        wide = None
+        if found:
+            last = found[-1][-1]
+            cut = bisect_left(cuts, last.host_recv_ns)
+            if cut == len(cuts) or cuts[cut] > ping.host_send_ns:
+                wide = one_count(last, ping)
+        if wide is None:
+            found.append([])
+        found[-1].append(ping if wide is None else ping._replace(tick=wide))
+    return found
+
+
+def axis_one_by_one(pings, breaks):
+    found, lives, before_ns = [], [[(0, 0)]], 0
+    for ping in pings:
+        shift = lives[-1][-1][1]
+        if ping.host_send_ns < before_ns:
+            shift += before_ns + 3600 * S - ping.host_send_ns
+            lives.append([(0, shift)])
+        elif found:
+            for one in breaks:
+                if before_ns <= one.host_ns <= ping.host_send_ns:
+                    shift += one.slept_ns
+                    lives[-1].append((one.host_ns, shift))
+        before_ns = ping.host_recv_ns
+        found.append(Ping(ping.host_send_ns + shift, before_ns + shift, ping.tick))
+    return found, lives
+
+
+@settings(max_examples=150)
+@given(conversations())
+def test_epochs_are_those_of_one_sample_after_the_other(drawn):
+    pings, cuts, _ = drawn
+    found = [[Ping(*row) for row in piece.tolist()] for piece in epochs(pings, HZ, cuts).pings]
+    assert found == epochs_one_by_one(pings, cuts)
+
+
+@settings(max_examples=150)
+@given(conversations())
+def test_the_axis_is_that_of_one_sample_after_the_other(drawn):
+    pings, boots, breaks = drawn
+    given_samples = samples(pings)
+    axis = one_axis(given_samples, boots, breaks)
+    found, lives = axis_one_by_one(pings, breaks)
+    assert [Ping(*row) for row in axis.pings.tolist()] == found
+    assert [[tuple(stretch) for stretch in life] for life in axis.lives] == lives
+    assert (given_samples == samples(pings)).all(), "what was given stays as it is"

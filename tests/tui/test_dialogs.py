@@ -1,0 +1,113 @@
+"""STOP everywhere: in every dialog, while typing, and in every state that lasts."""
+
+from __future__ import annotations
+
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+from textual.widgets import Input
+
+from rig.session.store import Session
+from rig.tui.screens.ask import Ask, Confirm, Pick
+from rig.tui.screens.help import Help
+from rig.tui.turns import Stage
+from tests.tui.lab import run
+
+
+@asynccontextmanager
+async def listening(op):
+    """Hear what the daemon is asked for."""
+    called, real = [], op.app.wire.call
+
+    async def call(method, **params):
+        called.append(method)
+        return await real(method, **params)
+
+    op.app.wire.call = call
+    yield called
+    op.app.wire.call = real
+
+
+async def stops(op, key):
+    """Press a key and see that the daemon is asked to stop."""
+    async with listening(op) as called:
+        await op.press(key)
+        await op.until(lambda: "stop" in called)
+
+
+def test_stop_works_in_every_dialog(lab):
+    async def work():
+        async with lab.ready() as op:
+            for opens, dialog, key in (
+                ("l", Confirm, "f9"), ("l", Confirm, "escape"),
+                ("question_mark", Help, "f9"), ("question_mark", Help, "escape"),
+                ("o", Pick, "f9"), ("o", Pick, "escape"),
+            ):  # fmt: skip
+                await op.press(opens)
+                await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))
+                await stops(op, key)
+                await op.until(lambda: len(op.app.screen_stack) == 1)
+            await op.press("3", "enter")
+            await op.at(Stage.RESULT)
+            await op.press("n", *"warm")
+            await op.until(lambda: isinstance(op.app.screen, Ask))
+            await stops(op, "f9")
+            assert op.app.screen.query_one(Input).value == "warm"  # nothing typed is lost
+            async with listening(op) as called:
+                await op.press("escape")
+                await op.until(lambda: len(op.app.screen_stack) == 1)
+            assert not called  # while typing it only leaves the line
+            await op.press("ctrl+p")
+            await op.until(lambda: len(op.app.screen_stack) == 2)
+            await stops(op, "f9")
+
+    run(work())
+
+
+def test_stop_works_in_every_state_that_lasts(lab):
+    lab.stop()
+    lab.daemons.clear()
+    lab.url += "&pace=1"
+    lab.start()
+
+    async def work():
+        async with lab.ready(countdown_s=600.0) as op:
+            for stage, key, said in (
+                (Stage.SETTLING, "f9", "nothing fell"), (Stage.COUNTDOWN, "escape", "nothing fell"),
+                (Stage.TESTING, "f9", "the release is off"),
+            ):  # fmt: skip
+                await op.press(*("l", "enter") if stage is Stage.TESTING else ("enter",))
+                await op.at(stage)
+                await stops(op, key)
+                await op.at(Stage.PREPARE)
+                await op.sees(said)
+            await op.until(lambda: op.app.state.phase == "idle")
+            op.app.flow = replace(op.app.flow, countdown_s=0.1)
+            await op.press("enter")
+            await op.at(Stage.LIVE)
+            await stops(op, "escape")
+            await op.at(Stage.RESULT)  # what there is is kept and judged
+
+    run(work())
+    with Session.open(lab.session, readonly=True) as session:
+        (drop,) = session.drops()
+        assert drop.run == 1
+
+
+def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
+    async def work():
+        async with lab.ready() as op:
+            async with listening(op) as called:
+                await op.press("l")
+                await op.sees("TEST OF THE RELEASE", "once, for 80 ms", "Take the chains off")
+                await op.press("n")
+                await op.until(lambda: len(op.app.screen_stack) == 1)
+                assert not called
+            await op.press("l", "enter")
+            await op.sees("release driven for 80 ms", "no gate saw anything")
+            assert op.app.page == "device"
+            await op.press("3")
+            await op.sees("RUN 1 of 3", "Enter arms")
+            assert {line.state for line in op.app.state.runs} == {"planned"}
+
+    run(work())

@@ -1,0 +1,100 @@
+"""The session page says what ``rig analyze`` says; and the shelf of sessions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from rig.results import detailed
+from rig.session.store import Session
+from rig.tui.app import RigApp
+from rig.tui.book import Book
+from rig.tui.options import Options
+from rig.tui.plots import control_pictures
+from rig.tui.shelf import shelf
+from tests.cli.lab import rig, short
+from tests.tui.lab import KEYS, Operator, run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> Path:
+    """Record four drops of two chains."""
+    folder = tmp_path_factory.mktemp("learned")
+    protocol, session = folder / "abba.yaml", folder / "abba.session"
+    protocol.write_text(short("[40 deg]", 4), "utf-8")
+    done = rig("run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes")
+    assert done.returncode == 0, done.stderr
+    return session
+
+
+def test_what_is_learned_is_what_rig_analyze_says(recorded):
+    book = Book(recorded)
+    alone = book.read()
+    assert (alone.learned, alone.lagging) == (0, True)
+    book.learn(alone)
+    learned = book.read()
+    with Session.open(recorded, readonly=True) as session:
+        expected = detailed(session)[0]
+    assert (learned.learned, learned.lagging) == (len(expected.lesson.drops), False)
+    assert learned.analysis == expected.json()
+    assert learned.analysis["summary"] != alone.analysis["summary"]
+
+
+def test_both_control_charts_are_there_and_hide_a_blind_run(recorded):
+    found = Book(recorded).read()
+    for hidden, runs in ((None, [1.0, 2.0, 3.0, 4.0]), (2, [1.0, 3.0, 4.0])):
+        skew, gravity = control_pictures(found, hidden)
+        assert "skew" in skew.title
+        assert "g of the free chain" in gravity.title
+        for chart in (skew, gravity):
+            assert sorted(x for one in chart.series if one.kind == "bars" for x in one.x) == runs
+    single = replace(found, gravity={})
+    assert len(control_pictures(single, None)) == 1
+
+
+def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded):
+    other = recorded.with_name("zero.session")
+    Session.create(other, short(), "zero.yaml", simulated=True, origin="sim://").close()
+    (recorded.parent / "broken.session").write_bytes(b"nothing")
+    volumes = {volume.path.name: volume for volume in shelf(recorded.parent)}
+    assert list(volumes) == ["broken.session", "zero.session", "abba.session"]  # newest first
+    assert (volumes["abba.session"].drops, volumes["zero.session"].drops) == (4, 0)
+    assert volumes["broken.session"].trouble
+
+    async def work():
+        app = RigApp(Options(session=other, offline=True), KEYS)
+        async with app.run_test(size=(120, 36)) as pilot:
+            op = Operator(app, pilot)
+            await op.sees("No drop is recorded yet")
+            await op.press("o")
+            await op.sees("abba.session", "4 drops", "broken.session")
+            await op.press("down", "enter")
+            await op.sees("drop 1 of 4", "abba.session")
+            await op.press("5", "6", "g")
+            await op.sees("Drops of this session", "run 4, attempt 1")
+            await op.press("end", "enter")
+            await op.sees("drop 4 of 4")
+            await op.press("o")
+            await op.sees("broken.session")
+            await op.press("home", "enter")
+            await op.sees("✗", "drop 4 of 4")
+
+    run(work())
+
+
+def test_the_session_page_says_how_many_taught_each_other(recorded):
+    async def work():
+        app = RigApp(Options(session=recorded, offline=True), KEYS)
+        async with app.run_test(size=(120, 36)) as pilot:
+            op = Operator(app, pilot)
+            await op.press("5")
+            await op.sees("after learning from 4 runs", "release skew")
+            await op.press("y")
+            await op.sees("g of the free chain")
+
+    run(work())

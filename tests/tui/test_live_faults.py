@@ -1,0 +1,144 @@
+"""Cable, board and daemon fail while each screen is open: said at once, mended by itself."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from rig.session.store import Session
+from rig.tui.turns import Stage
+from tests.tui.lab import run
+
+PULLED = ("✗ the port is lost", "it is found again by itself")
+RESTARTED = ("✗ the port was lost and is back: the board restarted", "check its power supply")
+
+
+def pull(stand, lab):
+    stand.hand("pull 1.5")
+
+
+def reset(stand, lab):
+    stand.hand("reset")
+
+
+def kill(stand, lab):
+    lab.kill()
+
+
+async def mended(op):
+    await op.until(lambda: op.app.state.link == "up" and op.app.wire.driving)
+    await op.until(lambda: op.app.state.section("session"))
+
+
+async def armed(op):
+    """Arm, and again where a busy computer let the board wait too long."""
+    wanted = {Stage.COUNTDOWN, Stage.LIVE, Stage.JUDGING, Stage.RESULT}
+    while op.app.flow.stage not in wanted:
+        if op.app.flow.stage is Stage.PREPARE:
+            await op.press("enter")
+        await op.pilot.pause(0.02)
+
+
+async def session_on(op):
+    await op.until(lambda: op.app.wire.driving and op.app.state.link == "up")
+    await op.press("enter")
+    await op.at(Stage.DEVICE)
+    await op.until(lambda: op.app.findings and op.app.lamps.known)
+
+
+def test_a_pulled_cable_is_said_on_every_screen(wired):
+    stand, lab = wired
+
+    async def work():
+        async with lab.operator(countdown_s=0.1) as op:
+            await op.until(lambda: op.app.state.link == "up")
+            pull(stand, lab)  # before there is a session
+            await op.sees(*PULLED, "PROTOCOL")
+            await session_on(op)
+            pull(stand, lab)
+            for page in "123456":
+                await op.press(page)
+                await op.sees(*PULLED)
+            await mended(op)
+            await op.sees("the port was lost and is back")
+            await op.press("enter")
+            await armed(op)
+            await op.at(Stage.RESULT)
+            pull(stand, lab)
+            await op.sees(*PULLED, "RESULT")
+            assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
+
+    run(work())
+
+
+@pytest.mark.parametrize("fault", [pull, kill])
+def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(wired, fault):
+    stand, lab = wired
+
+    async def work():
+        async with lab.operator(countdown_s=0.1) as op:
+            await session_on(op)
+            await op.press("enter")
+            await armed(op)
+            await op.at(Stage.LIVE)
+            await asyncio.to_thread(fault, stand, lab)
+            await op.sees("no daemon" if fault is kill else "the port is lost")
+            await op.at(Stage.RESULT)
+            await op.sees("run 1, attempt 1", "ACCEPTED")
+
+    run(work())
+    with Session.open(lab.session, readonly=True) as session:
+        assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1)]
+
+
+@pytest.mark.parametrize("fault", [reset])
+def test_what_was_armed_is_not_when_the_line_breaks(wired, fault):
+    stand, lab = wired
+
+    async def work():
+        async with lab.operator(countdown_s=600.0) as op:
+            await session_on(op)
+            await op.press("enter")
+            await armed(op)
+            await op.at(Stage.COUNTDOWN)
+            fault(stand, lab)
+            await op.at(Stage.PREPARE)  # at once: long before the count is over
+            await mended(op)
+            await op.sees("nothing fell", "RUN 1 of 2 · attempt 2")
+
+    run(work())
+
+
+def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(wired):
+    stand, lab = wired
+
+    async def work():
+        async with lab.operator(countdown_s=0.1) as op:
+            await session_on(op)
+            reset(stand, lab)
+            await op.sees(*RESTARTED)
+            await mended(op)
+            await op.press("enter")
+            await armed(op)
+            await op.at(Stage.LIVE)
+            reset(stand, lab)
+            await op.sees("restarted")
+            await mended(op)
+            await op.at(Stage.PREPARE)
+            await op.sees("RUN 1 of 2 · attempt 2")
+
+    run(work())
+
+
+def test_a_stop_by_another_client_ends_the_countdown(lab):
+    async def work():
+        async with lab.ready(countdown_s=600.0) as op, lab.operator(name="other") as other:
+            await op.press("enter")
+            await op.at(Stage.COUNTDOWN)
+            await other.until(lambda: other.app.state.phase == "armed")
+            await other.press("f9")
+            await op.at(Stage.PREPARE)
+            await op.sees("stopped by the operator: nothing fell")
+
+    run(work())

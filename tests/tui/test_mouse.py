@@ -1,0 +1,106 @@
+"""Whatever looks as if it could be clicked can be."""
+
+from __future__ import annotations
+
+from rig.tui.actions import OFFLINE
+from rig.tui.screens.ask import Ask, Confirm, Pick
+from rig.tui.turns import Stage
+from rig.tui.widgets.text import Words
+from tests.tui.lab import run
+
+
+def spots(app):
+    """Where on the screen each action can be clicked, one place an action."""
+    found = {}
+    for words in app.screen.query(Words):
+        if not words.region or not words.display:
+            continue
+        for y in range(words.content_region.height):
+            x, top = words.content_region.x, words.content_region.y
+            for part in words.render_line(y + top - words.region.y):
+                said = part.style.meta.get("@click") if part.style else None
+                if said:
+                    found.setdefault(said, (x, y + top))
+                x += part.cell_length
+    return found
+
+
+async def click(op, action):
+    await op.until(lambda: action in spots(op.app))
+    x, y = spots(op.app)[action]
+    assert op.app.screen.get_style_at(x, y).meta["@click"] == action
+    await op.pilot.click(offset=(x, y))
+
+
+def test_pages_keys_and_dialogs_go_by_mouse_alone(lab):
+    async def work():
+        async with lab.operator((120, 36)) as op:
+            await op.until(lambda: op.app.wire and op.app.wire.driving)
+            await click(op, "app.do('go_on')")
+            await op.at(Stage.DEVICE)
+            await op.until(lambda: op.app.findings and op.app.lamps.known)
+            for page in ("result", "session", "history", "protocol", "run", "device"):
+                await click(op, f"app.do('page_{page}')")
+                await op.until(lambda page=page: op.app.page == page)
+            await click(op, "app.do('release_test')")
+            await op.until(lambda: isinstance(op.app.screen, Confirm))
+            await click(op, "screen.answer(False)")
+            await op.until(lambda: len(op.app.screen_stack) == 1)
+            await click(op, "app.do('release_test')")
+            await click(op, "screen.answer(True)")
+            await op.sees("no gate saw anything")
+            await click(op, "app.do('go_on')")
+            await op.at(Stage.PREPARE)
+            await click(op, "app.do('go_on')")
+            await op.at(Stage.RESULT)
+            await op.until(lambda: op.app.flow.logged)
+            await click(op, "app.do('note')")
+            await op.until(lambda: isinstance(op.app.screen, Ask))
+            await op.press(*"warm")
+            await click(op, "screen.say")
+            await op.sees("note: warm")
+            await click(op, "app.do('page_history')")
+            await click(op, "app.do('drops')")
+            await op.until(lambda: isinstance(op.app.screen, Pick))
+            await click(op, "screen.take")
+            await op.until(lambda: len(op.app.screen_stack) == 1)
+            await click(op, "app.do('play')")
+            await op.until(lambda: op.app.history.player.time_s > 0)
+
+    run(work())
+
+
+def test_a_protocol_and_stop_are_clicked(lab, fence):
+    other = lab.folder / "other.yaml"
+    other.write_text(fence.replace("TITLE", "The other one"), "utf-8")
+
+    async def work():
+        async with lab.operator(files=(lab.protocol, other)) as op:
+            await op.until(lambda: op.app.wire and op.app.wire.driving)
+            await click(op, "app.choose('protocol', 1)")
+            await op.sees("The other one")
+            stopped = []
+            real = op.app.wire.call
+
+            async def call(method, **params):
+                stopped.append(method)
+                return await real(method, **params)
+
+            op.app.wire.call = call
+            await click(op, "app.do('stop')")
+            await op.until(lambda: "stop" in stopped)
+
+    run(work())
+
+
+def test_every_key_that_is_shown_can_be_clicked(lab):
+    async def work():
+        async with lab.ready((200, 60)) as op:
+            await op.until(lambda: "app.do('go_on')" in spots(op.app))
+            shown = set(spots(op.app))
+            assert {f"app.do('{name}')" for name in OFFLINE if name.startswith("page_")} <= shown
+            x, y = spots(op.app)["app.do('help')"]
+            words, region = op.app.screen.get_widget_at(x, y)
+            assert words.said[x - region.x - 1] == "?"  # the key itself, not only what it does
+
+    run(work())
