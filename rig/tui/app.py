@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from textual import events
 from textual.app import App, ComposeResult, SystemCommand
+from textual.css.query import NoMatches
 from textual.widgets import ContentSwitcher
 
 from rig.tui import doing, effects, keyboard, pages, seen, themes
@@ -132,9 +133,13 @@ class RigApp(App[None]):
 
     def draw(self) -> None:
         """Draw what changed since the last time."""
-        if not self._open() or not self.screen_stack[0].query("Status #alarm"):
-            return  # on its way in, or out
+        if not self._open():
+            return
         model, size, base = self.model, self.size, self.screen_stack[0]
+        try:
+            base.query_one("#alarm")
+        except NoMatches:
+            return  # on its way in, or out
         base.query_one(Status).show(model, self.page, self.keys, size)
         base.query_one(StopBar).show(model, self.page, self.keys, size.width)
         page = self.pages.get(self.page)

@@ -26,8 +26,14 @@ def spots(app):
 
 
 async def click(op, action):
-    await op.until(lambda: action in spots(op.app))
-    x, y = spots(op.app)[action]
+    seen = [None]
+
+    def rests():  # what is still being laid out moves from under the pointer
+        seen.append(spots(op.app).get(action))
+        return seen[-1] is not None and seen[-1] == seen[-2]
+
+    await op.until(rests)
+    x, y = seen[-1]
     assert op.app.screen.get_style_at(x, y).meta["@click"] == action
     await op.pilot.click(offset=(x, y))
 

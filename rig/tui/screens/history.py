@@ -139,7 +139,7 @@ class HistoryPage(Page):
 
     def _blank(self) -> None:
         self.query_one("#numbers", Words).say("")
-        self.query_one(LampBoard).say("")
+        self.query_one(LampBoard).clear()
         for name in ("#z", "#dz"):
             self.query_one(name, Figure).show(None)
 

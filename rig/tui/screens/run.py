@@ -66,9 +66,11 @@ class RunPage(Page):
         """Draw what holds now."""
         stage = model.stage
         self.set_class(stage in _FALLING, "-live")
-        self.set_class(stage is Stage.COUNTDOWN and model.driving, "-count")
+        counting = stage is Stage.COUNTDOWN and model.driving
+        self.set_class(counting, "-count")
         self.query_one("#card", Words).say_content(_card(model, low=self.screen.has_class("-low")))
-        self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
+        if counting:
+            self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
         checks = self.query_one("#checks", Words)
         checks.say_content(_checks(model))
         self.query_one(LampBoard).show(model.protocol, model.lamps, model.now_s)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from textual.content import Content
-
-from rig.tui.widgets.text import Words
+from rich.segment import Segment
+from textual.strip import Strip
+from textual.widget import Widget
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from textual.geometry import Size
 
     from rig.protocol.scene import Gate, Protocol
     from rig.tui.gates import Lamp, Lamps
@@ -20,21 +22,67 @@ _MOST = 8
 """Lamps above each other: more would not fit a low screen."""
 
 
-class LampBoard(Words):
-    """All gates, one side beside the other."""
+class Part(NamedTuple):
+    """Text and its component class; none for the board's own look."""
 
-    DEFAULT_CSS = "LampBoard { height: auto; padding: 0 1; }"
+    text: str
+    look: str = ""
+
+
+class LampBoard(Widget):
+    """All gates, one side beside the other.
+
+    Every lamp changes at every tick of a drop: lines are made of a few parts each, without the
+    wrapping and styling that other text goes through.
+    """
+
+    COMPONENT_CLASSES = {"lamp--title", "lamp--unknown", "lamp--blocked", "lamp--clear"}  # noqa: RUF012
+    DEFAULT_CSS = """
+    LampBoard { height: auto; padding: 0 1; }
+    LampBoard > .lamp--title { text-style: bold; }
+    LampBoard > .lamp--unknown { color: $foreground 60%; }
+    LampBoard > .lamp--blocked { color: $warning; text-style: bold; }
+    LampBoard > .lamp--clear { color: $success; }
+    """
+
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
+        super().__init__(id=id)
+        self._rows: list[list[Part]] = []
 
     def show(self, protocol: Protocol | None, lamps: Lamps, now_s: float) -> None:
         """Draw what the gates do now."""
-        width = self.size.width or 78
-        self.say_content(board(protocol, lamps, now_s, width))
+        self._take(board(protocol, lamps, now_s, self.size.width or 78))
+
+    def clear(self) -> None:
+        """Draw nothing."""
+        self._take([])
+
+    def _take(self, rows: list[list[Part]]) -> None:
+        if rows != self._rows:
+            higher = len(rows) != len(self._rows)
+            self._rows = rows
+            self.refresh(layout=higher)
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """As many lines as there are."""
+        del container, viewport, width
+        return len(self._rows)
+
+    def render_line(self, y: int) -> Strip:
+        """One line."""
+        plain, width = self.rich_style, self.size.width
+        parts = self._rows[y] if y < len(self._rows) else []
+        line = [
+            Segment(text, self.get_component_rich_style(look) if look else plain)
+            for text, look in parts
+        ]
+        return Strip(line).adjust_cell_length(width, plain)
 
 
-def board(protocol: Protocol | None, lamps: Lamps, now_s: float, width: int) -> Content:
+def board(protocol: Protocol | None, lamps: Lamps, now_s: float, width: int) -> list[list[Part]]:
     """Draw the lamps in a width of characters."""
     if protocol is None or protocol.gates is None:
-        return Content("no gates in this scene")
+        return [[Part("no gates in this scene")]]
     by_channel = {lamp.channel: lamp for lamp in lamps.lamps}
     columns: list[tuple[str, list[Gate]]] = []
     for side in ("impact", "free"):
@@ -43,25 +91,26 @@ def board(protocol: Protocol | None, lamps: Lamps, now_s: float, width: int) -> 
             title = "" if begin else f"{side} side"
             columns.append((title, gates[begin : begin + _MOST]))
     wide = width // len(columns)
-    rows = [Content.styled("".join(title.ljust(wide) for title, _ in columns).rstrip(), "bold")]
+    rows = [[Part("".join(title.ljust(wide) for title, _ in columns), "lamp--title")]]
     for at in range(max(len(gates) for _, gates in columns)):
-        cells = [
-            _lamp(gates[at], by_channel.get(gates[at].channel), lamps, now_s, wide)
-            if at < len(gates)
-            else Content(" " * wide)
-            for _, gates in columns
-        ]
-        rows.append(Content.assemble(*cells))
-    return Content("\n").join(rows)
+        row: list[Part] = []
+        for _, gates in columns:
+            if at < len(gates):
+                lamp = by_channel.get(gates[at].channel)
+                row += _lamp(gates[at], lamp, lamps, now_s, wide)
+            else:
+                row.append(Part(" " * wide))
+        rows.append(row)
+    return rows
 
 
-def _lamp(gate: Gate, lamp: Lamp | None, lamps: Lamps, now_s: float, width: int) -> Content:
+def _lamp(gate: Gate, lamp: Lamp | None, lamps: Lamps, now_s: float, width: int) -> list[Part]:
     if lamp is None or not lamps.known:
-        symbol, style, word = "?", "$foreground 60%", "unknown"
+        symbol, look, word = "?", "lamp--unknown", "unknown"
     elif lamp.blocked:
-        symbol, style, word = "●", "bold $warning", "BLOCKED"
+        symbol, look, word = "●", "lamp--blocked", "BLOCKED"
     else:
-        symbol, style, word = "○", "$success", "clear"
+        symbol, look, word = "○", "lamp--clear", "clear"
     edges = 0 if lamp is None else lamp.edges
     quiet = ""
     if lamp is not None and lamps.known:
@@ -75,7 +124,7 @@ def _lamp(gate: Gate, lamp: Lamp | None, lamps: Lamps, now_s: float, width: int)
         text = f" {where} ch{gate.channel:<2} {word:7}{edges:4} {quiet}"
     else:
         text = f" {where} {word:7}{edges:4}"
-    return Content.assemble((symbol, style), text[: width - 2].ljust(width - 1))
+    return [Part(symbol, look), Part(text[: width - 2].ljust(width - 1))]
 
 
 def named(gates: Sequence[Gate], channel: int) -> str:
