@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from time import monotonic
+from time import monotonic, process_time
 from typing import TYPE_CHECKING, Any, cast
 
 from textual import events
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rig.tui.turns import Event
 
 TICK_S = 0.1
+_SHARE = 0.17  # of a core, that this may take on a slow machine
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
     Stage.DEVICE: "device",
@@ -85,6 +86,7 @@ class RigApp(App[None]):
         self.pages: dict[str, Page] = {ProtocolPage.NAME: self.protocols}
         self._turning = asyncio.Lock()
         self._last = monotonic()
+        self._spent = process_time()
         self._followed = ""
         for theme in themes.THEMES:
             self.register_theme(theme)
@@ -103,7 +105,7 @@ class RigApp(App[None]):
         elif self.options.session is not None:
             self.follower.look_at(self.options.session)
         await self._follow()
-        self.set_interval(TICK_S, self._tick)
+        self.set_timer(TICK_S, self._tick)
         self.draw()
         self.call_after_refresh(lambda: self._begin(self._load_pages()))
 
@@ -111,6 +113,10 @@ class RigApp(App[None]):
         self.run_worker(work, group="read")
 
     async def _tick(self) -> None:
+        # Ten times a second, and down to five where that takes too much of the machine.
+        before, self._spent = self._spent, process_time()
+        pause = max(TICK_S, (self._spent - before) / _SHARE)
+        self.set_timer(min(pause, 2 * TICK_S), self._tick)
         if not self._open():
             return
         now = monotonic()
