@@ -332,7 +332,10 @@ def _parser() -> argparse.ArgumentParser:
         "--board", dest="boards", nargs="+", choices=["sim", "emu"], default=["sim", "emu"],
         help="virtual, or real firmware in an emulator",
     )  # fmt: skip
-    faults.add_argument("--kind", dest="kinds", nargs="+", metavar="KIND", help="only these")
+    faults.add_argument(
+        "--kind", dest="kinds", nargs="+", metavar="KIND", help="only these",
+        choices=["daemon", "runner", "cable", "reset", "disk", "noise", "race", "deaf"],
+    )  # fmt: skip
     _json(faults)
     links = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
     links.set_defaults(module="bench_link")
@@ -404,7 +407,10 @@ def _sweep(sweep: argparse.ArgumentParser) -> None:
 
 
 def _count(text: str) -> int:
-    number = int(text)
+    try:
+        number = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"found '{text}', not a whole number") from None
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text} is too few: at least 1 is needed")
     return number

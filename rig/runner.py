@@ -16,7 +16,7 @@ from rig.link.messages import Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
-from rig.protocol.plan import runs
+from rig.protocol.plan import ATTEMPTS, runs
 from rig.report.numbers import plus_minus
 from rig.results import results
 from rig.session.schema import RunState
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
 
-ATTEMPTS = 3
-"""How often a void run is made before it stays void."""
 _SETTLED = (RunState.ACCEPTED, RunState.MARGINAL, RunState.REJECTED)
 _CLOCK_U = 1e-4
 """How well the device's clock must be known before a drop, relative: a resonator that is off by

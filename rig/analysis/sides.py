@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,13 +12,14 @@ from rig.model.fall import kicks
 from rig.model.rods import rod_impacts
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from rig.analysis.pattern import Guess
+    from rig.analysis.trains import Train
     from rig.model.chain import Chain
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.scene import Protocol, RodChain, Run
     from rig.records import Drop
 
     Array = NDArray[np.float64]
@@ -26,20 +27,29 @@ if TYPE_CHECKING:
 
 def sides_of(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[Side]:
     """Collect each chain with the trains of its gates."""
+    return [
+        Side(role, chain, trains, _ratios(protocol, chain.chain) if role == "impact" else None)
+        for role, chain, trains in trains_of(protocol, run, Edges.of(drop, hz))
+    ]
+
+
+def trains_of(
+    protocol: Protocol, run: Run, edges: Edges
+) -> Iterator[tuple[Literal["impact", "free"], RodChain, tuple[Train, ...]]]:
+    """Sort edges by side: its role, the chain that hung there, and the train of each of its gates.
+
+    A side where nothing hung, or without gates, is left out.
+    """
     assert protocol.gates is not None
-    edges = Edges.of(drop, hz)
     start = protocol.drop.value
-    sides = []
     for role in ("impact", "free"):
         name = run.impact if role == "impact" else run.free
         gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
         if name is None or not gates:
             continue
         chain = protocol.chains[name]
-        trains = [train(n, g, chain, edges, start, role == "impact") for n, g in gates]
-        ratios = _ratios(protocol, chain.chain) if role == "impact" else None
-        sides.append(Side(role, chain, tuple(trains), ratios))
-    return sides
+        trains = (train(n, gate, chain, edges, start, role == "impact") for n, gate in gates)
+        yield role, chain, tuple(trains)
 
 
 def guesses_of(protocol: Protocol, sides: Sequence[Side]) -> dict[str, Guess]:

@@ -42,7 +42,8 @@ def main(arguments: Namespace) -> int:
             for kind, count in _COUNTS[board].items()
             if kind in (arguments.kinds or _COUNTS[board])
         }
-        found[board] = faults(counts, arguments.jobs, say, board)
+        if counts:  # not every kind is done to both
+            found[board] = faults(counts, arguments.jobs, say, board)
     if arguments.json:
         print_json(
             {

@@ -70,8 +70,11 @@ def _beam(protocol: Protocol, channel: int | None) -> tuple[Gate, int]:
     if len(named) == 1:
         return named[0], max(one.chain.rods for one in protocol.chains.values())
     known = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
+    wrong = "the file does not say which gate its times are of"
+    if channel is not None:
+        wrong = f"there is no gate at channel {channel}"
     raise InputError(
-        f"{protocol.source}: the file does not say which gate its times are of",
+        f"{protocol.source}: {wrong}",
         f"say which with --channel N: {known}" if known else "add the gate they are of",
     )
 

@@ -15,8 +15,9 @@ from rig.analysis.learn import FEWEST
 from rig.analysis.result import GOOD
 from rig.analysis.session import Analysis, gather
 from rig.analysis.summary import summarize
+from rig.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
-from rig.results import calibration, protocol_of, rejected
+from rig.results import protocol_of, rejected
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.findings import Findings
@@ -72,6 +73,7 @@ class Book:
     _drops: dict[Job, Drop] = field(default_factory=dict)
     _curves: dict[str, Any] | None = None
     _lesson: _Lesson | None = None
+    _calibrator: Calibrator = field(default_factory=Calibrator)
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
 
@@ -86,7 +88,7 @@ class Book:
         with self._lock, Session.open(self.path, readonly=True) as session:
             protocol = protocol_of(session)
             plan = {run.number: run for run in planned_runs(protocol)}
-            clock, states = calibration(session), tuple(session.states())
+            clock, states = self._calibrator.look(session), tuple(session.states())
             if states != self._log:  # records are never altered, only added, and that is logged
                 self._drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
                 self._log = states

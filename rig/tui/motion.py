@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.trains import Edges, train
+from rig.analysis.sides import trains_of
+from rig.analysis.trains import Edges
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.errors import DomainError
 from rig.model.fall import kicks
@@ -86,14 +87,7 @@ def motions(
         return ()
     table = _table(edges, hz, thin=matches is None)
     found = []
-    for role in ("impact", "free"):
-        name = run.impact if role == "impact" else run.free
-        gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
-        if name is None or not gates:
-            continue
-        chain = protocol.chains[name]
-        start = protocol.drop.value
-        parts = [train(n, gate, chain, table, start, role == "impact") for n, gate in gates]
+    for role, _, parts in trains_of(protocol, run, table):
         model = _model(protocol, run, role)
         if matches is not None:
             pairs = [_matched(part, matches) for part in parts]
@@ -145,7 +139,7 @@ def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Ar
     return times_in[: gaps.size], gaps, curve, model
 
 
-def _nearest(parts: list[Train], model: Trajectory | None) -> list[tuple[Array, Array]]:
+def _nearest(parts: Sequence[Train], model: Trajectory | None) -> list[tuple[Array, Array]]:
     """Times and heights of each gate's edges before anybody has matched them."""
     counted = [_counted(part, part.times.size) for part in parts]
     if model is None:

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from rig.tui.state import RunLine
 
 SETTLED = ("accepted", "marginal", "rejected")
-OPEN = ("armed", "fired")
 
 
 class Job(NamedTuple):
@@ -36,7 +35,7 @@ def next_job(runs: Sequence[RunLine], voids: Mapping[int, int]) -> Job | None:
 
 def done(line: RunLine, voids: int) -> bool:
     """Whether a run is done with: settled, or void too often."""
-    from rig.runner import ATTEMPTS  # noqa: PLC0415 - not before the first paint
+    from rig.protocol.plan import ATTEMPTS  # noqa: PLC0415 - not before the first paint
 
     return line.state in SETTLED or voids >= ATTEMPTS
 
