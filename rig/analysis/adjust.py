@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     Matches = Mapping[str, Sequence[Index]]
 
 _STEPS = 60
-_DONE = 1e-6  # of a standard uncertainty
+DONE = 1e-3
+"""Of a standard uncertainty: a step so short is the last, for the next one is shorter again."""
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 
 
@@ -61,13 +62,25 @@ class Estimate:
         """Inverse of the normal matrix."""
         return np.linalg.inv(self.information).astype(float, copy=False)
 
+    def beyond(self, x: Array) -> float:
+        """How far this is from other unknowns, see `length`."""
+        step = np.zeros(x.size)
+        np.divide(self.x - x, self.sd, out=step, where=self.sd > 0.0)
+        return length(step, self.information)
+
     @property
     def degrees(self) -> float:
         """Degrees of freedom: edges less the unknowns that they determine."""
         return self.edges - self.x.size + float(np.trace(self.covariance))
 
 
-def adjust(model: DropModel, matches: Matches, x: Array, centre: Array | None = None) -> Estimate:
+def adjust(
+    model: DropModel,
+    matches: Matches,
+    x: Array,
+    centre: Array | None = None,
+    done: float = DONE,
+) -> Estimate:
     """Find the unknowns that fit all matched edges best.
 
     Gauss–Newton on ‖r/σ‖² + ‖(x − centre)/sd‖²; residuals beyond 4 σ weigh less (Huber).
@@ -80,6 +93,8 @@ def adjust(model: DropModel, matches: Matches, x: Array, centre: Array | None = 
         Where to begin.
     centre
         Prior means of the unknowns, zero if not given.
+    done
+        How short a step is the last, see `length`.
     """
     sd = model.unknowns.sd
     free = sd > 0.0
@@ -96,23 +111,37 @@ def adjust(model: DropModel, matches: Matches, x: Array, centre: Array | None = 
         found = normal(model, matches, scaled * sd, sd, inflation)
         data = found.matrix
         information = data + identity
-        new = np.linalg.solve(information, data @ scaled - found.vector + prior)
-        last, moved = moved, float(np.abs(new - scaled).max(initial=0.0))
-        scaled = new
-        before, chi2, edges = chi2, found.chi2, found.size
+        right = data @ scaled - found.vector + prior
+        before = scaled
+        scaled = np.linalg.solve(information, right).astype(np.float64, copy=False)
+        last, moved = moved, length(scaled - before, information)
+        previous, chi2, edges = chi2, found.chi2, found.size
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
         calm = chi2 <= edges - x.size
-        if step and (calm or abs(chi2 - before) <= _STEADY * max(chi2, 1.0)):
+        if calm or (step and abs(chi2 - previous) <= _STEADY * max(chi2, 1.0)):
             factor = 1.0
             if not calm:
                 degrees = edges - float(np.trace(np.linalg.solve(information, data)))
                 factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
             if factor >= 1.05:
                 inflation *= factor  # the edges scatter more than assumed: weigh them so
-            elif moved < _DONE or moved**2 < _DONE * last:  # the next step is shorter again
+            elif moved < done or moved**2 < done * last:
                 settled = True
                 break
     return Estimate(scaled * sd, sd, information, data, chi2, edges, inflation, settled)
+
+
+def length(step: Array, information: Array) -> float:
+    """√(dᵀAd): no function of the unknowns moves by more of its own standard uncertainties.
+
+    Parameters
+    ----------
+    step
+        Of the unknowns, in units of their prior uncertainties.
+    information
+        As in `Estimate`.
+    """
+    return math.sqrt(max(0.0, float(step @ information @ step)))
 
 
 def uncertainty(

@@ -59,24 +59,48 @@ def align(
     """
     if not trains:
         return []
-    heights, _ = trajectory.heights(np.concatenate([t.times for t in trains]) * (1.0 + clock))
-    begins = np.cumsum([train.times.size for train in trains])[:-1]
-    return [
-        _match(_costs(train, level, height, scale))
-        for train, level, height in zip(trains, levels, np.split(heights, begins), strict=True)
-    ]
+    costs, sizes = _costs(trains, levels, trajectory, scale, clock)
+    matched = _match(costs, sizes).reshape(len(trains), -1)
+    return [row[:size] for row, size in zip(matched, sizes[0], strict=True)]
 
 
 def possible(train: Train, trajectory: Trajectory, scale: float, clock: float) -> int:
     """Most expected edges that any matching could match at the nominal levels, see `align`."""
-    heights, _ = trajectory.heights(train.times * (1.0 + clock))
-    return int(_worth(_costs(train, train.levels, heights, scale)).any(axis=0).sum())
+    costs, _ = _costs([train], [train.levels], trajectory, scale, clock)
+    return int(_worth(costs).any(axis=0).sum())
 
 
-def _costs(train: Train, levels: Array, heights: Array, scale: float) -> Array:
-    """Cost of every pairing, shape ``(edges, expected)``; infinite for unlike polarities."""
-    distance = (heights[:, None] - levels) / scale
-    return np.where(train.blocked[:, None] == train.blocks, 0.5 * distance**2, np.inf)
+def _costs(
+    trains: Sequence[Train],
+    levels: Sequence[Array],
+    trajectory: Trajectory,
+    scale: float,
+    clock: float,
+) -> tuple[Array, Index]:
+    """Cost of every pairing of an edge and an expected edge of its gate, and how many there are.
+
+    Returns
+    -------
+    costs
+        Shape ``(edges of all gates, most expected edges of a gate)``; infinite for unlike
+        polarities and beyond a gate's expected edges.
+    sizes
+        Expected and observed edges of each gate, shape ``(2, gates)``.
+    """
+    sizes = np.array([[t.rods.size for t in trains], [t.times.size for t in trains]])
+    wide, gates = int(sizes[0].max()), np.arange(len(trains))
+    gate = np.repeat(gates, sizes[0])
+    place = np.concatenate([np.arange(size) for size in sizes[0]])
+    blocks = np.concatenate([train.blocks for train in trains])
+    expected = np.full((gates.size, 2, wide), np.inf)  # of either polarity
+    expected[gate, blocks.astype(np.intp), place] = np.concatenate(levels)
+    blocked = np.concatenate([train.blocked for train in trains])
+    like = 2 * np.repeat(gates, sizes[1]) + blocked
+    times = np.concatenate([train.times for train in trains]) * (1.0 + clock)
+    distance = expected.reshape(2 * gates.size, wide)[like]
+    distance -= trajectory.heights(times)[0][:, None]
+    distance /= scale
+    return 0.5 * distance**2, sizes
 
 
 def _worth(costs: Array) -> NDArray[np.bool_]:
@@ -84,27 +108,37 @@ def _worth(costs: Array) -> NDArray[np.bool_]:
     return costs < MISSED + EXTRA
 
 
-def _match(costs: Array) -> Index:
-    """Match one gate, shape ``(expected,)``."""
-    matched = np.full(costs.shape[1], -1, dtype=np.intp)
+def _match(costs: Array, sizes: Index) -> Index:
+    """Match all gates, see `_costs`; shape ``(gates · most expected edges of a gate,)``."""
+    gates, wide = sizes.shape[1], costs.shape[1]
+    matched = np.full(gates * wide, -1, dtype=np.intp)
+    if not costs.size:
+        return matched
     worth = _worth(costs)
-    rows = np.flatnonzero(worth.any(axis=1))
+    first = worth.argmax(axis=1)
+    rows = np.flatnonzero(worth[np.arange(first.size), first])
     if not rows.size:
         return matched
-    first = worth[rows].argmax(axis=1)
-    end = worth.shape[1] - worth[rows, ::-1].argmax(axis=1)
+    gate = np.repeat(np.arange(gates), sizes[1])[rows]
+    begins_at = np.cumsum(sizes[1]) - sizes[1]  # a gate's edges are numbered by themselves
+    number = rows - begins_at[gate]
+    # All gates' expected edges in one line, so that gates are cut apart like everything else.
+    first = first[rows] + gate * wide
+    end = (gate + 1) * wide - worth[rows, ::-1].argmax(axis=1)
     # Cut where no edge's choice bears on another's: all later ones begin beyond all earlier ones.
     later = np.minimum.accumulate(first[::-1])[::-1]
     earlier = np.maximum.accumulate(end)
     cuts = np.concatenate([[0], 1 + np.flatnonzero(later[1:] >= earlier[:-1]), [rows.size]])
-    begins, sizes = cuts[:-1], np.diff(cuts)
-    sole = (sizes == 1) & ((end - first)[begins] == 1)
-    matched[first[begins[sole]]] = rows[begins[sole]]
-    for begin, size in zip(begins[~sole].tolist(), sizes[~sole].tolist(), strict=True):
-        edges = rows[begin : begin + size]
-        left, right = later[begin], earlier[begin + size - 1]
-        for row, column in _cheapest(costs[edges, left:right].tolist()):
-            matched[left + column] = edges[row]
+    begins, lengths = cuts[:-1], np.diff(cuts)
+    sole = (lengths == 1) & ((end - first)[begins] == 1)
+    matched[first[begins[sole]]] = number[begins[sole]]
+    for begin, length in zip(begins[~sole].tolist(), lengths[~sole].tolist(), strict=True):
+        edges = slice(begin, begin + length)
+        left, right = int(later[begin]), int(earlier[begin + length - 1])
+        base = gate[begin] * wide
+        block = costs[rows[edges], left - base : right - base]
+        for row, column in _cheapest(block.tolist()):
+            matched[left + column] = number[begin + row]
     return matched
 
 

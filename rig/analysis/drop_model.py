@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import STATED, Components
-from rig.analysis.equations import Equations, Expected
+from rig.analysis.equations import Equations, Expected, Residuals, Seen
 from rig.analysis.trajectory import (
     COMMON,
     GRAVITY,
@@ -41,18 +41,18 @@ class _Local(NamedTuple):
     Attributes
     ----------
     columns
-        Places in the drop's vector, shape ``(columns,)``.
+        Places in the drop's vector, shape ``(columns,)``; first those that move its trajectory.
     at
         Where each is among them, by the place in the drop's vector.
     moving
-        Which of them move its trajectory, shape ``(moving,)``.
+        How many move its trajectory.
     path
         Derivatives of the trajectory's parameters by these, shape ``(parameters, moving)``.
     """
 
     columns: Index
     at: Index
-    moving: Index
+    moving: int
     path: Array
 
 
@@ -100,6 +100,8 @@ class DropModel:
         }
         self.unknowns = self._unknowns()
         self._local = {role: self._columns(role) for role in self.sides}
+        self._paths: dict[str, tuple[bytes, Trajectory]] = {}
+        self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
 
     def _unknowns(self) -> Unknowns:
         """Name everything that is not known, with what is known of it beforehand."""
@@ -144,11 +146,14 @@ class DropModel:
         for name in ("beams", "ripple"):
             if name in self.unknowns:
                 mine[self.unknowns[name]] &= ~elsewhere
-        columns = np.flatnonzero(mine)
         parameters = COMMON + (2 * len(self.sides[role].chain.widths) if role == "impact" else 0)
-        path = self.spread(role, np.eye(parameters))[:, columns]
-        moving = np.flatnonzero(path.any(axis=0))
-        return _Local(columns, np.cumsum(mine) - 1, moving, path[:, moving])
+        path = self.spread(role, np.eye(parameters))
+        moves = mine & path.any(axis=0)
+        moving = np.flatnonzero(moves)
+        columns = np.concatenate([moving, np.flatnonzero(mine & ~moves)])
+        at = np.zeros(mine.size, dtype=np.intp)
+        at[columns] = np.arange(columns.size)
+        return _Local(columns, at, moving.size, path[:, moving])
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
         """Return the same drop with other priors, that of impulses relative to the α found.
@@ -167,11 +172,13 @@ class DropModel:
         other = copy(self)
         other.components, other.clock_u, other.guesses = components, clock_u, guesses
         other.unknowns = other._unknowns()
+        other._paths = {}
         return other
 
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return the same drop with its edges moved in time, by so many seconds each."""
         other = copy(self)
+        other._paths, other._seen = {}, {}
         other.expected = {
             role: expected._replace(times=expected.times + shifts[role])
             for role, expected in self.expected.items()
@@ -187,6 +194,14 @@ class DropModel:
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Path of one side for given unknowns."""
+        # Matching, adjusting and judging ask for the same one again and again.
+        asked = x.tobytes()
+        known = self._paths.get(role)
+        if known is None or known[0] != asked:
+            known = self._paths[role] = asked, self._trajectory(role, x)
+        return known[1]
+
+    def _trajectory(self, role: str, x: Array) -> Trajectory:
         at = self.unknowns
         release = self.guesses[role].release + float(x[at[f"{role} release"]][0])
         start = self.protocol.drop.value + float(x[at["drop"]][0] + x[at[f"{role} hang"]][0])
@@ -231,36 +246,47 @@ class DropModel:
 
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""
-        return np.split(self._levels(role, x), self.expected[role].ends)
+        expected = self.expected[role]
+        return np.split(self._levels(role, x, expected), expected.ends)
 
-    def _levels(self, role: str, x: Array) -> Array:
-        at, expected = self.unknowns, self.expected[role]
-        shift = x[at["beams"]][expected.gate] - x[at[f"{role} rods"]][expected.rods]
+    def _levels(self, role: str, x: Array, edges: Expected | Seen) -> Array:
+        at = self.unknowns
+        found: Array = edges.levels - edges.sign * x[at[f"{role} width"]]
+        found += x[at["beams"]][edges.gate]
+        found -= x[at[f"{role} rods"]][edges.rods]
         if "ripple" in at:
-            shift -= self._tilts[role] * expected.turn * x[at["ripple"]][expected.gate]
-        found: Array = expected.levels + shift - expected.sign * x[at[f"{role} width"]][0]
+            found -= self._tilts[role] * edges.turn * x[at["ripple"]][edges.gate]
         return found
+
+    def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
+        """Collect the matched edges; a matching stays for many steps of an adjustment."""
+        known = self._seen.get(role)
+        if known is None or known[0] is not matches:
+            known = self._seen[role] = matches, self.expected[role].seen(matches)
+        return known[1]
+
+    def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
+        """What the unknowns leave over of one side's matched edges."""
+        seen, known = self._matched(role, matches), self.components
+        times = seen.times * (1.0 + x[self.unknowns["clock"]])
+        height, speed = self.trajectory(role, x).heights(times)
+        sigma = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2))
+        values = height - self._levels(role, x, seen)
+        return Residuals(values, sigma, speed, seen.burst == 0.0)
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges."""
-        at, expected, local = self.unknowns, self.expected[role], self._local[role]
-        path = self.trajectory(role, x)
-        pick, edge = expected.chosen(matches)
-        raw, burst = expected.times[edge], expected.burst[edge]
-        rods, gate = expected.rods[pick], expected.gate[pick]
-        times = raw * (1.0 + x[at["clock"]])
-        height, speed = path.heights(times)
+        at, local, seen = self.unknowns, self._local[role], self._matched(role, matches)
+        left = self.residuals(role, x, matches)
+        times = seen.times * (1.0 + x[at["clock"]])
         slopes = np.zeros((times.size, local.columns.size))
-        slopes[:, local.moving] = path.derivatives(times, local.path)
+        slopes[:, : local.moving] = self.trajectory(role, x).derivatives(times, local.path)
         row = np.arange(times.size)
-        slopes[:, local.at[at["clock"].start]] -= speed * raw
-        slopes[row, local.at[at[f"{role} rods"].start + rods]] += 1.0
-        slopes[:, local.at[at[f"{role} width"].start]] += expected.sign[pick]
-        slopes[row, local.at[at["beams"].start + gate]] -= 1.0
+        slopes[:, local.at[at["clock"].start]] -= left.speed * seen.times
+        slopes[row, local.at[at[f"{role} rods"].start + seen.rods]] += 1.0
+        slopes[:, local.at[at[f"{role} width"].start]] += seen.sign
+        slopes[row, local.at[at["beams"].start + seen.gate]] -= 1.0
         if "ripple" in at:
-            ripple = self._tilts[role] * expected.turn[pick]
-            slopes[row, local.at[at["ripple"].start + gate]] += ripple
-        known = self.components
-        sigma = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + burst**2))
-        residuals = height - self._levels(role, x)[pick]
-        return Equations(residuals, slopes, sigma, speed, burst == 0.0, local.columns, len(at))
+            ripple = self._tilts[role] * seen.turn
+            slopes[row, local.at[at["ripple"].start + seen.gate]] += ripple
+        return Equations(left, slopes, local.columns, len(at))

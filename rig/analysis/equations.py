@@ -18,41 +18,65 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 
+class Residuals(NamedTuple):
+    """What is left over of one side's matched edges, shape ``(edges,)`` each.
+
+    Attributes
+    ----------
+    values
+        Where the beam saw the rod's side less where the beam is, m.
+    sigma
+        Standard deviation of each, m.
+    speed
+        Of the chain at each edge, m/s.
+    clean
+        Whether each edge is no part of a flicker.
+    """
+
+    values: Array
+    sigma: Array
+    speed: Array
+    clean: Flags
+
+
 class Equations(NamedTuple):
     """Observation equations of one side, one a matched edge.
 
     Attributes
     ----------
     residuals
-        Where the beam saw the rod's side less where the beam is, m.
+        Their left sides.
     slopes
         Derivatives by the unknowns that this side knows of, shape ``(edges, columns)``.
-    sigma
-        Standard deviation of each residual, m.
-    speed
-        Of the chain at each edge, m/s.
-    clean
-        Whether each edge is no part of a flicker.
     columns
         Which unknowns these are; shape ``(columns,)``.
     unknowns
         Number of all.
     """
 
-    residuals: Array
+    residuals: Residuals
     slopes: Array
-    sigma: Array
-    speed: Array
-    clean: Flags
     columns: Index
     unknowns: int
 
     @property
     def jacobian(self) -> Array:
         """Derivatives by all unknowns, shape ``(edges, unknowns)``."""
-        found = np.zeros((self.residuals.size, self.unknowns))
+        found = np.zeros((self.slopes.shape[0], self.unknowns))
         found[:, self.columns] = self.slopes
         return found
+
+
+class Seen(NamedTuple):
+    """The matched edges of a side, shape ``(edges,)`` each; see `Expected`."""
+
+    times: Array
+    burst: Array
+    rods: Index
+    gate: Index
+    levels: Array
+    sign: Array
+    turn: Array
 
 
 class Expected(NamedTuple):
@@ -106,3 +130,16 @@ class Expected(NamedTuple):
         begins = np.repeat(self.begins, [one.size for one in matches])
         pick = np.flatnonzero(match >= 0)
         return pick, (match + begins)[pick]
+
+    def seen(self, matches: Sequence[Index]) -> Seen:
+        """Join the expected edges that are matched and the observed edge of each."""
+        pick, edge = self.chosen(matches)
+        return Seen(
+            self.times[edge],
+            self.burst[edge],
+            self.rods[pick],
+            self.gate[pick],
+            self.levels[pick],
+            self.sign[pick],
+            self.turn[pick],
+        )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import Equations
+    from rig.analysis.equations import Residuals
 
     Array = NDArray[np.float64]
 
@@ -84,11 +84,11 @@ class Evidence:
                 (alpha**2, float(y[block] @ y[block]) * variance, float(np.sum(1.0 - v[block])))
             )
 
-    def edges(self, equations: Iterable[Equations]) -> None:
+    def edges(self, residuals: Iterable[Residuals]) -> None:
         """Count what is left over of the edges that are no part of a flicker."""
-        for row in equations:
-            good = row.clean & (np.abs(row.residuals) <= STRAY * row.sigma)
-            self._edges.append((row.residuals[good] ** 2, row.speed[good] ** 2))
+        for row in residuals:
+            good = row.clean & (np.abs(row.values) <= STRAY * row.sigma)
+            self._edges.append((row.values[good] ** 2, row.speed[good] ** 2))
 
     def _count(self, kind: str, y: Array, v: Array) -> None:
         self._squares[kind] += float(y @ y)

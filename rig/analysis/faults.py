@@ -81,7 +81,7 @@ def find_faults(fit: Fit) -> Faults:
 
 
 class _Seen(NamedTuple):
-    """A gate, the share of its expected edges that it saw, and how far off its beam seems to be.
+    """A gate, how many of its expected edges it saw, and how far off its beam seems to be.
 
     The latter is in standard uncertainties of its height.
     """
@@ -89,13 +89,13 @@ class _Seen(NamedTuple):
     role: str
     train: Train
     match: Index
-    share: float
+    matched: int
     off: float
 
     @property
-    def matched(self) -> int:
-        """Number of its edges that belong to a rod."""
-        return int((self.match >= 0).sum())
+    def share(self) -> float:
+        """Of its expected edges."""
+        return self.matched / self.match.size
 
     @property
     def odd(self) -> bool:
@@ -114,7 +114,7 @@ def _gates(fit: Fit) -> list[_Seen]:
     x, sd = np.abs(fit.estimate.x[beams]), fit.model.unknowns.sd[beams]
     off = np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
     return [
-        _Seen(role, train, match, float((match >= 0).mean()), float(off[train.gate]))
+        _Seen(role, train, match, int((match >= 0).sum()), float(off[train.gate]))
         for role, side in fit.model.sides.items()
         for train, match in zip(side.trains, fit.matches[role], strict=True)
         if match.size
@@ -141,14 +141,19 @@ def _exchanged(fit: Fit, one: _Seen, other: _Seen) -> bool:
 
     Gates that are a whole number of rods apart see nearly the same: the ends of the chain tell.
     """
+    pairs = ((one, other), (other, one))
+    own = one.matched + other.matched + 1
+    if max(one.off, other.off) > IMPLAUSIBLE:
+        own = 0
+    if sum(min(a.match.size, b.train.times.size) for a, b in pairs) <= own:
+        return False  # not even if all of them were
     counts = []
-    for expected, observed in ((one, other), (other, one)):
+    for expected, observed in pairs:
         count = _count_as(fit, expected, observed)
         if count <= RIGHT * expected.match.size:
             return False
         counts.append(count)
-    far = max(one.off, other.off) > IMPLAUSIBLE
-    return far or sum(counts) > one.matched + other.matched + 1
+    return sum(counts) > own
 
 
 def _count_as(fit: Fit, expected: _Seen, observed: _Seen) -> int:

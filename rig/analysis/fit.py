@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _COARSE = 2.5e-3  # m: how far off a first guess may put a rod
 _FINE = 0.5e-3  # m: how far off an adjusted trajectory may
+_NEAR = 10.0  # standard uncertainties: the step after one so short ends where edges can be matched
+_SAME = 1.0  # standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
 
 
@@ -64,21 +66,17 @@ class Fit(Matched):
 
 
 def settle(model: DropModel) -> Fit:
-    """Match and adjust in turn until the matching stays."""
+    """Match and adjust in turn until that moves the chain no more."""
     x = model.first()
-    estimate: Estimate | None = None
-    before: Matches = {}
-    for round_ in range(_ROUNDS):
-        matches = match(model, x, _COARSE if round_ == 0 else _FINE)
-        if estimate is not None and _same(matches, before):
-            break
+    matches = match(model, x, _COARSE)
+    estimate = adjust(model, matches, x, done=_NEAR)
+    for _ in range(_ROUNDS):
+        x = estimate.x
+        matches = without_strays(model, x, match(model, x), estimate.scatter)
         estimate = adjust(model, matches, x)
-        x, before = estimate.x, matches
-    assert estimate is not None
-    struck = without_strays(model, x, before, estimate.scatter)
-    if not _same(struck, before):
-        estimate = adjust(model, struck, x)
-    return Fit(model, struck, estimate)
+        if estimate.beyond(x) < _SAME:
+            break
+    return Fit(model, matches, estimate)
 
 
 def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
@@ -110,8 +108,8 @@ def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float 
 def _kept(
     model: DropModel, role: str, x: Array, matches: Sequence[Index], scatter: float
 ) -> list[Index]:
-    rows = model.equations(role, x, matches)
-    stray = np.abs(rows.residuals) > STRAY * rows.sigma * scatter
+    rows = model.residuals(role, x, matches)
+    stray = np.abs(rows.values) > STRAY * rows.sigma * scatter
     kept, position = [], 0
     for one in matches:
         copy = one.copy()
@@ -120,11 +118,3 @@ def _kept(
         position += chosen.size
         kept.append(copy)
     return kept
-
-
-def _same(one: Matches, other: Matches) -> bool:
-    return all(
-        np.array_equal(a, b)
-        for role in one
-        for a, b in zip(one[role], other.get(role, []), strict=True)
-    )

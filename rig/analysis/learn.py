@@ -175,7 +175,7 @@ def _weigh(
         variance = np.zeros(drop.x.size)
         variance[drop.own] = left
         new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
-        new.edges(found.equations)
+        new.edges(found.residuals)
     return new.settled(parameters)
 
 

@@ -175,7 +175,7 @@ def _scatter(drop: Fit | Taught) -> dict[str, Array]:
     """Standard deviation of every observed edge of each side, s; 0 where it is not matched."""
     found = {}
     for role, matches in drop.matches.items():
-        rows = drop.model.equations(role, drop.x, matches)
+        rows = drop.model.residuals(role, drop.x, matches)
         expected = drop.model.expected[role]
         _, edges = expected.chosen(matches)
         found[role] = np.zeros(expected.times.size)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import Equations
+    from rig.analysis.equations import Residuals
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -38,7 +38,7 @@ class Normal:
         JᵀWr likewise, shape ``(unknowns,)``.
     chi2, size
         Weighted sum of squares, and number of edges.
-    equations
+    residuals
         What it was made of, one a side.
     """
 
@@ -46,7 +46,7 @@ class Normal:
     vector: Array
     chi2: float
     size: int
-    equations: tuple[Equations, ...]
+    residuals: tuple[Residuals, ...]
 
 
 def normal(
@@ -72,18 +72,20 @@ def normal(
     """
     matrix, vector = np.zeros((x.size, x.size)), np.zeros(x.size)
     chi2, size = 0.0, 0
-    rows = tuple(model.equations(role, x, match) for role, match in matches.items())
-    for row in rows:
-        sigma = row.sigma * inflation
-        residuals = row.residuals / sigma
+    left = []
+    for role, match in matches.items():
+        (values, sigma, *_), slopes, columns, _ = one = model.equations(role, x, match)
+        sigma = sigma * inflation
+        residuals = values / sigma
         far = np.maximum(np.abs(residuals), 1e-300)
         weight = np.where(far > cut, 0.0, np.sqrt(np.minimum(1.0, HUBER / far)))
-        slopes = row.slopes * sd[row.columns]
-        slopes *= (weight / sigma)[:, None]
-        residuals = residuals * weight
-        place = row.columns[:, None] * x.size + row.columns
-        matrix.reshape(-1)[place] += slopes.T @ slopes
-        vector[row.columns] += slopes.T @ residuals
+        residuals *= weight
+        slopes *= (weight / sigma)[:, None]  # in place: nobody else has them
+        matrix[np.ix_(columns, columns)] += slopes.T @ slopes
+        vector[columns] += slopes.T @ residuals
         chi2 += float(residuals @ residuals)
         size += residuals.size
-    return Normal(matrix, vector, chi2, size, rows)
+        left.append(one.residuals)
+    # A column's unit is applied to few numbers instead of to each edge.
+    matrix *= np.outer(sd, sd)
+    return Normal(matrix, vector * sd, chi2, size, tuple(left))

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rig.units import Quantity
 
     Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
 
 ALPHAS = np.arange(-0.10, 0.601, 0.01)
 """Impact coefficients that are tried: beyond both ends of what energy allows."""
@@ -84,23 +85,16 @@ def guess_release(
     tau = np.sqrt(2.0 * (start.value - levels) / gravity)
     middle = times - tau
     half = np.minimum(slack / np.maximum(gravity * tau, slack / _LONGEST), _LONGEST)
-    begins, ends = np.sort(middle - half), np.sort(middle + half)
-    count = np.arange(1, times.size + 1)
-    # Just after each beginning of a vote, and just after each end.
-    votes = count - np.searchsorted(ends, begins, side="left")
-    after = np.searchsorted(begins, ends, side="right") - count
+    begins = times.size  # the first so many of all ends of votes
+    moments = np.concatenate([middle - half, middle + half])
+    order = np.argsort(moments, kind="stable")  # what begins comes before what ends then
+    moments = moments[order]
+    votes = np.cumsum(np.where(order < begins, 1, -1))  # just after each
     best = int(np.argmax(votes))
-    until = min(
-        np.append(begins, np.inf)[best + 1],
-        ends[np.searchsorted(ends, begins[best], side="left")],
-    )
-    release = 0.5 * float(begins[best] + until)
+    release = 0.5 * float(moments[best] + moments[best + 1])
     voters = np.abs(middle - release) <= half
     expected = sum(int((train.levels > lowest).sum()) for train in side.trains)
-    elsewhere = max(
-        votes[np.abs(begins - release) > _APART].max(initial=0),
-        after[np.abs(ends - release) > _APART].max(initial=0),
-    )
+    elsewhere = votes[np.abs(moments - release) > _APART].max(initial=0)
     most = float(votes[best])
     release, height = _refine(times[voters], levels[voters], release, start, gravity)
     return Guess(
@@ -126,7 +120,7 @@ class Pairs(NamedTuple):
 
     times: Array
     levels: Array
-    expected: NDArray[np.intp]
+    expected: Index
 
 
 def _pairs(side: Side, lowest: float) -> Pairs:
@@ -153,15 +147,12 @@ def _refine(
         residual = start.value + offset - 0.5 * gravity * since**2 - levels
         weight = np.minimum(1.0, 2.0 * _ROUGH / np.maximum(np.abs(residual), _ROUGH))
         speed = gravity * since
-        normal = np.array(
-            [
-                [float(weight @ speed**2), float(weight @ speed)],
-                [float(weight @ speed), float(weight.sum()) + prior],
-            ]
-        )
-        right = [float((weight * speed) @ residual), float(weight @ residual) + prior * offset]
-        step = np.linalg.solve(normal, right)
-        release, offset = release - float(step[0]), offset - float(step[1])
+        pull = weight * speed
+        both, one, other = float(pull @ speed), float(pull.sum()), float(weight.sum()) + prior
+        left, right = float(pull @ residual), float(weight @ residual) + prior * offset
+        determinant = both * other - one * one
+        release -= (left * other - right * one) / determinant
+        offset -= (right * both - left * one) / determinant
     return release, start.value + offset
 
 
@@ -171,8 +162,7 @@ def _alpha(
     """Try one α after another."""
     places = np.array(side.chain.chain.heights)
     time, height, speed = _paths(free.release, free.start, gravity, ratios, places)
-    pairs = _within_reach(_pairs(side, -np.inf), time, height, speed, gravity, slack)
-    scores = _scores(pairs, side.expected, time, height, speed, gravity, slack)
+    scores = _scores(side, time, height, speed, gravity, slack)
     # The middle of a plateau, not its left end.
     plateau = np.flatnonzero(scores == scores.max())
     best = int(plateau[plateau.size // 2])
@@ -206,41 +196,34 @@ def _paths(
     return time, height, speed
 
 
-def _within_reach(
-    pairs: Pairs, time: Array, height: Array, speed: Array, gravity: float, slack: float
-) -> Pairs:
-    """Leave out pairs that no α brings together: a larger one is lower at any time."""
-    highest = _heights(pairs.times, time[:, 0], height, speed[:, 0], gravity)
-    lowest = _heights(pairs.times, time[:, -1], height, speed[:, -1], gravity)
-    near = (highest > pairs.levels - slack) & (lowest < pairs.levels + slack)
-    return Pairs(pairs.times[near], pairs.levels[near], pairs.expected[near])
-
-
 def _scores(
-    pairs: Pairs, size: int, time: Array, height: Array, speed: Array, gravity: float, slack: float
-) -> NDArray[np.intp]:
+    side: Side, time: Array, height: Array, speed: Array, gravity: float, slack: float
+) -> Index:
     """Count for every α the expected edges that have an observed one where the chain would be."""
-    legs, alphas = time.shape
-    order = np.argsort(pairs.times, kind="stable")
-    times, levels, expected = (one[order] for one in pairs)
-    # How many edges come on each leg of each α, and so the leg on which each one comes.
-    begins = np.searchsorted(times, time.T)
-    begins[:, 0] = 0
-    counts = np.diff(begins, axis=1, append=times.size)
-    leg = np.repeat(np.tile(np.arange(legs), alphas), counts.ravel()).reshape(alphas, times.size)
-    flat = leg * alphas + np.arange(alphas)[:, None]
-    since = np.maximum(times - time.take(flat), 0.0)
-    at = height.take(leg) - (speed.take(flat) + 0.5 * gravity * since) * since
-    alpha, pair = np.nonzero(np.abs(at - levels) < slack)
-    found = np.zeros((alphas, size), dtype=np.bool_)
-    found[alpha, expected[pair]] = True
-    scores: NDArray[np.intp] = found.sum(axis=1)
+    levels = np.concatenate([train.levels for train in side.trains])
+    soonest = _passages(levels + slack, time, height, speed, gravity)
+    latest = _passages(levels - slack, time, height, speed, gravity)
+    times, _, expected = _pairs(side, -np.inf)
+    # The larger α, the sooner: most pairs are beyond what any of them reaches.
+    near = np.flatnonzero((soonest[expected, -1] < times) & (times < latest[expected, 0]))
+    near = near[np.argsort(expected[near], kind="stable")]
+    number, when = expected[near], times[near, None]
+    hit = (soonest[number] < when) & (when < latest[number])
+    if not number.size:
+        return np.zeros(time.shape[1], dtype=np.intp)
+    begins = np.flatnonzero(np.diff(number, prepend=-1))
+    scores: Index = np.logical_or.reduceat(hit, begins).sum(axis=0)
     return scores
 
 
-def _heights(times: Array, time: Array, height: Array, speed: Array, gravity: float) -> Array:
-    """Height of the reference point on one path, shape of `times`."""
-    leg = np.maximum(np.searchsorted(time, times, side="right") - 1, 0)
-    since = np.maximum(times - time[leg], 0.0)
-    at: Array = height[leg] - (speed[leg] + 0.5 * gravity * since) * since
-    return at
+def _passages(levels: Array, time: Array, height: Array, speed: Array, gravity: float) -> Array:
+    """When each path comes down to each level, shape ``(levels, paths)``; −∞ above the start."""
+    leg = np.maximum(np.searchsorted(-height, -levels, side="right") - 1, 0)
+    distance = np.maximum(height[leg] - levels, 0.0)[:, None]
+    begin = speed[leg]
+    arrival = np.sqrt(begin * begin + 2.0 * gravity * distance)
+    arrival += begin
+    passed = 2.0 * distance / np.maximum(arrival, np.finfo(float).tiny)
+    passed += time[leg]
+    passed[levels > height[0]] = -np.inf
+    return passed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -54,13 +55,18 @@ class Train:
     levels: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Edges:
     """A drop's edges as arrays, shape ``(edges,)`` each."""
 
     times: Array
     channels: Index
     blocked: Flags
+
+    @cached_property
+    def darkening(self) -> bool:
+        """Whether beams only ever darken: some timers tell nothing else."""
+        return bool(self.blocked.size and self.blocked.all())
 
     @classmethod
     def of(cls, drop: Drop, hz: float) -> Edges:
@@ -115,30 +121,30 @@ def train(
     """
     mine = np.flatnonzero(edges.channels == gate.channel)
     times = edges.times[mine]
+    rods, blocks, levels = _passages(gate.height, chain, start, struck, edges.darkening)
+    return Train(number, times, edges.blocked[mine], bursts(times), mine, rods, blocks, levels)
+
+
+@lru_cache(maxsize=256)  # a session asks for the same few again and again
+def _passages(
+    height: float, chain: RodChain, start: float, struck: bool, darkening: bool
+) -> tuple[Index, Flags, Array]:
+    """Rods, polarities and levels of what a beam should see, as `Train` has them."""
     places = np.array(chain.chain.heights)
     widths = np.array(chain.widths)
     # A rod's lower side darkens the beam, its upper side clears it.
-    levels = np.stack(
-        [gate.height - places + widths / 2, gate.height - places - widths / 2], axis=1
-    )
+    levels = np.stack([height - places + widths / 2, height - places - widths / 2], axis=1).ravel()
     rods = np.repeat(np.arange(places.size), 2)
     blocks = np.tile(np.array([True, False]), places.size)
-    flat = levels.ravel()
-    seen = flat < start
+    seen = levels < start
     if struck:
-        seen &= flat > -places[rods]
-    if edges.blocked.size and edges.blocked.all():  # some timers tell only when a beam darkens
+        seen &= levels > -places[rods]
+    if darkening:
         seen &= blocks
-    return Train(
-        number,
-        times,
-        edges.blocked[mine],
-        bursts(times),
-        mine,
-        rods[seen],
-        blocks[seen],
-        flat[seen],
-    )
+    found = rods[seen], blocks[seen], levels[seen]
+    for one in found:
+        one.flags.writeable = False
+    return found
 
 
 def bursts(times: Array) -> Array:

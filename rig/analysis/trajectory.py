@@ -126,15 +126,17 @@ class Trajectory:
         begin = [slopes.time, slopes.height, slopes.speed]
         if by is not None:
             begin, gravity = [one @ by for one in begin], by[GRAVITY]
-        time, height, speed = (one.take(leg, axis=0) for one in begin)
         # In place: these are the largest arrays of an adjustment.
-        time *= (self.speed[leg] + self.gravity * since)[:, None]
-        speed *= since[:, None]
-        time += height
-        time -= speed
+        found = begin[0].take(leg, axis=0)
+        found *= (self.speed[leg] + self.gravity * since)[:, None]
+        part = begin[1].take(leg, axis=0)
+        found += part
+        begin[2].take(leg, axis=0, out=part, mode="clip")
+        part *= since[:, None]
+        found -= part
         pulled = np.flatnonzero(gravity)
-        time[:, pulled] -= (0.5 * since * since)[:, None] * gravity[pulled]
-        return time
+        found[:, pulled] -= (0.5 * since * since)[:, None] * gravity[pulled]
+        return found
 
     def times(self, heights: Array) -> Array:
         """When the reference point comes down to each height, s; the release for higher ones."""

@@ -270,7 +270,7 @@ def _blocks(model: DropModel, side: Side, role: str, x: Array, place: Index) -> 
     """Split the equations of a side by beam."""
     at, sd = model.unknowns, model.unknowns.sd
     rows = model.equations(role, x, [np.arange(train.times.size) for train in side.trains])
-    slopes = rows.slopes * (sd[rows.columns] / rows.sigma[:, None])
+    slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
     gate = model.expected[role].gate
     columns = np.flatnonzero(place[rows.columns] >= 0)
     where = np.full(len(at), -1)

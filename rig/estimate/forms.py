@@ -144,11 +144,11 @@ def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array,
         extra = _extra(model, role, model.trajectory(role, x), times)
         place = np.append(rows.columns, np.arange(len(at), size))
         slopes = np.column_stack([rows.slopes, *extra])
-        sigma = rows.sigma * inflation
-        far = np.maximum(np.abs(rows.residuals / sigma), np.finfo(float).tiny)
+        sigma = rows.residuals.sigma * inflation
+        far = np.maximum(np.abs(rows.residuals.values / sigma), np.finfo(float).tiny)
         weight = np.where(far > STRAY, 0.0, np.minimum(1.0, HUBER / far)) / sigma**2
         weighted = slopes * weight[:, None]
-        left = rows.residuals - slopes @ point[place]
+        left = rows.residuals.values - slopes @ point[place]
         matrix[np.ix_(place, place)] += slopes.T @ weighted
         vector[place] += weighted.T @ left
         constant += float(left @ (weight * left))

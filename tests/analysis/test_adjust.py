@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp
 
-from rig.analysis.adjust import adjust, uncertainty
-from rig.analysis.equations import Equations
+from rig.analysis.adjust import DONE, adjust, uncertainty
+from rig.analysis.equations import Equations, Residuals
 from tests.analysis.drops import SCENES, case
 
 HUBER = 4.0
@@ -39,10 +39,8 @@ class Linear:
         residuals = self.offset[role] + self.jacobian[role] @ x
         sigma = self.sigma[role][match]
         ones = np.ones_like(sigma)
-        return Equations(
-            residuals[match], self.jacobian[role][match], sigma, ones, ones.astype(np.bool_),
-            np.arange(5), 5,
-        )  # fmt: skip
+        left = Residuals(residuals[match], sigma, ones, ones.astype(np.bool_))
+        return Equations(left, self.jacobian[role][match], np.arange(5), 5)
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """All rows in standard deviations: J/σ and r(0)/σ."""
@@ -113,8 +111,11 @@ def test_degrees_of_freedom_are_edges_less_what_they_determine():
 def test_an_outlier_pulls_with_bounded_force(outlier):
     """At the optimum of Huber's loss its gradient is zero."""
     model = Linear(3, noise=0.1, outlier=outlier)
-    found = adjust(model, ALL, np.zeros(5))
+    found = adjust(model, ALL, np.zeros(5), done=1e-6)
     assert found.settled
+    usual = adjust(model, ALL, np.zeros(5))
+    assert usual.settled
+    assert usual.beyond(found.x) < DONE
     jacobian, offset = model.stacked()
     residuals = (offset + jacobian @ found.x) / found.scatter
     assert np.abs(residuals).max() > HUBER

@@ -55,11 +55,11 @@ def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
     moving = np.zeros(x.size, dtype=np.bool_)
     for role, match in matches.items():
         found = model.equations(role, x, match)
-        assert found.residuals.size > 0.9 * sum(
+        assert found.residuals.values.size > 0.9 * sum(
             train.rods.size for train in model.sides[role].trains
         )
         expected, kinks = differences(
-            lambda at, role=role, match=match: model.equations(role, at, match).residuals,
+            lambda at, role=role, match=match: model.residuals(role, at, match).values,
             x,
             steps(model),
         )
@@ -127,7 +127,7 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
     model, matches = case(UNIFORM, seed=3).model()
     x = model.first()
     for role, match in matches.items():
-        found = model.equations(role, x, match)
+        found = model.residuals(role, x, match)
         trains = model.sides[role].trains
         times = np.concatenate([t.times[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
         burst = np.concatenate([t.burst[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
