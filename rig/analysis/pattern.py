@@ -86,7 +86,7 @@ def guess_release(
     middle = times - tau
     half = np.minimum(slack / np.maximum(gravity * tau, slack / _LONGEST), _LONGEST)
     begins = times.size  # the first so many of all ends of votes
-    moments = np.concatenate([middle - half, middle + half])
+    moments = np.concatenate([np.sort(middle - half), np.sort(middle + half)])
     order = np.argsort(moments, kind="stable")  # what begins comes before what ends then
     moments = moments[order]
     votes = np.cumsum(np.where(order < begins, 1, -1))  # just after each

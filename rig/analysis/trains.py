@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Literal
@@ -71,7 +72,8 @@ class Edges:
     @classmethod
     def of(cls, drop: Drop, hz: float) -> Edges:
         """Take them from a drop whose ticks come at a rate in Hz."""
-        table = np.array(drop.edges, dtype=np.int64).reshape(-1, 3)
+        flat = itertools.chain.from_iterable(drop.edges)  # much faster than an array of rows
+        table = np.fromiter(flat, np.int64, 3 * len(drop.edges)).reshape(-1, 3)
         return cls(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
 
 
