@@ -70,8 +70,12 @@ class Part(NamedTuple):
 
 
 def joint_step(
-    drops: Sequence[Joint], x: Array, sd: Array, centre: Array | None = None
-) -> tuple[Array, Array, list[Normal]]:
+    drops: Sequence[Joint],
+    x: Array,
+    sd: Array,
+    centre: Array | None = None,
+    cut: float = STRAY,
+) -> tuple[Array, Array]:
     """Take one Gauss–Newton step of all drops together; moves their own unknowns in place.
 
     Parameters
@@ -80,23 +84,21 @@ def joint_step(
         Common unknowns and their prior uncertainties.
     centre
         Prior means of the common unknowns, zero if not given.
+    cut
+        As for `rig.analysis.normal.normal`.
 
     Returns
     -------
     covariance, step
         Of the common unknowns, in units of `sd`.
-    normals
-        Of each drop, where the step began.
     """
     total = np.eye(x.size)
     vector = scaled(-x if centre is None else centre - x, sd)
-    normals = []
     for drop in drops:
-        found = normal(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=STRAY)
+        found = normal(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=cut)
         drop.part = part = _eliminate(drop, found)
         total[np.ix_(drop.here, drop.here)] += part.reduced
         vector[drop.here] += part.vector
-        normals.append(found)
     covariance = np.linalg.inv(total).astype(np.float64, copy=False)
     step = covariance @ vector
     for drop in drops:
@@ -104,7 +106,7 @@ def joint_step(
         scale = drop.model.unknowns.sd[drop.own]
         drop.x[drop.own] += scale * (drop.part.own - drop.part.gain @ step[drop.here])
         drop.x[drop.common] = (x + step * sd)[drop.here]
-    return covariance, step, normals
+    return covariance, step
 
 
 def _eliminate(drop: Joint, found: Normal) -> Part:

@@ -8,6 +8,7 @@ of nuisance scatters is estimated on the way (`rig.analysis.evidence`).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from rig.analysis.components import STATED
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
 from rig.analysis.joint import Joint, joint_step, scaled
+from rig.analysis.normal import STRAY
 from rig.analysis.shared import Shared
 
 if TYPE_CHECKING:
@@ -26,7 +28,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.analysis.fit import Fit
-    from rig.analysis.normal import Normal
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -38,6 +39,7 @@ _ROUNDS = 30  # of which few drops need many, for they tell little of the scatte
 _REMATCH = 2  # rounds after which all edges are matched again
 _DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
+_KEPT = 0.9  # share of its edges that every drop must keep: without them priors are all it has
 _LEAST = {"floor": 5e-6}  # where others of its kind count for more
 
 
@@ -79,7 +81,7 @@ class Lesson:
     drops
         In the order given.
     settled
-        Whether the steps came to an end.
+        Whether the steps came to an end, and all drops have still their edges.
     """
 
     shared: Shared
@@ -106,7 +108,7 @@ def learn(fits: Sequence[Fit]) -> Lesson:
     drops = [_begin(fit, shared) for fit in fits]
     x = _average(drops, shared)
     evidence = Evidence(STATED)
-    settled = False
+    settled, moved = False, 0.0
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
         for drop in drops:
@@ -115,14 +117,18 @@ def learn(fits: Sequence[Fit]) -> Lesson:
             if round_ == _REMATCH:
                 drop.matches = match(drop.model, drop.x)
             sd[drop.here] = drop.model.unknowns.sd[drop.common]
-        covariance, step, normals = joint_step(drops, x, sd)
+        # At first the common unknowns are not yet what a drop's own go with: all may be far off.
+        covariance, step = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
         x = x + step * sd
-        moved = float((np.abs(step) / np.sqrt(np.diag(covariance))).max())
+        last, moved = moved, float((np.abs(step) / np.sqrt(np.diag(covariance))).max())
         before = evidence.components
-        evidence = _weigh(evidence, shared, x, sd, covariance, drops, normals)
-        settled = round_ > _REMATCH and moved < _DONE
+        evidence = _weigh(evidence, shared, x, sd, covariance, drops)
+        # As long as steps get shorter alike, the next one is that of the last times their ratio.
+        settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
             break
+    taught = tuple(_taught(drop) for drop in drops)
+    whole = all(drop.matched >= _KEPT * fit.matched for drop, fit in zip(taught, fits, strict=True))
     return Lesson(
         shared,
         x,
@@ -130,8 +136,8 @@ def learn(fits: Sequence[Fit]) -> Lesson:
         covariance,
         before,
         evidence.degrees,
-        tuple(_taught(drop) for drop in drops),
-        settled,
+        taught,
+        settled and whole,
     )
 
 
@@ -157,7 +163,6 @@ def _weigh(
     sd: Array,
     covariance: Array,
     drops: Sequence[Joint],
-    normals: Sequence[Normal],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
     new = Evidence(evidence.components)
@@ -165,7 +170,7 @@ def _weigh(
     for name, block in shared.blocks.items():
         new.common(name, scaled(x, sd)[block], remaining[block], sd[block])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
-    for drop, found in zip(drops, normals, strict=True):
+    for drop in drops:
         assert drop.part is not None
         part, model = drop.part, drop.model
         common = covariance[np.ix_(drop.here, drop.here)]
@@ -175,7 +180,7 @@ def _weigh(
         variance = np.zeros(drop.x.size)
         variance[drop.own] = left
         new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
-        new.edges(found.residuals)
+        new.edges(model.residuals(role, drop.x, match) for role, match in drop.matches.items())
     return new.settled(parameters)
 
 

@@ -113,7 +113,7 @@ def session_monte_carlo(lesson: Lesson, trials: int, seed: int) -> list[dict[str
             places = drop.own, drop.common, drop.here
             joint.append(Joint(model, drop.matches, drop.x.copy(), *places, own))
         for _step in range(_SESSION_STEPS):
-            _, step, _ = joint_step(joint, x, lesson.sd, centre)
+            _, step = joint_step(joint, x, lesson.sd, centre)
             x = x + step * lesson.sd
         for one, values in zip(joint, found, strict=True):
             for name, (value, _gradient) in measurands(one.model, one.x).items():

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import Residuals
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -38,15 +37,12 @@ class Normal:
         JᵀWr likewise, shape ``(unknowns,)``.
     chi2, size
         Weighted sum of squares, and number of edges.
-    residuals
-        What it was made of, one a side.
     """
 
     matrix: Array
     vector: Array
     chi2: float
     size: int
-    residuals: tuple[Residuals, ...]
 
 
 def normal(
@@ -72,9 +68,8 @@ def normal(
     """
     matrix, vector = np.zeros((x.size, x.size)), np.zeros(x.size)
     chi2, size = 0.0, 0
-    left = []
     for role, match in matches.items():
-        (values, sigma, *_), slopes, columns, _ = one = model.equations(role, x, match)
+        (values, sigma, *_), slopes, columns, _ = model.equations(role, x, match)
         sigma = sigma * inflation
         residuals = values / sigma
         far = np.maximum(np.abs(residuals), 1e-300)
@@ -85,7 +80,6 @@ def normal(
         vector[columns] += slopes.T @ residuals
         chi2 += float(residuals @ residuals)
         size += residuals.size
-        left.append(one.residuals)
     # A column's unit is applied to few numbers instead of to each edge.
     matrix *= np.outer(sd, sd)
-    return Normal(matrix, vector * sd, chi2, size, tuple(left))
+    return Normal(matrix, vector * sd, chi2, size)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.components import STATED
-from rig.analysis.learn import FEWEST
+from rig.analysis.drop import fit_drop
+from rig.analysis.learn import FEWEST, learn
 from rig.analysis.lesson_json import lesson_json
 from rig.analysis.normal import STRAY, normal
 from rig.analysis.quantities import measurands
@@ -17,8 +18,8 @@ from rig.analysis.refine import Budgets
 from rig.analysis.session import analyze
 from sim.dials import Dials
 from sim.lab import ChainLab
-from tests.analysis.drops import UNIFORM, true_value, with_dials, wrong_rods
-from tests.analysis.sessions import MILD, analysis, cases, lesson
+from tests.analysis.drops import UNIFORM, case, true_value, with_dials, wrong_rods
+from tests.analysis.sessions import MILD, analysis, cases, fits, lesson
 
 FOUR = (1, 2, 3, 4)
 EIGHT = tuple(range(1, 9))
@@ -202,6 +203,21 @@ def test_few_drops_teach_nothing():
     assert not any(result.learned for result in few.runs)
     assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in drops[:3]]
     assert "learned" not in few.json()
+
+
+def test_a_drop_that_does_not_go_with_the_others_is_not_left_to_its_priors():
+    """Somebody moved the gates before the last drop: no place of a beam goes with all four."""
+    drops = cases(FOUR)
+    gates = UNIFORM.gates.gates
+    moved = [replace(gate, height=gate.height + (-1) ** n * 2e-3) for n, gate in enumerate(gates)]
+    other = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=tuple(moved)))
+    last = case(other, MILD, seed=1, run=4)
+    _, alone = fit_drop(UNIFORM, last.run, last.drop, last.scale)
+    assert alone.matched > 0.95 * sum(side.expected for side in alone.model.sides.values())
+    taught = learn([*fits(drops[:3]), alone])
+    assert taught.drops[-1].matched < 0.9 * alone.matched
+    assert not taught.settled
+    assert learn(fits(drops)).settled
 
 
 def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
