@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _COARSE = 2.5e-3  # m: how far off a first guess may put a rod
 _FINE = 0.5e-3  # m: how far off an adjusted trajectory may
-_NEAR = 10.0  # standard uncertainties: the step after one so short ends where edges can be matched
+_NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
 _SAME = 1.0  # standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
 

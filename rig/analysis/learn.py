@@ -39,7 +39,6 @@ _ROUNDS = 30  # of which few drops need many, for they tell little of the scatte
 _REMATCH = 2  # rounds after which all edges are matched again
 _DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
-_KEPT = 0.9  # share of its edges that every drop must keep: without them priors are all it has
 _LEAST = {"floor": 5e-6}  # where others of its kind count for more
 
 
@@ -81,7 +80,7 @@ class Lesson:
     drops
         In the order given.
     settled
-        Whether the steps came to an end, and all drops have still their edges.
+        Whether the steps came to an end.
     """
 
     shared: Shared
@@ -127,8 +126,6 @@ def learn(fits: Sequence[Fit]) -> Lesson:
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
             break
-    taught = tuple(_taught(drop) for drop in drops)
-    whole = all(drop.matched >= _KEPT * fit.matched for drop, fit in zip(taught, fits, strict=True))
     return Lesson(
         shared,
         x,
@@ -136,8 +133,8 @@ def learn(fits: Sequence[Fit]) -> Lesson:
         covariance,
         before,
         evidence.degrees,
-        taught,
-        settled and whole,
+        tuple(_taught(drop) for drop in drops),
+        settled,
     )
 
 

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], None]
 
+_KEPT = 0.9
+"""Share of its edges that a drop must keep among others: without them priors are all it has."""
+_MOVED = "somebody may have moved its gates or chains; it is judged and measured by itself"
+
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
@@ -163,7 +167,8 @@ def _taught(
     """Give good drops the numbers that they have in the light of all of them.
 
     A verdict is on a drop by itself, by limits fixed beforehand: what others teach about the rig
-    changes its numbers and never whether they count.
+    changes its numbers and never whether they count. One that loses its edges among the others
+    keeps the numbers that it has by itself, and teaches nothing.
     """
     good = {
         n: fit
@@ -171,13 +176,18 @@ def _taught(
         if fit is not None and result.verdict in GOOD and fit.estimate.settled
     }
     found = list(results)
+    lesson = None
+    while lesson is None and len(good) >= FEWEST:
+        lesson = learn(list(good.values()))
+        for (n, fit), drop in zip(list(good.items()), lesson.drops, strict=True):
+            if drop.matched < _KEPT * fit.matched:
+                why = f"only {drop.matched} of its {fit.matched} edges go with the other runs"
+                found[n] = replace(found[n], reasons=(*found[n].reasons, f"{why}: {_MOVED}"))
+                del good[n]
+                lesson = None
     keys = [(results[n].run.number, results[n].attempt) for n in good]
-    alone = dict[tuple[int, int], "Fit | Taught"](zip(keys, good.values(), strict=True))
-    if len(good) < FEWEST:
-        return found, None, alone
-    lesson = learn(list(good.values()))
-    if not lesson.settled:
-        return found, None, alone
+    if lesson is None or not lesson.settled:
+        return found, None, dict(zip(keys, good.values(), strict=True))
     budgets = Budgets(lesson)
     for n, drop in zip(good, lesson.drops, strict=True):
         found[n] = replace(

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.components import STATED
-from rig.analysis.drop import fit_drop
-from rig.analysis.learn import FEWEST, learn
+from rig.analysis.learn import FEWEST
 from rig.analysis.lesson_json import lesson_json
 from rig.analysis.normal import STRAY, normal
 from rig.analysis.quantities import measurands
@@ -19,7 +18,7 @@ from rig.analysis.session import analyze
 from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.analysis.drops import UNIFORM, case, true_value, with_dials, wrong_rods
-from tests.analysis.sessions import MILD, analysis, cases, fits, lesson
+from tests.analysis.sessions import MILD, analysis, cases, lesson
 
 FOUR = (1, 2, 3, 4)
 EIGHT = tuple(range(1, 9))
@@ -205,19 +204,25 @@ def test_few_drops_teach_nothing():
     assert "learned" not in few.json()
 
 
-def test_a_drop_that_does_not_go_with_the_others_is_not_left_to_its_priors():
-    """Somebody moved the gates before the last drop: no place of a beam goes with all four."""
-    drops = cases(FOUR)
+def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
+    """Somebody pushed the gates before the last drop: no place of a beam goes with all of them."""
     gates = UNIFORM.gates.gates
-    moved = [replace(gate, height=gate.height + (-1) ** n * 2e-3) for n, gate in enumerate(gates)]
-    other = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=tuple(moved)))
-    last = case(other, MILD, seed=1, run=4)
-    _, alone = fit_drop(UNIFORM, last.run, last.drop, last.scale)
-    assert alone.matched > 0.95 * sum(side.expected for side in alone.model.sides.values())
-    taught = learn([*fits(drops[:3]), alone])
-    assert taught.drops[-1].matched < 0.9 * alone.matched
-    assert not taught.settled
-    assert learn(fits(drops)).settled
+    pushed = [
+        replace(gate, height=gate.height + (-1) ** n * 1.2e-3) for n, gate in enumerate(gates)
+    ]
+    other = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=tuple(pushed)))
+    *rest, _ = cases(EIGHT)
+    last = replace(case(other, MILD, seed=1, run=8), protocol=UNIFORM)
+    alone = last.analyze()
+    assert (alone.verdict, alone.reasons) == ("accepted", ())
+    found = analysis([*rest, last])
+    assert [result.learned for result in found.runs] == [True] * 7 + [False]
+    assert found.runs[-1].quantities == alone.quantities
+    assert found.runs[-1].verdict == "accepted"
+    assert "go with the other runs" in found.runs[-1].reasons[0]
+    without = analysis(rest)
+    for one, other in zip(found.runs[:-1], without.runs, strict=True):
+        assert one.quantities == other.quantities
 
 
 def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
