@@ -200,6 +200,10 @@ def _parser() -> argparse.ArgumentParser:
     _session(report)
     report.add_argument("-o", "--output", required=True, metavar="FILE", help="the page")
     report.add_argument("--figures", metavar="DIR", help="folder for the figures as SVG files too")
+    report.add_argument(
+        "--bars", choices=["U95", "u", "SE", "SD", "half-SD"], default="U95",
+        help="what the bars on means stand for; half-SD is what the paper draws",
+    )  # fmt: skip
 
     export = command("export", "write a session's results and edges as CSV files")
     _session(export)

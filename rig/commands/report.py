@@ -39,6 +39,7 @@ def main(arguments: Namespace) -> int:
             session.simulated,
             skew_limit_s=protocol.accept.release_skew,
             site_m_s2={"value": protocol.gravity.value, "U95": 2.0 * protocol.gravity.u},
+            bars=arguments.bars,
         )
         estimated = _estimated(protocol, analysis, simulated=session.simulated)
         if estimated:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from rig.report.bars import LABELS, bar
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
 from rig.report.numbers import expanded, fixed, nested, value_of
 from rig.report.panels import (
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
+
+    from rig.report.bars import Bars
 
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2, "markeredgewidth": 0}
 _MEAN: dict[str, Any] = {
@@ -42,7 +45,10 @@ _SEGMENTS: dict[str, tuple[Any, str]] = {
 
 
 def incline_figure(
-    analysis: Mapping[str, Any], curves: Mapping[str, Any] | None = None, simulated: bool = False
+    analysis: Mapping[str, Any],
+    curves: Mapping[str, Any] | None = None,
+    simulated: bool = False,
+    bars: Bars = "U95",
 ) -> str:
     """Separation and end speed against inclination (the paper's Fig. 3).
 
@@ -57,6 +63,8 @@ def incline_figure(
         ``free_fall_speed_m_s`` adds that line.
     simulated
         Whether to stamp the figure.
+    bars
+        What the bars on means stand for.
 
     Returns
     -------
@@ -72,7 +80,7 @@ def incline_figure(
     ] or [_PANELS[0]]
     with canvas((3.1,) * len(panels), simulated=simulated) as drawing:
         for axes, (key, scale, label) in zip(drawing.axes, panels, strict=True):
-            _incline_panel(axes, analysis, curves, key, scale)
+            _incline_panel(axes, analysis, curves, key, scale, bars)
             axes.set_ylabel(label)
             if key == "separation_m":
                 axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
@@ -184,7 +192,12 @@ def gravity_figure(
 
 
 def _incline_panel(
-    axes: Axes, analysis: Mapping[str, Any], curves: Mapping[str, Any], key: str, scale: float
+    axes: Axes,
+    analysis: Mapping[str, Any],
+    curves: Mapping[str, Any],
+    key: str,
+    scale: float,
+    bars: Bars,
 ) -> None:
     stem, unit = ("speed", "_m_s") if key == "speed_m_s" else ("separation", "_m")
     for name, part in _segments(curves):
@@ -207,8 +220,8 @@ def _incline_panel(
         axes.errorbar(
             [line["incline_deg"] for line in lines],
             [_scaled(line[key], scale) for line in lines],
-            yerr=[(expanded(line[key]) or 0.0) * scale for line in lines],
-            label="mean of runs ± U (95 %)",
+            yerr=[(bar(line, key, bars) or 0.0) * scale for line in lines],
+            label=f"mean of runs ± {LABELS[bars]}",
             **_MEAN,
         )
 

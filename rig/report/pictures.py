@@ -11,6 +11,8 @@ from rig.report.numbers import value_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rig.report.bars import Bars
+
 
 def pictures(
     analysis: Mapping[str, Any],
@@ -19,6 +21,7 @@ def pictures(
     *,
     skew_limit_s: float | None = None,
     site_m_s2: object = None,
+    bars: Bars = "U95",
 ) -> list[Picture]:
     """Draw the figures of a report.
 
@@ -34,6 +37,8 @@ def pictures(
         Beyond which a run is void, s.
     site_m_s2
         Expected gravity, for scenes without a surface.
+    bars
+        What the bars on means of several runs stand for.
 
     Raises
     ------
@@ -49,7 +54,7 @@ def pictures(
     if measured("separation_m") or measured("speed_m_s"):
         found.append(
             Picture(
-                incline_figure(analysis, curves, simulated),
+                incline_figure(analysis, curves, simulated, bars),
                 "Separation and end speed against inclination",
                 "Separation of the top rods and speed of the impact chain's end just before it "
                 "reaches the surface, against inclination; lines are the model.",

@@ -5,8 +5,9 @@ from __future__ import annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
+from rig.report.bars import LABELS, bar
 from rig.report.columns import Column
-from rig.report.numbers import expanded, fixed, value_of
+from rig.report.numbers import fixed, value_of
 from rig.report.parts import Part
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ _QUANTITIES = {
     "speed_m_s": ("V (mm/s)", 1e3, 2),
     "gravity_m_s2": ("g (mm/s²)", 1e3, 2),
 }
-_HEADINGS = {"incline": "incline (°)", "n": "n", "quantity": "", "mean": "mean", "sd": "SD"}
-_HEADINGS |= {"se": "SE", "u": "u", "expanded": "U95", "half": "SD/2"}
+_HEADINGS = {"incline": "incline (°)", "n": "n", "quantity": "", "mean": "mean"}
+_HEADINGS |= {"SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "half-SD": "SD/2"}
 _COLUMNS = tuple(
     Column(heading, itemgetter(key), numeric=key != "quantity")
     for key, heading in _HEADINGS.items()
@@ -52,21 +53,14 @@ def _records(summary: Any) -> Iterator[Record]:
         for name, (label, scale, decimals) in _QUANTITIES.items():
             if name not in line:
                 continue
-            symbol, _, unit = name.partition("_")
-            sd, se = (value_of(line.get(f"{symbol}_{kind}_{unit}")) for kind in ("sd", "se"))
+            values: dict[str, float | None] = {"mean": value_of(line[name])}
+            values |= {kind: bar(line, name, kind) for kind in LABELS}
             yield {
                 "incline": fixed(line["incline_deg"], 0),
                 "n": fixed(line["n"], 0),
                 "quantity": label,
                 **{
                     key: "" if value is None else fixed(value * scale, decimals)
-                    for key, value in (
-                        ("mean", value_of(line[name])),
-                        ("sd", sd),
-                        ("se", se),
-                        ("u", line[name]["u"]),
-                        ("expanded", expanded(line[name])),
-                        ("half", None if sd is None else sd / 2.0),
-                    )
+                    for key, value in values.items()
                 },
             }

@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from rig.report.bars import bar
 from rig.session.store import Session
 from tests.cli.lab import rig, short
 
@@ -149,3 +150,55 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(call, finished, tmp_
     assert done.err.startswith(f"cannot write {tmp_path / 'none' / 'r.html'}: ")
     assert call("report", finished.session, "-o", tmp_path).code == 2
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("bars", ["U95", "u", "SE", "SD", "half-SD"])
+def test_the_reader_chooses_what_bars_stand_for(call, finished, analysis, tmp_path, bars):
+    """The legend says what they are; their lengths are those of the analysis."""
+    done = call("report", finished.session, "-o", tmp_path / "r.html",
+                "--figures", tmp_path, "--bars", bars)  # fmt: skip
+    assert done.code == 0, done.err
+    drawn = (tmp_path / "figure-1.svg").read_text("utf-8")
+    words = {"U95": "U (95 %)", "SD": "SD of one run", "half-SD": "SD/2 of one run"}
+    assert f"mean of runs ± {words.get(bars, bars)}" in drawn
+    line = analysis["summary"][0]
+    sd = line["separation_sd_m"]
+    expected = {"U95": line["separation_m"]["U95"], "u": line["separation_m"]["u"],
+                "SE": sd / line["n"] ** 0.5, "SD": sd, "half-SD": sd / 2}  # fmt: skip
+    assert bar(line, "separation_m", bars) == pytest.approx(expected[bars], rel=1e-9)
+
+
+def test_scatter_is_told_beside_uncertainty(call, finished, analysis):
+    done = call("analyze", finished.session, "--scatter")
+    assert done.code == 0, done.err
+    part = done.out[done.out.index("Scatter of the runs") :]
+    assert all(word in part for word in ("SD", "SE", "U95", "SD/2"))
+    rows = [row.split() for row in part.splitlines() if "Δz (mm)" in row]
+    assert len(rows) == len(analysis["summary"])
+    for row, line in zip(rows, analysis["summary"], strict=True):
+        mean, sd, se, u, expanded, half = map(float, row[-6:])
+        assert mean == pytest.approx(1e3 * line["separation_m"]["value"], abs=1e-3)
+        assert sd == pytest.approx(1e3 * line["separation_sd_m"], abs=1e-3)
+        assert (se, half) == pytest.approx((sd / line["n"] ** 0.5, sd / 2), abs=1e-3)
+        assert u == pytest.approx(1e3 * line["separation_m"]["u"], abs=1e-3)
+        assert expanded == pytest.approx(1e3 * line["separation_m"]["U95"], abs=1e-3)
+
+
+def test_a_whole_session_by_monte_carlo(call, finished, analysis):
+    done = call("analyze", finished.session, "--session-trials", "60", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["runs"] == analysis["runs"]
+    drawn = found["monte_carlo"]
+    assert (drawn["trials"], drawn["seed"]) == (60, 1)
+    assert [run["run"] for run in drawn["runs"]] == [run["run"] for run in analysis["runs"]]
+    ratios = [one["u_ratio"] for run in drawn["runs"] for one in run["quantities"].values()]
+    # The standard deviation of 60 values has a standard error of 9 %; drops share most of them.
+    assert 0.7 < sum(ratios) / len(ratios) < 1.3
+    again = call("analyze", finished.session, "--session-trials", "60", "--json")
+    assert json.loads(again.out) == found
+    words = call("analyze", finished.session, "--session-trials", "2")
+    assert "Monte Carlo of the whole session: 2 trials, seed 1" in words.out
+    wrong = call("analyze", finished.session, "--session-trials", "1")
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "trials tell no uncertainty" in wrong.err
