@@ -182,17 +182,24 @@ def _rods(fit: Fit, role: str, gates: Sequence[_Seen]) -> list[str]:
     """Compare the number of rods that passed with the chain's."""
     chain = fit.model.sides[role].chain
     rods = chain.chain.rods
-    seen, expected = np.zeros((2, rods), dtype=np.intp)
-    for gate in gates:
-        # Of a rod's two edges one is enough, and counts once.
-        expected += np.bincount(gate.train.rods, minlength=rods) > 0
-        seen += np.bincount(gate.train.rods[gate.match >= 0], minlength=rods) > 0
+    # Of a rod's two edges one is enough, and counts once.
+    expected = _counts([gate.train.rods for gate in gates], rods)
+    seen = _counts([gate.train.rods[gate.match >= 0] for gate in gates], rods)
     there = np.flatnonzero(seen)
     missing = rods - 1 - int(there[-1]) if there.size else 0
     if missing and expected[-missing:].min() >= _ENOUGH:
         return [_count(role, chain.name, rods, rods - missing)]
     more = _more(fit, role, gates)
     return [_count(role, chain.name, rods, rods + more)] if more else []
+
+
+def _counts(passed: Sequence[Index], rods: int) -> Index:
+    """How many gates each rod passed, shape ``(rods,)``."""
+    sizes = np.array([one.size for one in passed], dtype=np.intp)
+    gate = np.repeat(np.arange(len(passed)), sizes)
+    places = np.concatenate([*passed, np.zeros(0, dtype=np.intp)]) + gate * rods
+    found: Index = (np.bincount(places, minlength=len(passed) * rods) > 0).reshape(-1, rods).sum(0)
+    return found
 
 
 def _count(role: str, name: str, stated: int, found: int) -> str:

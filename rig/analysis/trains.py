@@ -69,6 +69,18 @@ class Edges:
         """Whether beams only ever darken: some timers tell nothing else."""
         return bool(self.blocked.size and self.blocked.all())
 
+    @cached_property
+    def burst(self) -> Array:
+        """How long the flicker of its gate lasts that each edge is part of, s; 0 if clean."""
+        order = np.argsort(self.channels, kind="stable")
+        times, channels = self.times[order], self.channels[order]
+        apart = (np.diff(times) > QUICK) | (np.diff(channels) != 0)
+        edge = np.ones(min(1, times.size), dtype=np.bool_)
+        begins, ends = np.concatenate([edge, apart]), np.concatenate([apart, edge])
+        found = np.empty_like(times)
+        found[order] = (times[ends] - times[begins])[np.cumsum(begins) - 1]
+        return found
+
     @classmethod
     def of(cls, drop: Drop, hz: float) -> Edges:
         """Take them from a drop whose ticks come at a rate in Hz."""
@@ -122,9 +134,17 @@ def train(
         Whether the rods end at the surface: what passes below it is not expected.
     """
     mine = np.flatnonzero(edges.channels == gate.channel)
-    times = edges.times[mine]
     rods, blocks, levels = _passages(gate.height, chain, start, struck, edges.darkening)
-    return Train(number, times, edges.blocked[mine], bursts(times), mine, rods, blocks, levels)
+    return Train(
+        number,
+        edges.times[mine],
+        edges.blocked[mine],
+        edges.burst[mine],
+        mine,
+        rods,
+        blocks,
+        levels,
+    )
 
 
 @lru_cache(maxsize=256)  # a session asks for the same few again and again
@@ -146,14 +166,4 @@ def _passages(
     found = rods[seen], blocks[seen], levels[seen]
     for one in found:
         one.flags.writeable = False
-    return found
-
-
-def bursts(times: Array) -> Array:
-    """How long the flicker lasts that each edge is part of, s; 0 for a clean edge."""
-    if times.size == 0:
-        return times
-    begins = np.concatenate([[True], np.diff(times) > QUICK])
-    ends = np.concatenate([begins[1:], [True]])
-    found: Array = (times[ends] - times[begins])[np.cumsum(begins) - 1]
     return found
