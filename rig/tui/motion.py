@@ -55,9 +55,14 @@ class Motion:
     delay_s: float
 
     def curve(self, end_s: float) -> tuple[Array, Array]:
-        """Model's heights from the fire stamp to a time; empty without a model."""
+        """Model's heights from the fire stamp to a time; empty without a model.
+
+        What strikes the surface ends there, with the impact of its top rod.
+        """
         if self.model is None:
             return np.empty(0), np.empty(0)
+        if self.model.hits is not None:
+            end_s = min(end_s, float(self.model.time[-1]) + self.delay_s)
         times = np.linspace(0.0, end_s, _POINTS)
         return times, self.model.heights(times - self.delay_s)[0]
 
@@ -133,9 +138,8 @@ def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Ar
         gaps = np.interp(times_in, free.times, free.heights) - impact.heights[inside]
     if impact.model is None or free.model is None:
         return times_in[: gaps.size], gaps, nothing, nothing
-    curve = np.linspace(0.0, end_s, _POINTS)
-    delay = impact.delay_s
-    model = free.model.heights(curve - delay)[0] - impact.model.heights(curve - delay)[0]
+    curve, heights = impact.curve(end_s)
+    model = free.model.heights(curve - impact.delay_s)[0] - heights
     return times_in[: gaps.size], gaps, curve, model
 
 

@@ -18,9 +18,10 @@ from rig.tui.flow import Flow, Stage
 from rig.tui.options import Options
 from rig.tui.plan import Job
 from rig.tui.still import QUIET, Still
+from rig.tui.themes import NAMES
 from tests.cli.lab import short
 from tests.tui.lab import KEYS, run
-from tests.tui.screen import text_of
+from tests.tui.screen import colours_of, text_of
 
 GOLDENS = Path(__file__).parent / "goldens"
 SIZES = ((80, 24), (120, 36), (200, 60))
@@ -51,7 +52,32 @@ def test_a_screen_looks_as_it_did(moment, size, tmp_path):
     assert text + "\n" == golden.read_text("utf-8")
 
 
-async def _screen(moment, size, path):
+READABLE = 4.5
+"""Contrast that WCAG 2.1 asks of text (1.4.3); of large text and of marks in figures it asks 3."""
+
+
+def luminance(colour) -> float:
+    """Relative luminance of an sRGB colour (WCAG 2.1)."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+              for c in (one / 255 for one in colour)]  # fmt: skip
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("theme", NAMES)
+@pytest.mark.parametrize("moment", ["device", "run", "trouble", "session"])
+def test_all_text_can_be_read_in_every_theme(moment, theme, tmp_path):
+    path = tmp_path / "looks.session"
+    Session.create(path, short(), "looks.yaml", simulated=True, origin="sim://").close()
+    found = run(_screen(moment, (120, 36), path, theme))
+    assert len(found) > 20
+    for text, ink, paper in found:
+        if not any(map(str.isalnum, text)):
+            continue  # lines and marks
+        dark, bright = sorted((luminance(ink), luminance(paper)))
+        assert (bright + 0.05) / (dark + 0.05) >= READABLE, (text, ink, paper)
+
+
+async def _screen(moment, size, path, theme=None):
     flow, more = MOMENTS[moment]
     whole = Book(path).read().state()
     state = replace(whole, sections={**QUIET, **more, "session": whole.sections["session"]})
@@ -64,8 +90,10 @@ async def _screen(moment, size, path):
             await pilot.press("question_mark")
         if moment == "note":
             await pilot.press("n", *"warm")
+        if theme is not None:
+            app.theme = theme
         before, text = "", text_of(app)
         while before != text:
             await pilot.pause(0.6)  # figures are drawn at most twice a second
             before, text = text, text_of(app)
-        return text
+        return text if theme is None else [*colours_of(app)]

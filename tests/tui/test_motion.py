@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.analysis.summary import predicted_run
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.records import Drop, Edge
@@ -56,10 +57,22 @@ def test_points_lie_on_the_models_curve(scene, matched):
         assert one.times.size > 200
         there = one.model.heights(one.times - one.delay_s)[0]
         assert np.abs(there - one.heights).max() < 1e-5
-    times, gaps, _, model = separation(both, 0.6)
+    times, gaps, when, model = separation(both, 0.6)
     assert times.size == gaps.size > 100
-    assert gaps[-1] == pytest.approx(np.interp(times[-1], np.linspace(0, 0.6, model.size), model),
-                                     abs=2e-3)  # fmt: skip
+    assert gaps[-1] == pytest.approx(np.interp(times[-1], when, model), abs=2e-3)
+
+
+def test_a_curve_ends_when_the_top_rod_strikes(scene):
+    """What comes after is no fall: Δz is what the model says at that moment, and no more."""
+    run = runs(scene)[0]
+    both = motions(scene, run, [edge for edge, _ in edges_of(scene, run)], HZ)
+    _, _, when, model = separation(both, 5.0)
+    length = scene.chains[run.impact].chain.length
+    at, heights = both[0].curve(5.0)
+    np.testing.assert_array_equal(at, when)
+    assert heights[-1] == pytest.approx(-length, abs=1e-9)
+    assert when[-1] < 1.0
+    assert model[-1] == pytest.approx(predicted_run(scene, run)[0].value, abs=1e-9)
 
 
 def test_live_a_missed_edge_shifts_nothing(scene):

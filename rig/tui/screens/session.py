@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import groupby
+from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ from rig.tui.widgets.text import Words
 from rig.tui.words import duration, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
 
     from textual.app import ComposeResult
@@ -115,7 +115,7 @@ def _progress(model: Model) -> Content:
     session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
     return Content.assemble(
         ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
-        (f"  {over} of {len(runs)} runs", "bold"), f"{left}  ", (session, "$foreground 60%"),
+        (f"  {over} of {len(runs)} runs", "bold"), f"{left}  ", (session, "$foreground 70%"),
         _taught(model),
     )  # fmt: skip
 
@@ -126,9 +126,16 @@ def _plan(model: Model) -> Content:
     if model.findings is not None and not model.blindfold:
         summary = {line["incline_deg"]: line for line in model.findings.analysis["summary"]}
     ordered = sorted(model.state.runs, key=lambda line: line.incline_deg)
+    groups = [list(group) for _, group in groupby(ordered, key=lambda line: line.incline_deg)]
+    means = [_means(summary.get(group[0].incline_deg, {})) for group in groups]
+    most = max(map(len, groups), default=0)
+    widths = [max(map(len, column)) for column in zip_longest(*means, fillvalue="")]
     lines = []
-    for incline, group in groupby(ordered, key=lambda line: line.incline_deg):
-        lines.append(_incline(incline, list(group), summary.get(incline, {}), model))
+    for group, parts in zip(groups, means, strict=True):
+        padded = [part.ljust(width) for part, width in zip(parts, widths, strict=False)]
+        marks = [*_marks(group, model), (" " * (most - len(group) + 2), "")]
+        head = f"{group[0].incline_deg:5g}° " if group[0].impact is not None else "drops  "
+        lines.append(Content.assemble((head, "bold"), *marks, "  ".join(padded).rstrip()))
     return Content("\n").join(lines)
 
 
@@ -144,24 +151,25 @@ def _taught(model: Model) -> tuple[str, str]:
     return f"\neach drop by itself{few}{more}", "$foreground 70%"
 
 
-def _incline(
-    incline: float, runs: Sequence[RunLine], mean: Mapping[str, Any], model: Model
-) -> Content:
-    marks: list[tuple[str, str]] = []
+def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:
+    """A symbol a run; the one that is on turns its colours round."""
     for line in runs:
-        hidden = model.blindfold and model.job is not None and line.run == model.job.run
-        symbol, colour = LOOKS.get("recorded" if hidden else line.state, ("?", "$foreground"))
         now = model.job is not None and line.run == model.job.run
-        marks.append((symbol, f"{colour} reverse" if now else colour))
-    parts = []
-    for name, label, scale, unit in (
-        ("separation_m", "Δz", 100.0, "cm"), ("speed_m_s", "V", 1.0, "m/s"),
-        ("gravity_m_s2", "g", 1.0, "m/s²"),
-    ):  # fmt: skip
-        if name in mean:
-            parts.append(f"{label} {plus_minus(mean[name], scale)} {unit}")
+        hidden = model.blindfold and now
+        symbol, colour = LOOKS.get("recorded" if hidden else line.state, ("?", "$foreground"))
+        yield symbol, f"{colour} reverse" if now else colour
+
+
+def _means(mean: Mapping[str, Any]) -> list[str]:
+    """What is known of an incline so far."""
+    parts = [
+        f"{label} {plus_minus(mean[name], scale)} {unit}"
+        for name, label, scale, unit in (
+            ("separation_m", "Δz", 100.0, "cm"),
+            ("speed_m_s", "V", 1.0, "m/s"),
+            ("gravity_m_s2", "g", 1.0, "m/s²"),
+        )
+        if name in mean
+    ]
     error = mean.get("normalized_error")
-    if error is not None:
-        parts.append(f"Eₙ {fixed(error, 2)}")
-    head = f"{incline:5g}° " if runs[0].impact is not None else "drops  "
-    return Content.assemble((head, "bold"), *marks, "  ", "  ".join(parts))
+    return parts if error is None else [*parts, f"Eₙ {fixed(error, 2)}"]

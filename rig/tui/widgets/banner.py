@@ -21,7 +21,7 @@ LOOKS = {
     "armed": ("!", "$warning"),
     "fired": ("↓", "$primary"),
     "interrupted": ("■", "$warning"),
-    "planned": ("·", "$foreground 60%"),
+    "planned": ("·", "$foreground 70%"),
 }
 """Symbol and colour of every state of a run."""
 

@@ -40,7 +40,7 @@ class LampBoard(Widget):
     DEFAULT_CSS = """
     LampBoard { height: auto; padding: 0 1; }
     LampBoard > .lamp--title { text-style: bold; }
-    LampBoard > .lamp--unknown { color: $foreground 60%; }
+    LampBoard > .lamp--unknown { color: $foreground 70%; }
     LampBoard > .lamp--blocked { color: $warning; text-style: bold; }
     LampBoard > .lamp--clear { color: $success; }
     """

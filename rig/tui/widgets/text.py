@@ -14,10 +14,9 @@ Part: TypeAlias = "str | tuple[str, str]"
 class Words(Static):
     """Text on a page."""
 
-    DEFAULT_CSS = "Words { link-style: none; link-background: transparent; }"
-
     def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002
         super().__init__(markup=False, id=id, classes=classes)
+        self.auto_links = False  # what can be clicked keeps the colours that it was given
         self._said: Content | None = None
 
     @property
