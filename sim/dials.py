@@ -63,6 +63,8 @@ class Dials:
         Share of the host's reads that are held up, and for how long, s.
     corrupt, lose
         Share of bytes on the line, either way, that are changed or lost.
+    drag
+        The air takes drag·v² from the acceleration of either chain, 1/m.
     restitution, friction
         True coefficients; not-a-number takes the protocol's.
     """
@@ -91,6 +93,7 @@ class Dials:
     stall: float = 50e-3
     corrupt: float = 0.0
     lose: float = 0.0
+    drag: float = 0.0
     restitution: float = math.nan
     friction: float = math.nan
 
@@ -137,7 +140,7 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
             if name in _TIMES
             else Dimension.LENGTH
             if name in _LENGTHS
-            else Dimension.NUMBER
+            else Dimension.NUMBER  # drag too: 0.03 is 0.03/m
         )
         try:
             changes[name] = parse(text, dimension).value

@@ -13,7 +13,8 @@ import numpy as np
 from rig.errors import InputError
 from rig.link.messages import TEST_RUN, unpack_label
 from rig.model.chain import Chain
-from rig.model.fall import hits, kicks
+from rig.model.drag import drag_hits
+from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
@@ -146,7 +147,10 @@ class ChainLab:
             # A chain that falls alone has nothing to be late against.
             late = skew if paths else 0.0
             gravity = self.protocol.gravity.value
-            paths["free"] = self.bodies[run.free], Path(release + late, start, gravity)
+            paths["free"] = (
+                self.bodies[run.free],
+                Path(release + late, start, gravity, kappa=dials.drag),
+            )
         edges = [
             edge
             for gate in self.gates
@@ -178,8 +182,9 @@ class ChainLab:
         actual = Chain(chain.masses, tuple((body.offsets - bottom).tolist()), chain.inertia)
         gains = kicks(actual, alphas.tolist(), impact.gamma)
         gravity = self.protocol.gravity.value
-        events = hits(actual, gains, start + bottom, gravity)
-        return Path(release, start, gravity, events, tuple((-body.offsets).tolist()))
+        air = [dials.drag] * chain.rods
+        events = drag_hits(actual, gains, air, start + bottom, gravity)
+        return Path(release, start, gravity, events, tuple((-body.offsets).tolist()), dials.drag)
 
     def _shift(self, body: Body, gate: Gate) -> np.ndarray:
         """How far each rod's crossing is shifted because the beam is off its middle, m."""

@@ -7,6 +7,8 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rig.model.drag import drag_leg, fallen
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -29,6 +31,8 @@ class Path:
         Impacts, with times counted from release; empty in free fall.
     hit_heights
         Height of the reference point at each impact, falling.
+    kappa
+        The air takes κv² from the acceleration, 1/m.
     """
 
     release_s: float
@@ -36,6 +40,7 @@ class Path:
     gravity: float
     hits: Sequence[Hit] = ()
     hit_heights: Sequence[float] = ()
+    kappa: float = 0.0
 
     def time_at(self, height: float) -> float:
         """When the reference point comes down to `height`, s."""
@@ -49,6 +54,8 @@ class Path:
         distance = top - height
         if distance <= 0.0:
             return time
+        if self.kappa:
+            return time + drag_leg(distance, speed, self.gravity, self.kappa)[1]
         arrival = math.sqrt(speed * speed + 2.0 * self.gravity * distance)
         return time + 2.0 * distance / (speed + arrival)
 
@@ -58,9 +65,11 @@ class Path:
         if since <= 0.0:
             return self.start
         done = bisect_left(self.hits, since, key=lambda hit: hit.time_s)
-        if not done:
-            return self.start - 0.5 * self.gravity * since * since
-        hit = self.hits[done - 1]
-        since -= hit.time_s
-        top = self.hit_heights[done - 1]
-        return top - (hit.speed_after + 0.5 * self.gravity * since) * since
+        top, speed = self.start, 0.0
+        if done:
+            hit = self.hits[done - 1]
+            since -= hit.time_s
+            top, speed = self.hit_heights[done - 1], hit.speed_after
+        if self.kappa:
+            return top - fallen(since, self.gravity, self.kappa, speed)
+        return top - (speed + 0.5 * self.gravity * since) * since

@@ -11,15 +11,17 @@ import numpy as np
 
 from rig.analysis.components import STATED, Components
 from rig.analysis.equations import Equations, Expected, Residuals, Seen
+from rig.analysis.sides import air_is_told
 from rig.analysis.trajectory import (
     COMMON,
+    DRAG,
     GRAVITY,
     RELEASE,
     START,
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SIDE_U, Unknowns
+from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, DRAG_U, SIDE_U, Unknowns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -115,6 +117,8 @@ class DropModel:
         unknowns.add("drop", "drop height", protocol.drop.u)
         if len(self.sides) > 1:
             unknowns.add("side", "hanging height", SIDE_U)
+        if air_is_told([*self.sides.values()]):
+            unknowns.add("drag", "air", DRAG_U)
         unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
         if self._steepest:
             unknowns.add("ripple", "beam offsets", [components.beam * self._steepest] * gates)
@@ -190,6 +194,8 @@ class DropModel:
         x = np.zeros(len(self.unknowns))
         starts = [guess.start for guess in self.guesses.values()]
         x[self.unknowns["drop"]] = sum(starts) / len(starts) - self.protocol.drop.value
+        if "drag" in self.unknowns:
+            x[self.unknowns["drag"]] = max(guess.kappa for guess in self.guesses.values())
         return x
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
@@ -208,13 +214,14 @@ class DropModel:
         if role == "free" and "side" in at:
             start += float(x[at["side"]][0])
         gravity = self.protocol.gravity.value + float(x[at["gravity"]][0])
+        kappa = float(x[at["drag"]][0]) if "drag" in at else 0.0
         if role == "free":
-            return free_trajectory(release, start, gravity)
+            return free_trajectory(release, start, gravity, kappa)
         side = self.sides["impact"]
         assert side.ratios is not None
         places = np.array(side.chain.chain.heights) + x[at["impact rods"]]
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        return struck_trajectory(release, start, gravity, gains, side.ratios, places)
+        return struck_trajectory(release, start, gravity, gains, side.ratios, places, kappa)
 
     def spread(self, role: str, derivatives: Array) -> Array:
         """Derivatives by a trajectory's parameters → by all unknowns.
@@ -233,6 +240,8 @@ class DropModel:
         found = np.zeros((*derivatives.shape[:-1], len(at)))
         found[..., at[f"{role} release"]] = derivatives[..., [RELEASE]]
         found[..., at["gravity"]] = derivatives[..., [GRAVITY]]
+        if "drag" in at:
+            found[..., at["drag"]] = derivatives[..., [DRAG]]
         found[..., at["drop"]] = found[..., at[f"{role} hang"]] = derivatives[..., [START]]
         if role == "free" and "side" in at:
             found[..., at["side"]] = derivatives[..., [START]]

@@ -2,7 +2,8 @@
 
 This is no result. In g = 2·length/time² an error of the time scale counts twice, so a g that is not
 the place's says that the clock, a beam's height or the protocol's gravity is not what it is said
-to be. It uses none of the adjustment's machinery but its matches of edges to rods.
+to be. It uses none of the adjustment's machinery but its matches of edges to rods. What the air
+takes is fitted beside it: a light chain would read several per cent less.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.legs import fall_for, leg_slopes
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
+from rig.analysis.unknowns import DRAG_U
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,6 +33,8 @@ _EDGE_M = 0.1e-3  # where on a rod's surface a beam is cut
 _EDGE_S = 5e-6  # comparator and stamp
 _BEAM_M = 1e-3  # how far off a rod's middle a beam may run: tan(tilt) makes a height of it
 _FEWEST = 8  # edges
+_STEPS = 6
+_FIXED = 1e18  # inverse square of a prior uncertainty that leaves nothing free
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +114,7 @@ def check_gravity(
 def free_gravity(
     protocol: Protocol, result: DropResult, drop: Drop, scale: TimeScale
 ) -> Measured | None:
-    """Fit h = a + b t − g t²/2 to one drop's matched edges of the free side.
+    """Fit a fall from rest to one drop's matched edges of the free side, with κ of the air.
 
     Generalised least squares: rods off their places, beams off their heights and rods as they
     look to a beam are common to several edges each, and stand in the covariance.
@@ -129,8 +134,9 @@ def free_gravity(
     beam = np.array([gates[edge.channel].height for edge, _ in pairs])
     height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
     design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
-    _, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
+    top, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
     sigma = np.hypot(_EDGE_M, (speed - fall * time) * _EDGE_S)
+    point = np.array([top + speed**2 / (2.0 * fall), speed / fall, fall, 0.0])  # h, t, g and κ
     turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
     ripple = _BEAM_M * math.tan(math.radians(chain.tilt_deg))
     # What edges have in common, one column each, in units of its standard uncertainty: with the
@@ -144,12 +150,26 @@ def free_gravity(
             chain.width_u * side,
         ]
     )
-    whole = np.column_stack([design, common]) / sigma[:, None]
-    prior = np.concatenate([np.zeros(3), np.ones(common.shape[1])])
-    inverse = np.linalg.inv(whole.T @ whole + np.diag(prior))
-    best = inverse @ (whole.T @ (height / sigma))
-    left = height / sigma - whole @ best
-    chi2 = float(left @ left + (prior * best) @ best)
-    scatter2 = max(1.0, chi2 / (height.size - 3))
+    air = len(set(chain.chain.masses)) == 1  # else κ is not one number
+    prior = np.concatenate(
+        [[0.0, 0.0, 0.0, DRAG_U**-2 if air else _FIXED], np.ones(common.shape[1])]
+    )
+    for _ in range(_STEPS):
+        at, release, g, kappa = point
+        since = np.maximum(time - release, 0.0)
+        still = np.zeros_like(since)
+        fallen, _ = fall_for(since, still, g, kappa)
+        end, _, by_gravity, by_kappa = leg_slopes(since, still, g, kappa)
+        design = np.stack([np.ones_like(time), end, -by_gravity, -by_kappa], axis=1)
+        whole = np.column_stack([design, common]) / sigma[:, None]
+        inverse = np.linalg.inv(whole.T @ whole + np.diag(prior))
+        off = np.concatenate([[0.0, 0.0, 0.0, kappa], np.zeros(common.shape[1])])
+        residual = (height - at + fallen) / sigma
+        best = inverse @ (whole.T @ residual - prior * off)
+        point = point + best[:4]
+    left = residual - whole @ best
+    chi2 = float(left @ left + best[4:] @ best[4:])
+    scatter2 = max(1.0, chi2 / (height.size - 3 - air))
     fitted = math.sqrt(scatter2 * float(inverse[2, 2]))
-    return Measured(float(best[2]), math.hypot(fitted, 2.0 * float(best[2]) * scale.u))
+    value = float(point[2])
+    return Measured(value, math.hypot(fitted, 2.0 * value * scale.u))

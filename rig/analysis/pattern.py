@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import STATED
+from rig.analysis.legs import fall_for, fall_through, leg_slopes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,6 +32,21 @@ _STEPS = 6
 _APART = 8e-3  # release times further apart than this are different answers, s
 
 
+class Air(NamedTuple):
+    """What is known of κ beforehand, 1/m: where to begin, and its standard uncertainty.
+
+    With no uncertainty it stays as it is.
+    """
+
+    kappa: float = 0.0
+    u: float = 0.0
+
+
+NO_AIR = Air()
+_AIRS = tuple(0.02 * n for n in range(1, 11))  # of which one brings a chain near enough
+_CLEAR = 0.9  # share of the expected edges with which no other κ is tried
+
+
 @dataclass(frozen=True, slots=True)
 class Guess:
     """A first guess and how well the edges support it.
@@ -47,6 +63,8 @@ class Guess:
         Share of the expected edges that are where they should be.
     runner_up
         The same for the best guess that is a really different one.
+    kappa
+        Of the air, 1/m.
     """
 
     release: float
@@ -54,37 +72,43 @@ class Guess:
     alpha: float = 0.0
     share: float = 0.0
     runner_up: float = 0.0
+    kappa: float = 0.0
 
 
-def guess(side: Side, start: Quantity, gravity: float) -> Guess:
-    """Guess the release time, and α where the chain is struck.
+def guess(side: Side, start: Quantity, gravity: float, air: Air = NO_AIR) -> Guess:
+    """Guess the release time, κ of the air, and α where the chain is struck.
 
     Parameters
     ----------
     start
         Height of the reference point before release, m.
+    air
+        What is known of κ.
     """
     places = np.array(side.chain.chain.heights)
     pitch = float(np.diff(places).min()) if places.size > 1 else start.value
     slack = pitch / 6
     # An impact chain falls freely until its bottom rod is down.
     lowest = -np.inf if side.ratios is None else 0.0
-    free = guess_release(side, start, gravity, lowest, slack)
+    free = guess_release(side, start, gravity, lowest, slack, air)
+    for kappa in _AIRS if air.u and free.share < _CLEAR else ():
+        other = guess_release(side, start, gravity, lowest, slack, Air(kappa, air.u))
+        free = max(free, other, key=lambda one: one.share)
     if side.ratios is None or free.share == 0.0:
         return free
     return _alpha(side, gravity, side.ratios, slack, pitch, free)
 
 
 def guess_release(
-    side: Side, start: Quantity, gravity: float, lowest: float, slack: float
+    side: Side, start: Quantity, gravity: float, lowest: float, slack: float, air: Air = NO_AIR
 ) -> Guess:
     """Let all pairs vote and count at the moment that most of them agree on."""
     times, levels, _ = _pairs(side, lowest)
     if times.size == 0:
         return Guess(0.0, start.value)
-    tau = np.sqrt(2.0 * (start.value - levels) / gravity)
+    speed, tau = fall_through(start.value - levels, np.zeros_like(levels), gravity, air.kappa)
     middle = times - tau
-    half = np.minimum(slack / np.maximum(gravity * tau, slack / _LONGEST), _LONGEST)
+    half = np.minimum(slack / np.maximum(speed, slack / _LONGEST), _LONGEST)
     begins = times.size  # the first so many of all ends of votes
     moments = np.concatenate([np.sort(middle - half), np.sort(middle + half)])
     order = np.argsort(moments, kind="stable")  # what begins comes before what ends then
@@ -96,12 +120,13 @@ def guess_release(
     expected = sum(int((train.levels > lowest).sum()) for train in side.trains)
     elsewhere = votes[np.abs(moments - release) > _APART].max(initial=0)
     most = float(votes[best])
-    release, height = _refine(times[voters], levels[voters], release, start, gravity)
+    release, height, kappa = _refine(times[voters], levels[voters], release, start, gravity, air)
     return Guess(
         release,
         height,
         share=min(1.0, most / expected),
         runner_up=float(elsewhere) / expected,
+        kappa=kappa,
     )
 
 
@@ -137,23 +162,24 @@ def _pairs(side: Side, lowest: float) -> Pairs:
 
 
 def _refine(
-    times: Array, levels: Array, release: float, start: Quantity, gravity: float
-) -> tuple[float, float]:
-    """Fit release time and start height to the pairs that voted for them."""
-    offset = 0.0
-    prior = (_ROUGH / max(start.u, STATED.hang)) ** 2
+    times: Array, levels: Array, release: float, start: Quantity, gravity: float, air: Air
+) -> tuple[float, float, float]:
+    """Fit release time, start height and κ to the pairs that voted for them."""
+    offset, kappa = 0.0, air.kappa
+    prior = np.array([0.0, (_ROUGH / max(start.u, STATED.hang)) ** 2, 0.0])
+    prior[2] = (_ROUGH / air.u) ** 2 if air.u else 1.0
     for _ in range(_STEPS):
-        since = times - release
-        residual = start.value + offset - 0.5 * gravity * since**2 - levels
+        since = np.maximum(times - release, 0.0)
+        still = np.zeros_like(since)
+        fallen, speed = fall_for(since, still, gravity, kappa)
+        residual = start.value + offset - fallen - levels
         weight = np.minimum(1.0, 2.0 * _ROUGH / np.maximum(np.abs(residual), _ROUGH))
-        speed = gravity * since
-        pull = weight * speed
-        both, one, other = float(pull @ speed), float(pull.sum()), float(weight.sum()) + prior
-        left, right = float(pull @ residual), float(weight @ residual) + prior * offset
-        determinant = both * other - one * one
-        release -= (left * other - right * one) / determinant
-        offset -= (right * both - left * one) / determinant
-    return release, start.value + offset
+        by_kappa = -leg_slopes(since, still, gravity, kappa)[3] if air.u else still
+        slopes = np.stack([speed, np.ones_like(since), by_kappa])
+        right = slopes @ (weight * residual) + prior * [0.0, offset, kappa if air.u else 0.0]
+        step = np.linalg.solve((slopes * weight) @ slopes.T + np.diag(prior), right)
+        release, offset, kappa = release - step[0], offset - step[1], kappa - step[2]
+    return float(release), start.value + float(offset), float(kappa)
 
 
 def _alpha(
@@ -161,8 +187,8 @@ def _alpha(
 ) -> Guess:
     """Try one α after another."""
     places = np.array(side.chain.chain.heights)
-    time, height, speed = _paths(free.release, free.start, gravity, ratios, places)
-    scores = _scores(side, time, height, speed, gravity, slack)
+    time, height, speed = _paths(free, gravity, ratios, places)
+    scores = _scores(side, time, height, speed, gravity, slack, free.kappa)
     # The middle of a plateau, not its left end.
     plateau = np.flatnonzero(scores == scores.max())
     best = int(plateau[plateau.size // 2])
@@ -170,7 +196,7 @@ def _alpha(
     end = time[-1, best]
     leg = np.clip((time <= end).sum(axis=0) - 1, 0, None)
     since = end - time[leg, range(ALPHAS.size)]
-    at = height[leg] - (speed[leg, range(ALPHAS.size)] + 0.5 * gravity * since) * since
+    at = height[leg] - fall_for(since, speed[leg, range(ALPHAS.size)], gravity, free.kappa)[0]
     different = np.abs(at - at[best]) > pitch / 2
     return replace(
         free,
@@ -180,29 +206,33 @@ def _alpha(
     )
 
 
-def _paths(
-    release: float, start: float, gravity: float, ratios: Array, places: Array
-) -> tuple[Array, Array, Array]:
+def _paths(free: Guess, gravity: float, ratios: Array, places: Array) -> tuple[Array, Array, Array]:
     """Times and speeds at the beginning of each leg for every α, shape ``(legs, alphas)``."""
     legs = places.size + 1
     time, speed = np.empty((legs, ALPHAS.size)), np.zeros((legs, ALPHAS.size))
-    height = np.concatenate([[start], -places])
-    time[0] = release
+    height = np.concatenate([[free.start], -places])
+    time[0] = free.release
     for k, ratio in enumerate(ratios):
         distance = height[k] - height[k + 1]
-        arrival = np.sqrt(speed[k] ** 2 + 2.0 * gravity * distance)
-        time[k + 1] = time[k] + 2.0 * distance / (speed[k] + arrival)
+        arrival, lasted = fall_through(distance, speed[k], gravity, free.kappa)
+        time[k + 1] = time[k] + lasted
         speed[k + 1] = arrival * (1.0 + ALPHAS * ratio)
     return time, height, speed
 
 
 def _scores(
-    side: Side, time: Array, height: Array, speed: Array, gravity: float, slack: float
+    side: Side,
+    time: Array,
+    height: Array,
+    speed: Array,
+    gravity: float,
+    slack: float,
+    kappa: float,
 ) -> Index:
     """Count for every α the expected edges that have an observed one where the chain would be."""
     levels = np.concatenate([train.levels for train in side.trains])
-    soonest = _passages(levels + slack, time, height, speed, gravity)
-    latest = _passages(levels - slack, time, height, speed, gravity)
+    soonest = _passages(levels + slack, time, height, speed, gravity, kappa)
+    latest = _passages(levels - slack, time, height, speed, gravity, kappa)
     times, _, expected = _pairs(side, -np.inf)
     # The larger α, the sooner: most pairs are beyond what any of them reaches.
     near = np.flatnonzero((soonest[expected, -1] < times) & (times < latest[expected, 0]))
@@ -216,14 +246,12 @@ def _scores(
     return scores
 
 
-def _passages(levels: Array, time: Array, height: Array, speed: Array, gravity: float) -> Array:
+def _passages(
+    levels: Array, time: Array, height: Array, speed: Array, gravity: float, kappa: float
+) -> Array:
     """When each path comes down to each level, shape ``(levels, paths)``; −∞ above the start."""
     leg = np.maximum(np.searchsorted(-height, -levels, side="right") - 1, 0)
     distance = np.maximum(height[leg] - levels, 0.0)[:, None]
-    begin = speed[leg]
-    arrival = np.sqrt(begin * begin + 2.0 * gravity * distance)
-    arrival += begin
-    passed = 2.0 * distance / np.maximum(arrival, np.finfo(float).tiny)
-    passed += time[leg]
+    passed = time[leg] + fall_through(distance, speed[leg], gravity, kappa)[1]
     passed[levels > height[0]] = -np.inf
     return passed

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
-_RIG = ("clock", "gravity", "drop", "side", "beams", "ripple")
+_RIG = ("clock", "gravity", "drop", "side", "drag", "beams", "ripple")
 _CHAIN = ("rods", "width")
 
 

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rig.analysis.pattern import guess
+from rig.analysis.pattern import NO_AIR, Air, guess
 from rig.analysis.trains import Edges, Side, train
+from rig.analysis.unknowns import DRAG_U
 from rig.model.fall import kicks
 from rig.model.rods import rod_impacts
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
     Array = NDArray[np.float64]
+
+_FELT = 2e-3  # 1/m: less than a millimetre in a first guess
 
 
 def sides_of(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[Side]:
@@ -54,8 +57,20 @@ def trains_of(
 
 def guesses_of(protocol: Protocol, sides: Sequence[Side]) -> dict[str, Guess]:
     """Guess each side's fall."""
-    gravity = protocol.gravity.value
-    return {side.role: guess(side, protocol.drop, gravity) for side in sides}
+    gravity, start = protocol.gravity.value, protocol.drop
+    # The free chain tells what the air does to both.
+    air = Air(0.0, DRAG_U) if air_is_told(sides) else NO_AIR
+    found: dict[str, Guess] = {}
+    for side in reversed(sides):
+        found[side.role] = guess(side, start, gravity, air)
+        kappa = found[side.role].kappa
+        air = Air(kappa) if abs(kappa) > _FELT else NO_AIR
+    return {side.role: found[side.role] for side in sides}
+
+
+def air_is_told(sides: Sequence[Side]) -> bool:
+    """Whether κ can be told from what is struck: by a free chain, of rods that are all alike."""
+    return len(sides) > 1 and all(len(set(side.chain.chain.masses)) == 1 for side in sides)
 
 
 def _ratios(protocol: Protocol, chain: Chain) -> Array:

@@ -24,6 +24,7 @@ COMMON = frozenset(
     {
         "clock",
         "gravity",
+        "air",
         "drop height",
         "beam heights",
         "beam offsets",

@@ -1,27 +1,29 @@
 """A chain's way down as a function of everything that is unknown about it, with derivatives.
 
-The path is ballistic between impacts (section III.D): the same legs as in `rig.model.fall`, but
-with release time, start, gravity, the relative gain at each impact and the place of each rod all
-free, and with the derivative by each of them on request.
+Between impacts the path is ballistic (section III.D), or that of g − κv² in air: the same legs as
+in `rig.model.fall` and `rig.model.drag`, but with release time, start, gravity, κ, the relative
+gain at each impact and the place of each rod all free, and with the derivative by each of them on
+request.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.legs import fall_for, fall_through, leg_slopes, one_leg, reach
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-RELEASE, START, GRAVITY = 0, 1, 2
-"""Columns of every trajectory's derivatives: release time, start height, acceleration."""
-COMMON = 3
+RELEASE, START, GRAVITY, DRAG = 0, 1, 2, 3
+"""Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
+COMMON = 4
 
 
 class Hits(NamedTuple):
@@ -66,6 +68,8 @@ class Trajectory:
         m/s².
     hits
         `None` where nothing is struck.
+    kappa
+        κ of the air, 1/m; what an adjustment tries may be negative.
     """
 
     time: Array
@@ -73,6 +77,7 @@ class Trajectory:
     speed: Array
     gravity: float
     hits: Hits | None = None
+    kappa: float = 0.0
 
     @property
     def arrival(self) -> float:
@@ -102,9 +107,8 @@ class Trajectory:
     def heights(self, times: Array) -> tuple[Array, Array]:
         """Height of the reference point and its speed (downward positive), shape of `times`."""
         leg, since = self._legs(times)
-        speed = self.speed[leg]
-        fallen = (speed + 0.5 * self.gravity * since) * since
-        return self.height[leg] - fallen, speed + self.gravity * since
+        fallen, speed = fall_for(since, self.speed[leg], self.gravity, self.kappa)
+        return self.height[leg] - fallen, speed
 
     def derivatives(self, times: Array, by: Array | None = None) -> Array:
         """Derivatives of the height at fixed times.
@@ -121,21 +125,22 @@ class Trajectory:
         """
         leg, since = self._legs(times)
         slopes = self._slopes
-        gravity = np.zeros(slopes.time.shape[1])
-        gravity[GRAVITY] = 1.0
+        speed, by_speed, *pull = leg_slopes(since, self.speed[leg], self.gravity, self.kappa)
+        pulls = np.zeros((2, slopes.time.shape[1]))  # by gravity and by κ
+        pulls[0, GRAVITY] = pulls[1, DRAG] = 1.0
         begin = [slopes.time, slopes.height, slopes.speed]
         if by is not None:
-            begin, gravity = [one @ by for one in begin], by[GRAVITY]
+            begin, pulls = [one @ by for one in begin], by[[GRAVITY, DRAG]]
         # In place: these are the largest arrays of an adjustment.
         found = begin[0].take(leg, axis=0)
-        found *= (self.speed[leg] + self.gravity * since)[:, None]
+        found *= speed[:, None]
         part = begin[1].take(leg, axis=0)
         found += part
         begin[2].take(leg, axis=0, out=part, mode="clip")
-        part *= since[:, None]
+        part *= by_speed[:, None]
         found -= part
-        pulled = np.flatnonzero(gravity)
-        found[:, pulled] -= (0.5 * since * since)[:, None] * gravity[pulled]
+        pulled = np.flatnonzero(pulls.any(axis=0))
+        found[:, pulled] -= np.stack(pull, axis=1) @ pulls[:, pulled]
         return found
 
     def times(self, heights: Array) -> Array:
@@ -143,9 +148,8 @@ class Trajectory:
         leg = np.searchsorted(-self.height, -heights, side="right") - 1
         leg = np.maximum(leg, 0)
         distance = np.maximum(self.height[leg] - heights, 0.0)
-        arrival = np.sqrt(self.speed[leg] ** 2 + 2.0 * self.gravity * distance)
-        sum_of_speeds = np.maximum(self.speed[leg] + arrival, np.finfo(float).tiny)
-        found: Array = self.time[leg] + 2.0 * distance / sum_of_speeds
+        _, lasted = fall_through(distance, self.speed[leg], self.gravity, self.kappa)
+        found: Array = self.time[leg] + lasted
         return found
 
     def _legs(self, times: Array) -> tuple[NDArray[np.intp], Array]:
@@ -159,16 +163,22 @@ class Trajectory:
             time, height, speed = (np.zeros((1, COMMON)) for _ in range(3))
             time[0, RELEASE] = height[0, START] = 1.0
             return Slopes(time, height, speed, np.zeros(COMMON))
-        return _struck_slopes(self.speed, self.gravity, self.hits)
+        return _struck_slopes(self)
 
 
-def free_trajectory(release: float, start: float, gravity: float) -> Trajectory:
-    """Free fall from rest."""
-    return Trajectory(np.array([release]), np.array([start]), np.zeros(1), gravity)
+def free_trajectory(release: float, start: float, gravity: float, kappa: float = 0.0) -> Trajectory:
+    """Fall from rest of a chain that strikes nothing."""
+    return Trajectory(np.array([release]), np.array([start]), np.zeros(1), gravity, kappa=kappa)
 
 
 def struck_trajectory(
-    release: float, start: float, gravity: float, gains: Array, ratios: Array, places: Array
+    release: float,
+    start: float,
+    gravity: float,
+    gains: Array,
+    ratios: Array,
+    places: Array,
+    kappa: float = 0.0,
 ) -> Trajectory:
     """Fall of a chain whose rods strike the surface one after another.
 
@@ -180,6 +190,8 @@ def struck_trajectory(
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, 0 for the top rod; shape ``(rods,)``.
     places
         Height of each rod's middle above the reference point, shape ``(rods,)``.
+    kappa
+        κ of the air, 1/m: one for all legs, as it is where all rods are alike.
 
     Returns
     -------
@@ -195,50 +207,57 @@ def struck_trajectory(
     now, speed = release, 0.0
     time, speeds, arrivals = [now], [speed], []
     for fallen, more in zip(distance.tolist(), gain.tolist(), strict=True):
-        arrival = math.sqrt(speed * speed + 2.0 * gravity * max(fallen, 0.0))
-        now += 2.0 * fallen / (speed + arrival)
+        arrival, lasted = one_leg(fallen, speed, gravity, kappa)
+        now += lasted
         speed = arrival * (1.0 + more)
         time.append(now)
         speeds.append(speed)
         arrivals.append(arrival)
     hits = Hits(distance, np.array(arrivals), gain, ratios)
-    return Trajectory(np.array(time), height, np.array(speeds), gravity, hits)
+    return Trajectory(np.array(time), height, np.array(speeds), gravity, hits, kappa)
 
 
-def _struck_slopes(speed: Array, gravity: float, hits: Hits) -> Slopes:
+def _struck_slopes(path: Trajectory) -> Slopes:
     """Derivatives of a struck chain's legs.
 
-    With squared speeds E_k before and f_k²·E_k after each impact, E_k = f²_{k−1}·E_{k−1} + 2g·d_k
-    is linear: E_k = Σ_j P_kj·2g·d_j, where P_kj is the product of f² from j to k − 1.
+    With squared speeds E_k before and f_k²·E_k after each impact, and q_k = e^(−2κd_k),
+    E_k = q_k·f²_{k−1}·E_{k−1} + g·(1 − q_k)/κ: its derivatives are sums of those of single legs,
+    each times the product of q f² from there on.
     """
+    hits, gravity, kappa, speed = path.hits, path.gravity, path.kappa, path.speed
+    assert hits is not None
     rods = hits.distance.size
     size = COMMON + 2 * rods
     row = np.arange(rods)
-    places = slice(COMMON + rods, size)
-    gain, factor = COMMON + row, 1.0 + hits.gain
-    arrival, squares = hits.arrival, factor * factor
+    places, gain = COMMON + rods + row, COMMON + row
+    factor, arrival = 1.0 + hits.gain, hits.arrival
+    left = np.exp(-2.0 * kappa * hits.distance)
     steps = np.ones((rods, rods))
-    steps[1:] = np.where(row[1:, None] > row, squares[:-1, None], 1.0)
+    kept = left[1:] * factor[:-1] ** 2
+    steps[1:] = np.where(row[1:, None] > row, kept[:, None], 1.0)
     product = np.tril(np.cumprod(steps, axis=0))
-    after = np.zeros((rods, rods))
-    after[:, :-1] = product[:, 1:]
-    # Of E: f² − 1 as a product, for it is small where α is.
-    energy = np.zeros((rods, size))
-    energy[:, START] = 2.0 * gravity * product[:, 0]
-    energy[:, GRAVITY] = product @ (2.0 * hits.distance)
-    energy[:, COMMON : COMMON + rods] = after * (2.0 * factor * arrival**2 * hits.ratio)
-    energy[:, places] = after * (2.0 * gravity * hits.gain * (factor + 1.0))
-    energy[row, places.start + row] = 2.0 * gravity
-    d_arrival = energy / (2.0 * arrival)[:, None]
+    steeper = 2.0 * (gravity - kappa * arrival**2)  # of E, by the way
+    alone = np.zeros((rods, size))
+    alone[0, START] = steeper[0]
+    alone[:, GRAVITY], by_kappa = reach(hits.distance, kappa)
+    alone[:, DRAG] = gravity * by_kappa - 2.0 * hits.distance * left * speed[:-1] ** 2
+    alone[row, places] = steeper
+    alone[row[1:], places[:-1]] = -steeper[1:]
+    alone[row[1:], gain[:-1]] = left[1:] * (2.0 * factor * arrival**2 * hits.ratio)[:-1]
+    d_arrival = (product @ alone) / (2.0 * arrival)[:, None]
     d_speed = np.zeros((rods + 1, size))
     d_speed[1:] = factor[:, None] * d_arrival
     d_speed[1 + row, gain] += arrival * hits.ratio
     d_height = np.zeros((rods + 1, size))
     d_height[0, START] = 1.0
-    d_height[1 + row, places.start + row] = -1.0
-    both = speed[:-1] + arrival
+    d_height[1 + row, places] = -1.0
+    # A leg lasts until its way is done.
+    lasted = np.diff(path.time)
+    _, by_speed, by_gravity, by_kappa = leg_slopes(lasted, speed[:-1], gravity, kappa)
     legs = np.zeros((rods + 1, size))
     legs[0, RELEASE] = 1.0
-    legs[1:] = (2.0 / both)[:, None] * (d_height[:-1] - d_height[1:])
-    legs[1:] -= (2.0 * hits.distance / both**2)[:, None] * (d_speed[:-1] + d_arrival)
+    legs[1:] = d_height[:-1] - d_height[1:] - by_speed[:, None] * d_speed[:-1]
+    legs[1:, GRAVITY] -= by_gravity
+    legs[1:, DRAG] -= by_kappa
+    legs[1:] /= arrival[:, None]
     return Slopes(np.cumsum(legs, axis=0), d_height, d_speed, d_arrival[-1])

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 SIDE_U = 0.5e-3
 """How much lower one side may hang than the other in every run, m."""
+DRAG_U = 0.05
+"""What the air may take: κv² of the acceleration, 1/m; a tenth of g at 4.5 m/s."""
 ANYTHING = 1.0
 """Prior of release times (s) and α: nothing is known."""
 ANY_GRAVITY = 5.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.faults import find_faults
@@ -26,6 +27,8 @@ RESTLESS = 2.0
 LATE = 0.2
 """Share of stamps so close behind another that they may be late which a drop may have without
 remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
+
+_SURE = 4.0  # standard uncertainties
 
 GLITCHES = 0.02
 """Pulses too short to be timed, relative to the edges, that a drop may have without remark."""
@@ -61,6 +64,7 @@ def judge(
             void += faults.doubts  # which may be why
         doubts += faults.doubts
         doubts += _doubts(protocol, drop, found, fit.estimate)
+        doubts += _pushed(fit)
     if void:
         return Judgement("void", tuple(void))
     return Judgement("marginal" if doubts else "accepted", tuple(doubts))
@@ -123,3 +127,19 @@ def _doubts(
     if device is not None and device.glitches > GLITCHES * edges:
         doubts.append(f"{device.glitches} pulses were too short to be timed")
     return doubts
+
+
+def _pushed(fit: Fit) -> list[str]:
+    """Air only holds back: where it seems to push, something is not as it is said to be."""
+    model, estimate = fit.model, fit.estimate
+    if "drag" not in model.unknowns:
+        return []
+    at = model.unknowns["drag"].start
+    kappa = float(estimate.x[at])
+    u = math.sqrt(estimate.covariance[at, at]) * float(estimate.sd[at])
+    if kappa > -_SURE * u:
+        return []
+    return [
+        f"these are edges of a fall that the air speeds up (κ = {kappa:.2g} ± {2 * u:.1g} per m): "
+        "the clock, the gates' heights or gravity are not as stated"
+    ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.fit import Fit
+from rig.analysis.legs import squared_after
 from rig.analysis.student import coverage_factor
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
@@ -75,8 +76,7 @@ def _squares(model: DropModel, x: Array, heights: Array) -> Array:
     path = model.trajectory("impact", x)
     level = heights - _places(model, x, "impact")[-1]
     leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
-    found: Array = path.speed[leg] ** 2 + 2.0 * path.gravity * (path.height[leg] - level)
-    return found
+    return squared_after(path.height[leg] - level, path.speed[leg], path.gravity, path.kappa)
 
 
 def _separations(model: DropModel, x: Array, times: Array) -> Array:

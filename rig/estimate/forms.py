@@ -17,8 +17,7 @@ import numpy as np
 
 from rig.analysis.fit import Fit
 from rig.analysis.normal import HUBER, STRAY
-from rig.analysis.trajectory import COMMON
-from rig.estimate.air import slowed
+from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -136,6 +135,8 @@ def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array,
     size = len(at) + len(EXTRA)
     point = np.concatenate([x, np.zeros(len(EXTRA))])
     point[at["impulses"]], point[at["alpha"]] = alphas, 0.0
+    if "drag" in at:  # κ stands behind the rods here, free of what is known of it beforehand
+        point[-1], point[at["drag"]] = x[at["drag"]][0], 0.0
     matrix, vector, constant, edges = np.zeros((size, size)), np.zeros(size), 0.0, 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
@@ -144,6 +145,8 @@ def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array,
         extra = _extra(model, role, model.trajectory(role, x), times)
         place = np.append(rows.columns, np.arange(len(at), size))
         slopes = np.column_stack([rows.slopes, *extra])
+        if "drag" in at:
+            slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
         sigma = rows.residuals.sigma * inflation
         far = np.maximum(np.abs(rows.residuals.values / sigma), np.finfo(float).tiny)
         weight = np.where(far > STRAY, 0.0, np.minimum(1.0, HUBER / far)) / sigma**2
@@ -158,13 +161,12 @@ def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array,
 
 def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple[Array, Array]:
     """Derivatives of the height by that of the contact point and by κ, shape ``(times,)`` each."""
-    air = slowed(path, times)
+    slopes = path.derivatives(times)
     if role == "free":
-        return np.zeros(times.size), air
+        return np.zeros(times.size), slopes[:, DRAG]
     # A contact point higher up is met as if every rod hung that much lower.
     rods = len(model.sides["impact"].chain.widths)
-    places = path.derivatives(times)[:, COMMON + rods :]
-    return -places.sum(axis=1), air
+    return -slopes[:, COMMON + rods :].sum(axis=1), slopes[:, DRAG]
 
 
 def merged(forms: Sequence[Form]) -> list[Form]:

@@ -1,4 +1,4 @@
-"""What can be predicted but not measured: the rig drops chains from rest and leaves the air out."""
+"""What can be predicted but not measured: the rig drops chains from rest, in air as it is."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def unmeasurable(protocol: Protocol) -> list[str]:
     if protocol.initial_speed != AT_REST:
         found.append("initial_speed: the rig lets its chains go from rest")
     if protocol.drag is not None:
-        found.append("drag: edges are read as those of falls without air")
+        found.append("drag: what the air takes is found from the edges")
     return found
 
 

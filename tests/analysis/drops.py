@@ -11,8 +11,9 @@ from rig.analysis.align import align
 from rig.analysis.components import STATED, Components
 from rig.analysis.drop import TimeScale, analyze_drop
 from rig.analysis.drop_model import DropModel
-from rig.analysis.pattern import Guess, guess
+from rig.analysis.pattern import Guess
 from rig.analysis.result import DropResult
+from rig.analysis.sides import guesses_of
 from rig.analysis.trains import Edges, Side, train
 from rig.link.messages import pack_label
 from rig.model.chain import Chain
@@ -74,8 +75,7 @@ class Case:
         return [self.side(role) for role, name in names.items() if name is not None]
 
     def guesses(self) -> dict[str, Guess]:
-        gravity = self.protocol.gravity.value
-        return {side.role: guess(side, self.protocol.drop, gravity) for side in self.sides}
+        return guesses_of(self.protocol, self.sides)
 
     def model(self) -> tuple[DropModel, dict]:
         """The observation equations of this drop, and the matches that the first guess gives."""

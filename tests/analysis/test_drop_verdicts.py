@@ -282,7 +282,7 @@ def test_what_is_known_exactly_stays_as_it_is(scene):
     one = case(exact, Dials.quiet(), clock_u=0.0)
     result = one.analyze()
     assert result.verdict == "accepted"
-    ours = {"edges", "hanging height", "single impulses", "beam offsets"}
+    ours = {"edges", "hanging height", "single impulses", "beam offsets", "air"}
     if scene == "fence":
         ours.add("gravity")  # what is measured, so it is never known
     for name, measured in result.quantities.items():

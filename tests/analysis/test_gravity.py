@@ -41,7 +41,8 @@ def test_its_interval_holds_the_truth(scene):
     errors = np.array([one.value - protocol.gravity.value for one in found])
     widths = np.array([one.expanded for one in found])
     assert (np.abs(errors) <= widths).sum() >= 24
-    assert errors.std() > 0.15 * widths.mean(), "and it is not far too wide"
+    # What is stated of rods, beams and gates is up to twice the dials, and κ is free beside g.
+    assert errors.std() > 0.1 * widths.mean(), "and it is not far too wide"
 
 
 @pytest.mark.parametrize("wrong", [-3000e-6, 3000e-6])

@@ -195,6 +195,20 @@ def test_the_least_sure_calibration_counts_for_all():
             assert measured.u == pytest.approx(other.quantities[name].u, rel=0.02)
 
 
+@pytest.mark.parametrize("drag", [0.0, 0.03])
+def test_a_session_teaches_what_the_air_takes(drag):
+    drops = cases(EIGHT, replace(MILD, drag=drag), 4)
+    found = analysis(drops)
+    at = found.lesson.shared.blocks["drag"].start
+    u = math.sqrt(found.lesson.covariance[at, at]) * found.lesson.sd[at]
+    assert abs(found.lesson.x[at] - drag) < 4 * u < 1e-4
+    for one, result in zip(drops, found.runs, strict=True):
+        assert result.learned
+        assert not wrong_rods(result, one.truth)
+        for name, measured in result.quantities.items():
+            assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u
+
+
 def test_few_drops_teach_nothing():
     drops = cases(FOUR)
     few = analysis(drops[: FEWEST - 1])

@@ -10,7 +10,8 @@ from mpmath import mp, mpf
 
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.model.chain import Chain
-from rig.model.fall import hits, kicks
+from rig.model.drag import drag_hits
+from rig.model.fall import kicks
 
 MASSES = (3.0, 1.0, 2.0, 0.4, 1.5)
 PLACES = (0.0004, 0.0493, 0.0967, 0.1461, 0.1939)  # above the reference point; rod 0 is off it
@@ -18,43 +19,71 @@ GAINS = (0.15, -0.05, 0.3, 0.0, 0.2)
 GAMMA = 4 / 3
 RODS = len(MASSES)
 RATIOS = tuple(kicks(Chain(MASSES, PLACES), [1.0] * RODS, GAMMA))
-# Release, start, gravity, gains, places: the order of a struck trajectory's parameters.
-PARAMETERS = (0.0213, 0.18, 9.81, *GAINS, *PLACES)
+# Release, start, gravity, κ, gains, places: the order of a struck trajectory's parameters.
+PARAMETERS = (0.0213, 0.18, 9.81, 0.0, *GAINS, *PLACES)
 STEP = mpf(10) ** -20
+# None, some, what an adjustment may try, very much, and so little that formulas could cancel.
+KAPPAS = (0.0, 0.03, -0.02, 1.5, 2e-5)
+
+
+def in_air(kappa: float) -> tuple[float, ...]:
+    return (*PARAMETERS[:3], kappa, *PARAMETERS[4:])
 
 
 def struck(parameters=PARAMETERS) -> Trajectory:
-    release, start, gravity, *rest = parameters
+    release, start, gravity, kappa, *rest = parameters
     gains, places = np.array(rest[:RODS]), np.array(rest[RODS:])
-    return struck_trajectory(release, start, gravity, gains, np.array(RATIOS), places)
+    return struck_trajectory(release, start, gravity, gains, np.array(RATIOS), places, kappa)
 
 
 class Exact:
-    """The same fall from the equations of uniform acceleration, in 60 digits."""
+    """The same fall from the equations of v' = g − κv², in 60 digits.
+
+    Its time is that from rest to one speed less that to another, so no formula is the program's.
+    """
 
     def __init__(self, parameters) -> None:
-        release, start, self.g, *rest = map(mpf, parameters)
+        release, start, self.g, self.kappa, *rest = map(mpf, parameters)
         gains, places = rest[:RODS], rest[RODS:]
         self.time, self.height, self.speed = [release], [start], [mpf(0)]
         for gain, ratio, place in zip(gains, RATIOS, places, strict=True):
             fallen = self.height[-1] + place
-            self.arrival = mp.sqrt(self.speed[-1] ** 2 + 2 * self.g * fallen)
-            self.time.append(self.time[-1] + (self.arrival - self.speed[-1]) / self.g)
+            square, kappa = self.speed[-1] ** 2, self.kappa
+            if kappa:
+                terminal = self.g / kappa
+                self.arrival = mp.sqrt(terminal + (square - terminal) * mp.exp(-2 * kappa * fallen))
+            else:
+                self.arrival = mp.sqrt(square + 2 * self.g * fallen)
+            self.time.append(
+                self.time[-1] + self._since(self.arrival) - self._since(self.speed[-1])
+            )
             self.height.append(-place)
             self.speed.append(self.arrival + gain * ratio * self.arrival)
+
+    def _since(self, speed) -> mpf:
+        """How long it takes from rest to a speed."""
+        if not self.kappa:
+            return speed / self.g
+        rate = mp.sqrt(self.kappa * self.g)
+        return mp.re(mp.atanh(speed * rate / self.g) / rate)
 
     def at(self, when) -> mpf:
         leg = max([k for k, begin in enumerate(self.time) if begin <= when], default=0)
         since = max(when - self.time[leg], mpf(0))
-        return self.height[leg] - self.speed[leg] * since - self.g * since**2 / 2
+        speed = self.speed[leg]
+        if not self.kappa:
+            return self.height[leg] - speed * since - self.g * since**2 / 2
+        x = mp.sqrt(self.kappa * self.g) * since
+        grown = mp.cosh(x) + speed * mp.sqrt(self.kappa / self.g) * mp.sinh(x)
+        return self.height[leg] - mp.re(mp.log(grown) / self.kappa)
 
 
-def derivatives(what) -> np.ndarray:
+def derivatives(what, parameters) -> np.ndarray:
     """Central differences of ``what(Exact)``, one column a parameter."""
     columns = []
     with mp.workdps(60):
-        for n in range(len(PARAMETERS)):
-            up, down = list(map(mpf, PARAMETERS)), list(map(mpf, PARAMETERS))
+        for n in range(len(parameters)):
+            up, down = list(map(mpf, parameters)), list(map(mpf, parameters))
             up[n] += STEP
             down[n] -= STEP
             high, low = what(Exact(up)), what(Exact(down))
@@ -66,32 +95,43 @@ def close(found, expected) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
 
 
-def test_values_are_those_of_60_digits():
+@pytest.mark.parametrize("kappa", KAPPAS)
+def test_values_are_those_of_60_digits(kappa):
     with mp.workdps(60):
-        exact = Exact(PARAMETERS)
-    path = struck()
+        exact = Exact(in_air(kappa))
+    path = struck(in_air(kappa))
     close(path.time, [float(t) for t in exact.time])
     close(path.height, [float(z) for z in exact.height])
     close(path.speed, [float(v) for v in exact.speed])
     assert path.arrival == pytest.approx(float(exact.arrival), rel=1e-14)
 
 
-def test_values_are_those_of_the_model_room():
+@pytest.mark.parametrize("kappa", [0.0, 0.03, 1.5])
+def test_values_are_those_of_the_model_room(kappa):
     chain = Chain(MASSES, tuple(place - PLACES[0] for place in PLACES))
     gains = kicks(chain, GAINS, GAMMA)
-    expected = hits(chain, gains, 0.18 + PLACES[0], 9.81)
-    path = struck()
+    expected = drag_hits(chain, gains, [kappa] * RODS, 0.18 + PLACES[0], 9.81)
+    path = struck(in_air(kappa))
     close(path.time[1:] - path.time[0], [hit.time_s for hit in expected])
     close(path.speed[1:], [hit.speed_after for hit in expected])
     assert path.arrival == pytest.approx(expected[-1].speed_before, rel=1e-14)
 
 
-def test_derivatives_of_times_heights_speeds_and_arrival():
-    path = struck()
-    close(path.d_time, derivatives(lambda exact: exact.time))
-    close(path.d_height, derivatives(lambda exact: exact.height))
-    close(path.d_speed, derivatives(lambda exact: exact.speed))
-    close(path.d_arrival, derivatives(lambda exact: [exact.arrival])[0])
+@pytest.mark.parametrize("kappa", KAPPAS)
+def test_derivatives_of_times_heights_speeds_and_arrival(kappa):
+    there = in_air(kappa)
+    path = struck(there)
+    near(path.d_time, derivatives(lambda exact: exact.time, there), kappa)
+    near(path.d_height, derivatives(lambda exact: exact.height, there), kappa)
+    near(path.d_speed, derivatives(lambda exact: exact.speed, there), kappa)
+    near(path.d_arrival, derivatives(lambda exact: [exact.arrival], there)[0], kappa)
+
+
+def near(found, expected, kappa) -> None:
+    """The derivative by κ is a difference over κ: of 1e-16 m or s, which its rounding is."""
+    np.testing.assert_allclose(
+        found, expected, rtol=1e-12, atol=1e-13 + (3e-16 / abs(kappa) if kappa else 0.0)
+    )
 
 
 def moments(path: Trajectory) -> np.ndarray:
@@ -101,13 +141,16 @@ def moments(path: Trajectory) -> np.ndarray:
     return np.concatenate([[path.time[0] - 0.01], inside.ravel()])
 
 
-def test_derivatives_of_heights_at_fixed_times():
-    path = struck()
+@pytest.mark.parametrize("kappa", KAPPAS)
+def test_derivatives_of_heights_at_fixed_times(kappa):
+    there = in_air(kappa)
+    path = struck(there)
     times = moments(path)
-    close(path.derivatives(times), derivatives(lambda e: [e.at(mpf(t)) for t in times]))
+    expected = derivatives(lambda e: [e.at(mpf(t)) for t in times], there)
+    near(path.derivatives(times), expected, kappa)
     heights, speeds = path.heights(times)
     with mp.workdps(60):
-        exact = Exact(PARAMETERS)
+        exact = Exact(there)
         close(heights, [float(exact.at(mpf(t))) for t in times])
         slopes = [-(exact.at(mpf(t) + STEP) - exact.at(mpf(t) - STEP)) / (2 * STEP) for t in times]
     close(speeds, [float(slope) for slope in slopes])
@@ -121,32 +164,38 @@ def test_free_fall_has_the_closed_form():
     heights, speeds = path.heights(times)
     close(heights, start - gravity * since**2 / 2)
     close(speeds, gravity * since)
-    close(path.derivatives(times), np.stack([gravity * since, since**0, -(since**2) / 2], axis=1))
-    close(path.d_time, [[1, 0, 0]])
-    close(path.d_height, [[0, 1, 0]])
+    expected = [gravity * since, since**0, -(since**2) / 2, gravity**2 * since**4 / 12]
+    close(path.derivatives(times), np.stack(expected, axis=1))
+    close(path.d_time, [[1, 0, 0, 0]])
+    close(path.d_height, [[0, 1, 0, 0]])
     assert not path.d_speed.any()
     assert path.arrival == 0.0
     assert not path.d_arrival.any()
 
 
-def test_without_gains_a_struck_chain_falls_freely():
-    struck_path = struck((*PARAMETERS[:3], *[0.0] * RODS, *PLACES))
-    free = free_trajectory(*PARAMETERS[:3])
+@pytest.mark.parametrize("kappa", [0.0, 0.03])
+def test_without_gains_a_struck_chain_falls_freely(kappa):
+    struck_path = struck((*PARAMETERS[:3], kappa, *[0.0] * RODS, *PLACES))
+    free = free_trajectory(*PARAMETERS[:3], kappa)
     times = moments(struck_path)
     close(struck_path.heights(times), free.heights(times))
     found = struck_path.derivatives(times)
-    close(found[:, :3], free.derivatives(times))
+    near(found[:, :4], free.derivatives(times), kappa)
     # Where a rod strikes does not matter to a chain that is not pulled.
-    close(found[:, 3 + RODS :], np.zeros((times.size, RODS)))
+    close(found[:, 4 + RODS :], np.zeros((times.size, RODS)))
 
 
+kappas = st.one_of(st.just(0.0), st.floats(-0.05, 1.0))
 paths = st.one_of(
-    st.builds(free_trajectory, st.floats(-1, 1), st.floats(0.01, 2), st.floats(1, 20)),
+    st.builds(free_trajectory, st.floats(-1, 1), st.floats(0.01, 2), st.floats(1, 20), kappas),
     st.builds(
-        lambda release, start, gravity, gains: struck((release, start, gravity, *gains, *PLACES)),
+        lambda release, start, gravity, kappa, gains: struck(
+            (release, start, gravity, kappa, *gains, *PLACES)
+        ),
         st.floats(-1, 1),
         st.floats(0.01, 2),
         st.floats(1, 20),
+        kappas,
         st.tuples(*[st.floats(-0.1, 0.5)] * RODS),
     ),
 )

@@ -185,7 +185,7 @@ def test_a_coefficient_needs_masses_and_sizes():
     ("more", "why"),
     [
         ("initial_speed: 1 m/s", "initial_speed: the rig lets its chains go from rest"),
-        ("drag: {terminal_speed: 20 m/s}", "drag: edges are read as those of falls without air"),
+        ("drag: {terminal_speed: 20 m/s}", "drag: what the air takes is found from the edges"),
     ],
 )
 def test_what_cannot_be_measured_is_said_and_refused(call, tmp_path, more, why):

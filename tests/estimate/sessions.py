@@ -18,7 +18,9 @@ DIALS = Dials(skew_sd=1e-3, restitution=BETA, friction=MU)
 
 
 @cache
-def analysis(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> Analysis:
+def analysis(
+    inclines: tuple[float, ...], each: int = 2, seed: int = 1, dials: Dials = DIALS
+) -> Analysis:
     """So many drops at each of these inclines, half of them with either chain."""
     planned = runs(SCENES["uniform"])
     numbers = tuple(
@@ -26,7 +28,7 @@ def analysis(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> Analy
         for incline in inclines
         for run in [one for one in planned if one.incline_deg == incline][:each]
     )
-    return analyzed(cases(numbers, DIALS, seed))
+    return analyzed(cases(numbers, dials, seed))
 
 
 @cache

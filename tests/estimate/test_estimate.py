@@ -23,7 +23,7 @@ from sim.dials import Dials
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
 from tests.analysis.sessions import analysis as analyzed
 from tests.analysis.sessions import cases
-from tests.estimate.sessions import BETA, MU, analysis, forms
+from tests.estimate.sessions import BETA, DIALS, MU, analysis, forms
 
 SURFACE = (30.0, 50.0, 70.0)
 
@@ -93,6 +93,16 @@ def test_contact_and_air_are_found_where_they_are(found):
     """The simulated contact point is where the protocol says, and there is no air."""
     assert all(abs(one["height_m"]["value"]) < 1e-3 for one in found["contact"])
     assert abs(found["drag_per_m"]["value"]) < 4 * found["drag_per_m"]["u"]
+
+
+def test_air_is_found_and_takes_nothing_from_the_coefficients():
+    """κ of light rods: a tenth of g at 5 m/s. β and μ are those of the truth all the same."""
+    found = estimate(UNIFORM, analysis(SURFACE, 4, 2, replace(DIALS, drag=0.04)))
+    drag = found["drag_per_m"]
+    assert abs(drag["value"] - 0.04) < 4 * drag["u"] < 1e-3
+    for name, truth in (("restitution", BETA), ("friction", MU)):
+        one = parameter(found, name)["least_squares"]
+        assert abs(one["value"] - truth) < 4 * one["u"]
 
 
 def test_the_posterior_stands_between_edges_and_prior(found):

@@ -9,9 +9,8 @@ import pytest
 from scipy.stats import chi2
 
 from rig.analysis.result import GOOD
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.analysis.trajectory import DRAG, free_trajectory, struck_trajectory
 from rig.estimate.agreement import agreement
-from rig.estimate.air import slowed
 from rig.estimate.rods import _groups
 from rig.estimate.tail import chi2_tail
 from rig.model.chain import Chain
@@ -33,7 +32,7 @@ def test_a_little_air_by_the_exact_fall_of_a_free_chain():
     times = np.linspace(0.0, 0.6, 25)
     path = free_trajectory(0.1, 0.3, gravity)
     exact = [(0.5 * gravity * t * t - fallen(t, gravity, kappa)) / kappa for t in times]
-    np.testing.assert_allclose(slowed(path, times + 0.1), exact, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(path.derivatives(times + 0.1)[:, DRAG], exact, rtol=1e-4, atol=1e-9)
 
 
 def test_a_little_air_by_the_exact_fall_of_a_struck_chain():
@@ -47,7 +46,7 @@ def test_a_little_air_by_the_exact_fall_of_a_struck_chain():
     before = np.nextafter(path.time[1:], 0.0)
     later = np.array([b.time_s - a.time_s for a, b in zip(plain, air, strict=True)]) / kappa
     speed = np.array([hit.speed_before for hit in plain])
-    np.testing.assert_allclose(slowed(path, before), later * speed, rtol=1e-4)
+    np.testing.assert_allclose(path.derivatives(before)[:, DRAG], later * speed, rtol=1e-4)
 
 
 def test_rods_that_are_not_resolved_are_taken_with_their_neighbours():

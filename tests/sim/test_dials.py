@@ -18,6 +18,7 @@ LENGTHS = ("hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd")
 SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled")
 FACTORS = (
     "drop_error", "impulse_sd", "friction", "restitution", "clock", "drift", "wander", "reference",
+    "drag",
 )  # fmt: skip
 UNSET = {"restitution", "friction", "reference"}  # not-a-number, which equals nothing
 SIGNED = {"restitution", "clock", "drift", "reference"}

@@ -8,8 +8,10 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mpmath import mp
 
 from rig.model.chain import Chain
+from rig.model.drag import drag_hits
 from rig.model.fall import hits, kicks
 from sim.path import Path
 
@@ -29,8 +31,11 @@ def paths(draw) -> Path:
     gravity = draw(st.floats(0.5, 30))
     gains = kicks(chain, alphas, draw(st.floats(0, 3)))
     # No impact throws the chain back up: only then is there one time for each height.
-    events = hits(chain, [max(gain, -0.5) for gain in gains], start, gravity)
-    return Path(draw(st.floats(0, 1)), start, gravity, events, tuple(-z for z in chain.heights))
+    gains = [max(gain, -0.5) for gain in gains]
+    kappa = draw(st.one_of(st.just(0.0), st.floats(1e-4, 0.3)))
+    events = drag_hits(chain, gains, [kappa] * rods, start, gravity)
+    heights = tuple(-z for z in chain.heights)
+    return Path(draw(st.floats(0, 1)), start, gravity, events, heights, kappa)
 
 
 def end(path: Path) -> float:
@@ -66,11 +71,15 @@ def test_the_speed_steps_at_each_hit_and_only_there(path):
         if after.time_s - before.time_s < e:
             continue
         first, last = path.release_s + before.time_s, path.release_s + after.time_s
-        # Exact for constant acceleration: v(0) = Δz/e − g e/2, v(e) = Δz/e + g e/2. Here z falls.
-        leaving = (path.height_at(first) - path.height_at(first + e)) / e - g * e / 2
-        arriving = (path.height_at(last - e) - path.height_at(last)) / e + g * e / 2
-        assert leaving == pytest.approx(before.speed_after, abs=1e-8)
-        assert arriving == pytest.approx(after.speed_before, abs=1e-8)
+        # Exact for constant acceleration: v(0) = Δz/e − a e/2, v(e) = Δz/e + a e/2. Here z falls.
+        slow, fast = before.speed_after, after.speed_before
+        left, come = (g - path.kappa * v * v for v in (slow, fast))
+        leaving = (path.height_at(first) - path.height_at(first + e)) / e - left * e / 2
+        arriving = (path.height_at(last - e) - path.height_at(last)) / e + come * e / 2
+        # In air the acceleration changes by 2κva, which two thirds of e²/2 make a speed of.
+        change = path.kappa * e * e
+        assert leaving == pytest.approx(slow, abs=1e-8 + change * slow * abs(left))
+        assert arriving == pytest.approx(fast, abs=1e-8 + change * fast * abs(come))
 
 
 @given(paths(), st.lists(st.floats(-0.5, 1.5), min_size=2).map(sorted))
@@ -79,6 +88,15 @@ def test_it_never_rises_and_hangs_still_before(path, parts):
     heights = [path.height_at(path.release_s + part * span) for part in parts]
     assert all(b <= a + 1e-14 for a, b in pairwise(heights))
     assert all(z == path.start for z, part in zip(heights, parts, strict=True) if part <= 0)
+
+
+@given(st.floats(0.1, 3), st.floats(0.5, 30), st.floats(1e-3, 1.0), st.floats(1e-3, 1.5))
+def test_a_free_fall_in_air_is_the_logarithm_of_a_cosh(start, gravity, kappa, since):
+    path = Path(0.02, start, gravity, kappa=kappa)
+    with mp.workdps(40):
+        x = mp.sqrt(mp.mpf(kappa) * gravity) * ((0.02 + since) - 0.02)
+        fallen = float(mp.log(mp.cosh(x)) / kappa)
+    assert path.height_at(0.02 + since) == pytest.approx(start - fallen, abs=1e-12)
 
 
 @given(st.floats(0, 1), st.floats(0.1, 3), st.floats(0.5, 30), st.floats(0, 3))

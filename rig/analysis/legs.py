@@ -1,0 +1,133 @@
+"""One leg of a fall: uniform acceleration, or that of g − κv² in air, and its derivatives.
+
+The same formulas as in `rig.model.drag`, for arrays, and for κ below zero too: an adjustment tries
+what no air does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_NONE = 1e-15  # 1/m: what takes less than an atom's width from a metre
+_FAINT = 1e-5  # 1/m: what still is in the last digits of a difference
+_SHORT = 0.02  # of y, up to which these terms of (1 − e^(−y))/y and its derivative will do
+_SERIES = (
+    [(-1.0) ** n / math.factorial(n + 1) for n in range(6)],
+    [(-1.0) ** (n + 1) * (n + 1) / math.factorial(n + 2) for n in range(6)],
+)
+_NEVER = 1.0 - 1e-9  # tanh of a time: nothing falls longer
+
+
+def fall_for(since: Array, speed: Array, gravity: float, kappa: float) -> tuple[Array, Array]:
+    """Way fallen and speed, a time after the beginning of a leg."""
+    way, end, _ = _fall(since, speed, gravity, kappa)
+    return way, end
+
+
+def _fall(since: Array, speed: Array, gravity: float, kappa: float) -> tuple[Array, Array, Array]:
+    """Way, speed at its end, and the derivative of the way by the speed v at its beginning.
+
+    The way is ln(1 + κw)/κ with w = 2g S(t/2)² + v S(t) and S(t) = sinh(√(κg) t)/√(κg), as in
+    `rig.model.drag.fallen`; below κ = 0 with the sine.
+    """
+    if abs(kappa) < _NONE:
+        return (speed + 0.5 * gravity * since) * since, speed + gravity * since, since
+    rate = math.sqrt(abs(kappa) * gravity)
+    half = (np.sinh if kappa > 0.0 else np.sin)(0.5 * rate * since) / rate
+    square = gravity * half * half
+    whole = 2.0 * half * np.sqrt(1.0 + kappa * square)
+    # An adjustment may try what no air does: a chain that falls for ever.
+    grown = np.maximum(kappa * (2.0 * square + speed * whole), -0.9)
+    shrunk = 1.0 / (1.0 + grown)
+    end = (gravity * whole + speed * (1.0 + 2.0 * kappa * square)) * shrunk
+    return np.log1p(grown) / kappa, end, whole * shrunk
+
+
+def fall_through(
+    distance: Array, speed: Array, gravity: float, kappa: float
+) -> tuple[Array, Array]:
+    """Speed at the end of a leg and how long it takes, as in `rig.model.drag.drag_leg`."""
+    arrival = np.sqrt(squared_after(distance, speed, gravity, kappa))
+    if abs(kappa) < _NONE:
+        return arrival, 2.0 * distance / np.maximum(speed + arrival, np.finfo(float).tiny)
+    reach = -np.expm1(-2.0 * kappa * distance) / kappa
+    rate = math.sqrt(abs(kappa) * gravity)
+    sum_of_speeds = arrival + (1.0 - kappa * reach) * speed
+    slow = rate * reach / np.maximum(sum_of_speeds, np.finfo(float).tiny)
+    if kappa > 0.0:
+        return arrival, np.arctanh(np.minimum(slow, _NEVER)) / rate
+    return arrival, np.arctan(slow) / rate
+
+
+def squared_after(distance: Array, speed: Array, gravity: float, kappa: float) -> Array:
+    """Square of the speed at the end of a leg; before its beginning it may be negative."""
+    reach = 2.0 * distance
+    if abs(kappa) >= _NONE:
+        reach = -np.expm1(-kappa * reach) / kappa
+    found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
+    return found
+
+
+def leg_slopes(
+    since: Array, speed: Array, gravity: float, kappa: float
+) -> tuple[Array, Array, Array, Array]:
+    """Speed a time after the beginning of a leg, and derivatives of the way z fallen till then.
+
+    By the speed v at the beginning, by g and by κ. As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ
+    are z, the last two follow from the others: 2g ∂z/∂g = t ∂z/∂t − v ∂z/∂v, and
+    κ ∂z/∂κ = v ∂z/∂v + g ∂z/∂g − z.
+    """
+    way, end, by_speed = _fall(since, speed, gravity, kappa)
+    by_gravity = (since * end - speed * by_speed) / (2.0 * gravity)
+    if abs(kappa) < _FAINT:  # else that difference is nothing but rounding
+        return end, by_speed, by_gravity, -_slowed(since, speed, gravity)
+    by_kappa = (speed * by_speed + gravity * by_gravity - way) / kappa
+    return end, by_speed, by_gravity, by_kappa
+
+
+def _slowed(since: Array, speed: Array, gravity: float) -> Array:
+    """∫∫v² of a ballistic leg, m²."""
+    half = 0.5 * speed * speed + (speed * gravity / 3.0 + gravity**2 * since / 12.0) * since
+    found: Array = half * since * since
+    return found
+
+
+def one_leg(distance: float, speed: float, gravity: float, kappa: float) -> tuple[float, float]:
+    """`fall_through` of one leg: much quicker than an array of one."""
+    if abs(kappa) < _NONE:
+        arrival = math.sqrt(speed * speed + 2.0 * gravity * max(distance, 0.0))
+        return arrival, 2.0 * distance / (speed + arrival)
+    left = math.exp(-2.0 * kappa * distance)
+    reach = -math.expm1(-2.0 * kappa * distance) / kappa
+    arrival = math.sqrt(max(left * speed * speed + gravity * reach, 0.0))
+    rate = math.sqrt(abs(kappa) * gravity)
+    slow = rate * reach / (arrival + left * speed)
+    return arrival, (math.atanh(min(slow, _NEVER)) if kappa > 0.0 else math.atan(slow)) / rate
+
+
+def reach(distance: Array, kappa: float) -> tuple[Array, Array]:
+    """(1 − e^(−2κd))/κ and its derivative by κ, by their series where these are short."""
+    y = 2.0 * kappa * distance
+    if np.abs(y).max() < _SHORT:
+        one, two = (_polynomial(terms, y) for terms in _SERIES)
+        return 2.0 * distance * one, 4.0 * distance**2 * two
+    left = np.exp(-y)
+    return -np.expm1(-y) / kappa, (2.0 * distance * left + np.expm1(-y) / kappa) / kappa
+
+
+def _polynomial(terms: Sequence[float], y: Array) -> Array:
+    found = np.full_like(y, terms[-1])
+    for term in terms[-2::-1]:
+        found *= y
+        found += term
+    return found
