@@ -43,7 +43,9 @@ def _fall(since: Array, speed: Array, gravity: float, kappa: float) -> tuple[Arr
     if abs(kappa) < _NONE:
         return (speed + 0.5 * gravity * since) * since, speed + gravity * since, since
     rate = math.sqrt(abs(kappa) * gravity)
-    half = (np.sinh if kappa > 0.0 else np.sin)(0.5 * rate * since) / rate
+    # An edge long after the fall overflows no sinh, and meets no second period of the sine.
+    sinus, most = (np.sinh, 300.0) if kappa > 0.0 else (np.sin, 1.2)
+    half = sinus(np.minimum(0.5 * rate * since, most)) / rate
     square = gravity * half * half
     whole = 2.0 * half * np.sqrt(1.0 + kappa * square)
     # An adjustment may try what no air does: a chain that falls for ever.

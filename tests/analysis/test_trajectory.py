@@ -186,6 +186,16 @@ def test_without_gains_a_struck_chain_falls_freely(kappa):
 
 
 kappas = st.one_of(st.just(0.0), st.floats(-0.05, 1.0))
+
+
+@pytest.mark.parametrize("kappa", [0.0, 0.03, -1e-4, -0.02])
+def test_long_after_a_fall_a_chain_is_far_below(kappa):
+    times = np.array([5.0, 20.0, 60.0, 200.6, 3600.0])
+    for path in (free_trajectory(0.02, 0.2, 9.81, kappa), struck(in_air(kappa))):
+        heights, _ = path.heights(times)
+        assert (heights < -10.0).all()
+
+
 paths = st.one_of(
     st.builds(free_trajectory, st.floats(-1, 1), st.floats(0.01, 2), st.floats(1, 20), kappas),
     st.builds(
