@@ -10,6 +10,7 @@ from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
+from rig.report.air import air_lines
 from rig.report.clock import clock_lines
 from rig.report.effects import effects_parts
 from rig.report.estimate import page_parts
@@ -63,7 +64,7 @@ def main(arguments: Namespace) -> int:
                 },
                 identities=[identity for _, identity in session.identities()],
                 clock=found["clock"],
-                notes=clock_lines(found),
+                notes=[*clock_lines(found), *air_lines(found)],
                 parts=[*effects_parts(found), *(page_parts(estimated) if estimated else ())],
             ),
         )
