@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.tui.app import RigApp
 from rig.tui.book import Book
 from rig.tui.flow import Flow
+from rig.tui.gates import FLICKER_S
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import State
@@ -113,6 +114,8 @@ async def _picture(scene: Scene, session: Path, keys: Mapping[str, str]) -> str:
             end = end_of(app.findings.drops[first], app.findings.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             await app.go("history")
+        if scene.state.edges:  # all of them came at once, which looks like flicker for a while
+            await pilot.pause(FLICKER_S + PAUSE_S)
         before, now = "", app.export_screenshot(title="chainrig")
         while now != before:  # figures are drawn again when their place is known
             await pilot.pause(1.2 * PAUSE_S)
