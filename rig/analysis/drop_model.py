@@ -276,9 +276,12 @@ class DropModel:
 
     def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """What the unknowns leave over of one side's matched edges."""
-        seen, known = self._matched(role, matches), self.components
+        seen = self._matched(role, matches)
         times = seen.times * (1.0 + x[self.unknowns["clock"]])
-        height, speed = self.trajectory(role, x).heights(times)
+        return self._left(role, x, seen, *self.trajectory(role, x).heights(times))
+
+    def _left(self, role: str, x: Array, seen: Seen, height: Array, speed: Array) -> Residuals:
+        known = self.components
         sigma = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2))
         values = height - self._levels(role, x, seen)
         return Residuals(values, sigma, speed, seen.burst == 0.0)
@@ -286,12 +289,13 @@ class DropModel:
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges."""
         at, local, seen = self.unknowns, self._local[role], self._matched(role, matches)
-        left = self.residuals(role, x, matches)
         times = seen.times * (1.0 + x[at["clock"]])
+        height, speed, moved = self.trajectory(role, x).sights(times, local.path)
+        left = self._left(role, x, seen, height, speed)
         slopes = np.zeros((times.size, local.columns.size))
-        slopes[:, : local.moving] = self.trajectory(role, x).derivatives(times, local.path)
+        slopes[:, : local.moving] = moved
         row = np.arange(times.size)
-        slopes[:, local.at[at["clock"].start]] -= left.speed * seen.times
+        slopes[:, local.at[at["clock"].start]] -= speed * seen.times
         slopes[row, local.at[at[f"{role} rods"].start + seen.rods]] += 1.0
         slopes[:, local.at[at[f"{role} width"].start]] += seen.sign
         slopes[row, local.at[at["beams"].start + seen.gate]] -= 1.0

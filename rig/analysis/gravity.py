@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.legs import fall_for, leg_slopes
+from rig.analysis.legs import leg_slopes
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import DRAG_U
@@ -150,7 +150,7 @@ def free_gravity(
             chain.width_u * side,
         ]
     )
-    air = len(set(chain.chain.masses)) == 1  # else κ is not one number
+    air = chain.chain.alike  # else κ is not one number
     prior = np.concatenate(
         [[0.0, 0.0, 0.0, DRAG_U**-2 if air else _FIXED], np.ones(common.shape[1])]
     )
@@ -158,8 +158,7 @@ def free_gravity(
         at, release, g, kappa = point
         since = np.maximum(time - release, 0.0)
         still = np.zeros_like(since)
-        fallen, _ = fall_for(since, still, g, kappa)
-        end, _, by_gravity, by_kappa = leg_slopes(since, still, g, kappa)
+        fallen, end, _, by_gravity, by_kappa = leg_slopes(since, still, g, kappa)
         design = np.stack([np.ones_like(time), end, -by_gravity, -by_kappa], axis=1)
         whole = np.column_stack([design, common]) / sigma[:, None]
         inverse = np.linalg.inv(whole.T @ whole + np.diag(prior))

@@ -62,7 +62,7 @@ def fall_through(
     arrival = np.sqrt(squared_after(distance, speed, gravity, kappa))
     if abs(kappa) < _NONE:
         return arrival, 2.0 * distance / np.maximum(speed + arrival, np.finfo(float).tiny)
-    reach = -np.expm1(-2.0 * kappa * distance) / kappa
+    reach = _reach(distance, kappa)
     rate = math.sqrt(abs(kappa) * gravity)
     sum_of_speeds = arrival + (1.0 - kappa * reach) * speed
     slow = rate * reach / np.maximum(sum_of_speeds, np.finfo(float).tiny)
@@ -73,17 +73,23 @@ def fall_through(
 
 def squared_after(distance: Array, speed: Array, gravity: float, kappa: float) -> Array:
     """Square of the speed at the end of a leg; before its beginning it may be negative."""
-    reach = 2.0 * distance
-    if abs(kappa) >= _NONE:
-        reach = -np.expm1(-kappa * reach) / kappa
+    reach = _reach(distance, kappa)
     found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
+    return found
+
+
+def _reach(distance: Array, kappa: float) -> Array:
+    """(1 − e^(−2κd))/κ."""
+    if abs(kappa) < _NONE:
+        return 2.0 * distance
+    found: Array = -np.expm1(-2.0 * kappa * distance) / kappa
     return found
 
 
 def leg_slopes(
     since: Array, speed: Array, gravity: float, kappa: float
-) -> tuple[Array, Array, Array, Array]:
-    """Speed a time after the beginning of a leg, and derivatives of the way z fallen till then.
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Way z fallen and speed, a time after the beginning of a leg, and derivatives of z.
 
     By the speed v at the beginning, by g and by κ. As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ
     are z, the last two follow from the others: 2g ∂z/∂g = t ∂z/∂t − v ∂z/∂v, and
@@ -92,9 +98,9 @@ def leg_slopes(
     way, end, by_speed = _fall(since, speed, gravity, kappa)
     by_gravity = (since * end - speed * by_speed) / (2.0 * gravity)
     if abs(kappa) < _FAINT:  # else that difference is nothing but rounding
-        return end, by_speed, by_gravity, -_slowed(since, speed, gravity)
+        return way, end, by_speed, by_gravity, -_slowed(since, speed, gravity)
     by_kappa = (speed * by_speed + gravity * by_gravity - way) / kappa
-    return end, by_speed, by_gravity, by_kappa
+    return way, end, by_speed, by_gravity, by_kappa
 
 
 def _slowed(since: Array, speed: Array, gravity: float) -> Array:
@@ -117,14 +123,14 @@ def one_leg(distance: float, speed: float, gravity: float, kappa: float) -> tupl
     return arrival, (math.atanh(min(slow, _NEVER)) if kappa > 0.0 else math.atan(slow)) / rate
 
 
-def reach(distance: Array, kappa: float) -> tuple[Array, Array]:
+def reach_slopes(distance: Array, kappa: float) -> tuple[Array, Array]:
     """(1 − e^(−2κd))/κ and its derivative by κ, by their series where these are short."""
     y = 2.0 * kappa * distance
     if np.abs(y).max() < _SHORT:
         one, two = (_polynomial(terms, y) for terms in _SERIES)
         return 2.0 * distance * one, 4.0 * distance**2 * two
-    left = np.exp(-y)
-    return -np.expm1(-y) / kappa, (2.0 * distance * left + np.expm1(-y) / kappa) / kappa
+    reach = _reach(distance, kappa)
+    return reach, (2.0 * distance * np.exp(-y) - reach) / kappa
 
 
 def _polynomial(terms: Sequence[float], y: Array) -> Array:

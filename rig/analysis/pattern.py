@@ -171,11 +171,10 @@ def _refine(
     for _ in range(_STEPS):
         since = np.maximum(times - release, 0.0)
         still = np.zeros_like(since)
-        fallen, speed = fall_for(since, still, gravity, kappa)
+        fallen, speed, _, _, by_kappa = leg_slopes(since, still, gravity, kappa)
         residual = start.value + offset - fallen - levels
         weight = np.minimum(1.0, 2.0 * _ROUGH / np.maximum(np.abs(residual), _ROUGH))
-        by_kappa = -leg_slopes(since, still, gravity, kappa)[3] if air.u else still
-        slopes = np.stack([speed, np.ones_like(since), by_kappa])
+        slopes = np.stack([speed, np.ones_like(since), -by_kappa if air.u else still])
         right = slopes @ (weight * residual) + prior * [0.0, offset, kappa if air.u else 0.0]
         step = np.linalg.solve((slopes * weight) @ slopes.T + np.diag(prior), right)
         release, offset, kappa = release - step[0], offset - step[1], kappa - step[2]

@@ -70,7 +70,7 @@ def guesses_of(protocol: Protocol, sides: Sequence[Side]) -> dict[str, Guess]:
 
 def air_is_told(sides: Sequence[Side]) -> bool:
     """Whether κ can be told from what is struck: by a free chain, of rods that are all alike."""
-    return len(sides) > 1 and all(len(set(side.chain.chain.masses)) == 1 for side in sides)
+    return len(sides) > 1 and all(side.chain.chain.alike for side in sides)
 
 
 def _ratios(protocol: Protocol, chain: Chain) -> Array:

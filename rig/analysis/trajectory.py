@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.legs import fall_for, fall_through, leg_slopes, one_leg, reach
+from rig.analysis.legs import fall_for, fall_through, leg_slopes, one_leg, reach_slopes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -123,9 +123,15 @@ class Trajectory:
         ndarray
             Shape ``(times, parameters)``, or ``(times, others)``.
         """
+        return self.sights(times, by)[2]
+
+    def sights(self, times: Array, by: Array | None = None) -> tuple[Array, Array, Array]:
+        """What `heights` and `derivatives` say, with every leg gone through once."""
         leg, since = self._legs(times)
         slopes = self._slopes
-        speed, by_speed, *pull = leg_slopes(since, self.speed[leg], self.gravity, self.kappa)
+        fallen, speed, by_speed, *pull = leg_slopes(
+            since, self.speed[leg], self.gravity, self.kappa
+        )
         pulls = np.zeros((2, slopes.time.shape[1]))  # by gravity and by κ
         pulls[0, GRAVITY] = pulls[1, DRAG] = 1.0
         begin = [slopes.time, slopes.height, slopes.speed]
@@ -141,7 +147,7 @@ class Trajectory:
         found -= part
         pulled = np.flatnonzero(pulls.any(axis=0))
         found[:, pulled] -= np.stack(pull, axis=1) @ pulls[:, pulled]
-        return found
+        return self.height[leg] - fallen, speed, found
 
     def times(self, heights: Array) -> Array:
         """When the reference point comes down to each height, s; the release for higher ones."""
@@ -239,7 +245,7 @@ def _struck_slopes(path: Trajectory) -> Slopes:
     steeper = 2.0 * (gravity - kappa * arrival**2)  # of E, by the way
     alone = np.zeros((rods, size))
     alone[0, START] = steeper[0]
-    alone[:, GRAVITY], by_kappa = reach(hits.distance, kappa)
+    alone[:, GRAVITY], by_kappa = reach_slopes(hits.distance, kappa)
     alone[:, DRAG] = gravity * by_kappa - 2.0 * hits.distance * left * speed[:-1] ** 2
     alone[row, places] = steeper
     alone[row[1:], places[:-1]] = -steeper[1:]
@@ -253,7 +259,7 @@ def _struck_slopes(path: Trajectory) -> Slopes:
     d_height[1 + row, places] = -1.0
     # A leg lasts until its way is done.
     lasted = np.diff(path.time)
-    _, by_speed, by_gravity, by_kappa = leg_slopes(lasted, speed[:-1], gravity, kappa)
+    _, _, by_speed, by_gravity, by_kappa = leg_slopes(lasted, speed[:-1], gravity, kappa)
     legs = np.zeros((rods + 1, size))
     legs[0, RELEASE] = 1.0
     legs[1:] = d_height[:-1] - d_height[1:] - by_speed[:, None] * d_speed[:-1]

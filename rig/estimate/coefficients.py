@@ -165,11 +165,7 @@ def nuisances(protocol: Protocol, found: Scene, inner: Hypothesis) -> Hypothesis
 
 def has_drag(protocol: Protocol, found: Scene) -> bool:
     """Whether drag can be told: by a free chain, of chains that slow down alike."""
-    return protocol.two_chains and all(_even(form.chain) for form in found.forms)
-
-
-def _even(chain: Chain) -> bool:
-    return len(set(chain.masses)) == 1
+    return protocol.two_chains and all(form.chain.alike for form in found.forms)
 
 
 def best(protocol: Protocol, found: Scene) -> Outcome:
