@@ -4,7 +4,8 @@ A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has dete
 γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
 largest (MacKay 1992). What was stated counts as one more member, so that where nothing is
 determined, s stays as stated. Where several components make up one variance, each is multiplied
-by the share of Σx² that it explains (an EM step), which keeps all of them positive.
+by the share of Σx² that it explains (an EM step), which keeps all of them positive. What too few
+degrees of freedom tell of stays as stated, and nothing becomes less than a share of it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import STATED
+from rig.analysis.components import FEWEST_DEGREES, LEAST_SHARE, STATED
 from rig.analysis.normal import STRAY
 
 if TYPE_CHECKING:
@@ -111,20 +112,30 @@ class Evidence:
             new[kind] = getattr(old, kind) * share**0.5
         if self._impulses:
             sizes, squares, counts = np.array(self._impulses).T
-            new["impulse"], new["impulse_floor"] = _two(
-                squares, counts, sizes, (old.impulse, old.impulse_floor)
-            )
-            self.degrees["impulse"] = self.degrees["impulse_floor"] = float(counts.sum())
+            self._pair("impulse", "impulse_floor", (squares, counts, sizes), new)
         squares, speeds = (np.concatenate(parts) for parts in zip(*self._edges, strict=True))
-        free = max(0.5, 1.0 - parameters / squares.size)
+        free = max(0.5, 1.0 - parameters / max(1, squares.size))
         # Edges at about the same speed scatter alike: few bins do as well as all of them.
         counts, edges = np.histogram(speeds, _BINS)
         sums, _ = np.histogram(speeds, edges, weights=squares)
         middles = 0.5 * (edges[1:] + edges[:-1])
-        new["jitter"], new["floor"] = _two(sums, free * counts, middles, (old.jitter, old.floor))
-        self.degrees["jitter"] = self.degrees["floor"] = squares.size * free
-        self.components = replace(old, **new)
+        self._pair("jitter", "floor", (sums, free * counts, middles), new)
+        least = {name: LEAST_SHARE * getattr(STATED, name) for name in new}
+        self.components = replace(old, **{name: max(new[name], least[name]) for name in new})
         return self
+
+    def _pair(
+        self, name: str, floor: str, sums: tuple[Array, Array, Array], new: dict[str, float]
+    ) -> None:
+        """Estimate two components that make up one variance, see `_two`."""
+        squares, counts, sizes = sums
+        degrees = float(counts.sum())
+        if degrees < FEWEST_DEGREES:
+            new[name], new[floor] = getattr(STATED, name), getattr(STATED, floor)
+            return
+        begin = getattr(self.components, name), getattr(self.components, floor)
+        new[name], new[floor] = _two(squares, counts, sizes, begin)
+        self.degrees[name] = self.degrees[floor] = degrees
 
 
 def _two(

@@ -136,7 +136,9 @@ def _contrast(blocks: Sequence[Block], name: str, signs: Sequence[float]) -> Mea
     own = math.sqrt(max(0.0, fmean(owns)) * size)
     single = max(own, seen) / math.sqrt(n)
     u = math.hypot(single, common)
-    degrees = (2 * n - 1) * (u / single) ** 4 if seen > own else math.inf
+    known = min(max(1.0, one.degrees) for block in measured for one in block)
+    share = single**4 / (2 * n - 1.0 if seen > own else known) + common**4 / known
+    degrees = u**4 / share if share > 0.0 else math.inf
     return Measured(float(values.mean()), u, degrees, {"runs": single, "common": common})
 
 

@@ -1,11 +1,11 @@
-"""All runs of one incline together, beside the model."""
+"""All runs of one incline and striking chain together, beside the model."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import fmean, stdev
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from rig.model.predict import predict
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from rig.analysis.result import DropResult
     from rig.protocol.scene import Protocol, Run
+
+T = TypeVar("T")
 
 COMMON = frozenset(
     {
@@ -46,6 +48,8 @@ class Incline:
         Mean and standard deviation between runs of each measurand, by JSON name.
     predicted
         The model's value of each measurand; missing outside its domain.
+    impact_chain
+        Which chain struck, where chains are unlike.
     """
 
     incline_deg: float
@@ -53,6 +57,7 @@ class Incline:
     means: dict[str, Measured]
     deviations: dict[str, float]
     predicted: dict[str, Quantity]
+    impact_chain: str | None = None
 
     def normalized_error(self, name: str) -> float | None:
         """E_n = (measured − predicted)/√(U² + U_p²); within ±1 they agree (ISO 13528)."""
@@ -64,7 +69,9 @@ class Incline:
 
     def json(self) -> dict[str, Any]:
         """One member of ``summary``."""
-        found: dict[str, Any] = {"incline_deg": self.incline_deg, "n": self.n}
+        found: dict[str, Any] = {"incline_deg": self.incline_deg}
+        found |= {"impact_chain": self.impact_chain} if self.impact_chain is not None else {}
+        found["n"] = self.n
         for name, mean in self.means.items():
             found[name] = mean.json()
             if name in self.deviations:
@@ -85,25 +92,36 @@ class Incline:
 def summarize(
     protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
 ) -> list[Incline]:
-    """Average the good runs of each incline, in order of incline.
+    """Average the good runs of each incline and, where chains are unlike, of each that strikes.
 
     Parameters
     ----------
     rejected
         Whether runs that are good by their limits count though the operator rejected them.
     """
-    by_incline: dict[float, list[DropResult]] = {}
-    for result in results:
-        if result.verdict in GOOD or (rejected and result.limits in GOOD):
-            by_incline.setdefault(result.run.incline_deg, []).append(result)
-    return [_incline(protocol, incline, runs) for incline, runs in sorted(by_incline.items())]
+    good = [
+        result
+        for result in results
+        if result.verdict in GOOD or (rejected and result.limits in GOOD)
+    ]
+    return [_incline(protocol, runs) for runs in by_case(protocol, good, lambda one: one.run)]
 
 
-def _incline(protocol: Protocol, incline: float, results: Sequence[DropResult]) -> Incline:
+def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
+    """Sort by incline and, where chains are unlike, by the one that strikes."""
+    found: dict[tuple[float, str], list[T]] = {}
+    for one in members:
+        run = run_of(one)
+        found.setdefault((run.incline_deg, protocol.striker(run) or ""), []).append(one)
+    return [group for _, group in sorted(found.items())]
+
+
+def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
+    run = results[0].run
     names = [name for name in MEASURANDS if name in results[0].quantities]
     values = {name: [result.quantities[name] for result in results] for name in names}
     return Incline(
-        incline,
+        run.incline_deg,
         len(results),
         {name: mean(found) for name, found in values.items()},
         {
@@ -111,7 +129,8 @@ def _incline(protocol: Protocol, incline: float, results: Sequence[DropResult]) 
             for name, found in values.items()
             if len(found) > 1
         },
-        _predicted(protocol, [result.run for result in results], names),
+        _predicted(protocol, run, names),
+        protocol.striker(run),
     )
 
 
@@ -119,19 +138,29 @@ def mean(runs: Sequence[Measured]) -> Measured:
     """Mean of several runs: their scatter over √n, and what is common to all of them.
 
     Where the runs happen to scatter less than each one's own uncertainty allows, the latter
-    counts. Degrees of freedom are effective ones (GUM G.4).
+    counts. Degrees of freedom are effective ones (GUM G.4): what the runs say of themselves is
+    known no better than they know it, however many they are.
     """
+    if len(runs) == 1:
+        (run,) = runs
+        common = _common(runs)[0]
+        alone = math.sqrt(max(0.0, run.u**2 - common**2))
+        return replace(run, budget={"runs": alone, "common": common}, shared=None)
     n = len(runs)
     common, each = _common(runs)
     own = math.sqrt(
         fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
     )
-    seen = stdev(run.value for run in runs) if n > 1 else 0.0
+    seen = stdev(run.value for run in runs)
     single = max(own, seen) / math.sqrt(n)
     u = math.hypot(single, common)
-    degrees = (n - 1) * (u / single) ** 4 if seen > own else math.inf
+    known = min(max(1.0, run.degrees) for run in runs)
+    share = single**4 / (n - 1.0 if seen > own else known) + common**4 / known
     return Measured(
-        fmean(run.value for run in runs), u, degrees, {"runs": single, "common": common}
+        fmean(run.value for run in runs),
+        u,
+        u**4 / share if share > 0.0 else math.inf,
+        {"runs": single, "common": common},
     )
 
 
@@ -149,29 +178,15 @@ def _common(runs: Sequence[Measured]) -> tuple[float, list[float]]:
     return math.sqrt(fmean(part**2 for part in each)), each
 
 
-def _predicted(
-    protocol: Protocol, runs: Sequence[Run], names: Sequence[str]
-) -> dict[str, Quantity]:
-    """Return what the model says for these runs; unlike chains count as often as they struck."""
+def _predicted(protocol: Protocol, run: Run, names: Sequence[str]) -> dict[str, Quantity]:
+    """Return what the model says for such runs; nothing outside its domain."""
     if protocol.surface is None:
-        return {"gravity_m_s2": protocol.gravity} if "gravity_m_s2" in names else {}
-    separations: list[Quantity] = []
-    speeds: list[Quantity] = []
-    known: dict[tuple[str | None, str | None], tuple[Quantity | None, Quantity | None]] = {}
-    for run in runs:
-        case = run.impact, run.free
-        if case not in known:
-            known[case] = predicted_run(protocol, run)
-        separation, speed = known[case]
+        found = {"gravity_m_s2": protocol.gravity}
+    else:
+        separation, speed = predicted_run(protocol, run)
         if separation is None or speed is None:
             return {}
-        separations.append(separation)
-        speeds.append(speed)
-    # The model's parameters are common to all runs, so its uncertainty does not average out.
-    found = {
-        "separation_m": Quantity(fmean(q.value for q in separations), separations[0].u),
-        "speed_m_s": Quantity(fmean(q.value for q in speeds), speeds[0].u),
-    }
+        found = {"separation_m": separation, "speed_m_s": speed}
     return {name: found[name] for name in names if name in found}
 
 

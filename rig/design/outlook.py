@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.design.cases import BEAM
-from rig.estimate.coefficients import KNOWN, described
-from rig.estimate.hypotheses import ALPHA, alphas
+from rig.estimate.coefficients import KNOWN, described, given_alphas
+from rig.estimate.hypotheses import alphas
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -181,13 +181,12 @@ def _coefficients(
     if not stated:
         return {}
     now = {name: quantity.value for name, quantity in stated.items()}
+    given = given_alphas(protocol)
     total = np.eye(size + len(now))  # ±1 of a coefficient is as good as nothing known
     for part, (chain, incline), said in zip(parts, drops, kept, strict=True):
         if not said:
             continue
-        slopes = np.ones(1)
-        if ALPHA not in now:
-            slopes = alphas(surface, chain, incline, now)[1].mean(axis=0)
+        slopes = alphas(surface, chain, incline, now, given.get(chain))[1].mean(axis=0)
         n = part.case.count
         total[part.grid] += n * part.matrix
         mixed = n * np.outer(part.cross, slopes)

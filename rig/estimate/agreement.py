@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.analysis.result import GOOD
 from rig.analysis.student import coverage_factor
-from rig.analysis.summary import MEASURANDS, mean, predicted_run
+from rig.analysis.summary import MEASURANDS, by_case, mean, predicted_run
 from rig.estimate.tail import chi2_tail
 from rig.units import Quantity
 
@@ -40,11 +39,8 @@ def agreement(protocol: Protocol, results: Iterable[DropResult]) -> list[dict[st
         One a measurand: ``inclines`` with difference, u, normalized error, χ² and p of each;
         ``chi2``, ``degrees`` and ``p`` of all together.
     """
-    by_incline: dict[float, list[DropResult]] = {}
-    for result in results:
-        if result.verdict in GOOD:
-            by_incline.setdefault(result.run.incline_deg, []).append(result)
-    cases = [runs for _, runs in sorted(by_incline.items())]
+    good = [result for result in results if result.verdict in GOOD]
+    cases = by_case(protocol, good, lambda one: one.run)
     # Outside the model's domain there is nothing to compare with.
     cases = [runs for runs in cases if _model(protocol, runs, 0) is not None]
     if not cases:
@@ -58,7 +54,11 @@ def _compared(
 ) -> dict[str, Any]:
     means = [mean([one.quantities[name] for one in runs]) for runs in cases]
     shared = _shared([[one.quantities[name] for one in runs] for runs in cases])
-    single = np.array([one.budget["runs"] ** 2 for one in means])
+    # Scatter that is known from few runs counts for as much as its expanded uncertainty says.
+    known = coverage_factor(np.inf)
+    single = np.array(
+        [max(0.0, (one.expanded / known) ** 2 - one.budget["common"] ** 2) for one in means]
+    )
     which = MEASURANDS.index(name)
     predicted = np.array([_model(protocol, runs, which) for runs in cases], dtype=float)
     slopes = np.stack(
@@ -75,8 +75,8 @@ def _compared(
     off = np.array([one.value for one in means]) - predicted
     chi2 = float(off @ np.linalg.solve(covariance, off))
     u = np.sqrt(np.diag(covariance))
-    known = coverage_factor(np.inf) * np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
-    widths = [np.hypot(one.expanded, model) for one, model in zip(means, known, strict=True)]
+    models = known * np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
+    widths = [np.hypot(one.expanded, model) for one, model in zip(means, models, strict=True)]
     return {
         "quantity": name,
         "chi2": chi2,
@@ -84,7 +84,7 @@ def _compared(
         "p": chi2_tail(chi2, len(cases)),
         "inclines": [
             {
-                "incline_deg": runs[0].run.incline_deg,
+                **protocol.case(runs[0].run),
                 "n": len(runs),
                 "difference": float(off[n]),
                 "u": float(u[n]),
@@ -107,16 +107,9 @@ def _shared(values: Sequence[Sequence[Measured]]) -> Array:
 
 
 def _model(protocol: Protocol, runs: Sequence[DropResult], which: int) -> float | None:
-    """Mean prediction for these runs; `None` outside the domain."""
-    known: dict[tuple[str | None, str | None], float | None] = {}
-    for one in runs:
-        case = one.run.impact, one.run.free
-        if case not in known:
-            found = predicted_run(protocol, one.run)[which]
-            known[case] = found.value if found is not None else None
-    values = [known[one.run.impact, one.run.free] for one in runs]
-    numbers = [value for value in values if value is not None]
-    return fmean(numbers) if len(numbers) == len(values) else None
+    """Prediction for these runs, which are of one case; `None` outside the domain."""
+    found = predicted_run(protocol, runs[0].run)[which]
+    return found.value if found is not None else None
 
 
 def _moved(protocol: Protocol) -> Iterator[tuple[Protocol, Protocol]]:

@@ -13,13 +13,11 @@ from rig.estimate.hypotheses import (
     MU,
     PILE,
     coefficients,
-    one_alpha,
     with_contact,
     with_drag,
 )
 from rig.estimate.joint import Parameter, fit
 from rig.model.impact import impact_on
-from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
     from rig.estimate.joint import Hypothesis, Outcome
     from rig.model.chain import Chain
     from rig.protocol.scene import Protocol
+    from rig.units import Quantity
 
 CONTACT_U = 1e-3
 """How far the contact point may move when the board is inclined anew, m."""
@@ -41,6 +40,9 @@ FOUND = 0.5
 class Scene:
     """What there is to be estimated.
 
+    What the edges tell is fitted, whatever the protocol says of it. What they do not tell is held
+    by its stated uncertainty; without one it is exact, which is no parameter, and leaves the fit.
+
     Attributes
     ----------
     forms
@@ -50,7 +52,7 @@ class Scene:
     held
         Names of the latter.
     stated
-        What the protocol says of each coefficient, by name.
+        What the protocol says of each coefficient that is fitted, by name.
     left_out
         Sentences on what is not fitted, and why.
     """
@@ -101,6 +103,7 @@ def described(
     stated: dict[str, Quantity] = {}
     left_out: list[str] = []
     kept = []
+    given = given_alphas(protocol)
     for chain, incline in drops:
         impact = impact_on(surface, chain, incline)
         kept.append(impact.basis == "given" or not impact.notes)
@@ -108,7 +111,7 @@ def described(
             said = f"{incline:g}° tells no coefficient: {'; '.join(impact.notes)}"
             left_out += [said] if said not in left_out else []
         elif chain.alpha is not None:
-            stated[ALPHA] = chain.alpha
+            stated[given[chain]] = chain.alpha
         elif impact.basis == "pile" and surface.pile is not None:
             stated[PILE] = surface.pile.restitution
         else:
@@ -118,43 +121,58 @@ def described(
     return kept, stated, left_out
 
 
+def given_alphas(protocol: Protocol) -> dict[Chain, str]:
+    """Name the α of each chain whose α is simply given; like chains have one."""
+    chains = {one.chain: one.name for one in protocol.chains.values() if one.chain.alpha}
+    return {chain: ALPHA if len(chains) == 1 else f"{ALPHA} {chains[chain]}" for chain in chains}
+
+
+def words(name: str) -> str:
+    """Write a coefficient's name for people."""
+    what, _, chain = name.partition(" ")
+    return what.replace("_", " ") + (f" of chain {chain}" if chain else "")
+
+
 def _identified(protocol: Protocol, given: Scene) -> Scene:
     """Hold μ, and then β, where the edges do not tell them apart."""
     found = given
-    for name in (MU, BETA, PILE, ALPHA):
+    alphas = [name for name in given.stated if name not in {MU, BETA, PILE}]
+    for name in (MU, BETA, PILE, *alphas):
         if name not in given.stated:
             continue
-        unsure = [one for one, u in sds(best(protocol, found)).items() if u > KNOWN]
+        outcome = best(protocol, found)
+        unsure = [one for one in found.stated if outcome[one][1] > KNOWN]
         if not unsure:
             break
         if name == MU and BETA not in unsure and MU not in unsure:
             continue
         stated = given.stated[name]
-        told = Quantity(stated.value, max(stated.u, 1e-9))
         said = (
-            f"{name.replace('_', ' ')} is not identified by drops at "
+            f"{words(name)} is not identified by drops at "
             f"{', '.join(f'{incline:g}°' for incline in given.inclines)}: held at the protocol's "
-            f"{stated.value:g} ± {stated.u:g}, which the other coefficients allow for"
         )
-        found = replace(
-            found,
-            parameters=tuple(
-                one._replace(prior=(told.value, told.u)) if one.name == name else one
+        if stated.u:
+            said += f"{stated.value:g} ± {stated.u:g}, which the other coefficients allow for"
+            parameters = tuple(
+                one._replace(prior=(stated.value, stated.u)) if one.name == name else one
                 for one in found.parameters
-            ),
-            held=(*found.held, name),
-            left_out=(*found.left_out, said),
-        )
+            )
+            found = replace(found, parameters=parameters, held=(*found.held, name))
+        else:
+            said += f"{stated.value:g}"
+            found = replace(
+                found,
+                parameters=tuple(one for one in found.parameters if one.name != name),
+                stated={key: value for key, value in found.stated.items() if key != name},
+            )
+        found = replace(found, left_out=(*found.left_out, said))
     return found
 
 
-def model(protocol: Protocol, found: Scene, parameters: Sequence[Parameter]) -> Hypothesis:
+def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     """Suppose the model with these parameters unknown, and nothing of contact or air."""
     assert protocol.surface is not None
-    if ALPHA in found.stated:
-        (parameter,) = parameters
-        return one_alpha(found.forms, lambda _: ALPHA)._replace(parameters=(parameter,))
-    return coefficients(protocol.surface, parameters)
+    return coefficients(protocol.surface, parameters, given_alphas(protocol))
 
 
 def nuisances(protocol: Protocol, found: Scene, inner: Hypothesis) -> Hypothesis:
@@ -170,13 +188,7 @@ def has_drag(protocol: Protocol, found: Scene) -> bool:
 
 def best(protocol: Protocol, found: Scene) -> Outcome:
     """Fit the coefficients with all nuisances."""
-    return fit(found.forms, nuisances(protocol, found, model(protocol, found, found.parameters)))
-
-
-def sds(outcome: Outcome) -> dict[str, float]:
-    """Standard uncertainty of each coefficient."""
-    names = (ALPHA, BETA, MU, PILE)
-    return {name: outcome[name][1] for name in names if name in outcome}
+    return fit(found.forms, nuisances(protocol, found, model(protocol, found.parameters)))
 
 
 def correlation(outcome: Outcome, names: Sequence[str]) -> list[list[float]]:

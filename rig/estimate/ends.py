@@ -45,7 +45,8 @@ def end_correction(protocol: Protocol, found: Scene) -> dict[str, Any] | None:
     by_eq10 = {float(gamma) for form in found.forms for gamma in gammas(form)}
     if by_eq10 == {0.0}:
         return None
-    inclines = nuisances(protocol, found, one_alpha(found.forms, lambda one: one.run.incline_deg))
+    cases = one_alpha(found.forms, lambda one: tuple(protocol.case(one.run).values()))
+    inclines = nuisances(protocol, found, cases)
     outcomes = {
         "open": fit(found.forms, ended(inclines, gammas, None)),
         "eq10": fit(found.forms, inclines),
@@ -79,7 +80,7 @@ def _sentence(scale: Measured, worse: float, p_eq10: float, *, told: bool) -> st
     agree = f"p {p_eq10:.2g} for Eq. 10"
     if worse > STRONG:
         return (
-            f"The end correction is needed: without it AIC is {worse:.3g} worse; {size}, {agree}."
+            f"The end correction is needed: without it AIC is {worse:.0f} worse; {size}, {agree}."
         )
     if worse > 0.0:
         return (

@@ -28,8 +28,16 @@ END, AIR = "end_correction", "drag"
 _STEP = 1e-5  # of a coefficient, for its derivative
 
 
-def coefficients(surface: Surface, parameters: Sequence[Parameter]) -> Hypothesis:
-    """Suppose Eqs. 8 to 13 with these of β, μ and the pile's β unknown, the others as stated."""
+def coefficients(
+    surface: Surface, parameters: Sequence[Parameter], given: Mapping[Chain, str]
+) -> Hypothesis:
+    """Suppose Eqs. 8 to 13 with these of β, μ and the pile's β unknown, the others as stated.
+
+    Parameters
+    ----------
+    given
+        Name of the α of each chain whose α is simply given.
+    """
     names = [one.name for one in parameters]
     known: dict[tuple[float, int, tuple[float, ...]], tuple[Array, Array]] = {}
 
@@ -37,22 +45,34 @@ def coefficients(surface: Surface, parameters: Sequence[Parameter]) -> Hypothesi
         key = form.run.incline_deg, id(form.chain), tuple(values.tolist())
         if key not in known:
             now = dict(zip(names, values.tolist(), strict=True))
-            known[key] = _padded(*alphas(surface, form.chain, form.run.incline_deg, now))
+            known[key] = _padded(
+                *alphas(surface, form.chain, form.run.incline_deg, now, given.get(form.chain))
+            )
         return known[key]
 
     return Hypothesis(tuple(parameters), targets)
 
 
 def alphas(
-    surface: Surface, chain: Chain, incline_deg: float, values: Mapping[str, float]
+    surface: Surface,
+    chain: Chain,
+    incline_deg: float,
+    values: Mapping[str, float],
+    given: str | None = None,
 ) -> tuple[Array, Array]:
     """α of every rod by Eqs. 8 to 13, shape ``(rods,)``, with its derivatives by coefficients.
 
     Parameters
     ----------
     values
-        Coefficients by name; others are the surface's.
+        Coefficients by name; others are as stated.
+    given
+        Name of this chain's α, where it is simply given.
     """
+    if given is not None and given in values:
+        slopes = np.zeros((chain.rods, len(values)))
+        slopes[:, [*values].index(given)] = 1.0
+        return np.full(chain.rods, values[given]), slopes
 
     def at(moved: Mapping[str, float]) -> Array:
         impacts = rod_impacts(with_coefficients(surface, moved), chain, incline_deg)

@@ -68,8 +68,7 @@ class Posterior:
         n = self.names.index(name)
         mean, sd = self.moments(name)
         low, high = mean - 20.0 * sd, mean + 20.0 * sd
-        while high - low > 1e-9 * sd:
-            middle = 0.5 * (low + high)
+        while high - low > 1e-9 * sd and low < (middle := 0.5 * (low + high)) < high:
             z = (middle - self.means[:, n]) / (self.sds[:, n] * math.sqrt(2.0))
             below = float(self.weights @ [0.5 * math.erfc(-one) for one in z.tolist()])
             low, high = (middle, high) if below < probability else (low, middle)
@@ -90,16 +89,14 @@ def posterior(protocol: Protocol, found: Scene, centre: Outcome) -> Posterior:
     }
     names = tuple(priors)
     if MU not in priors:
-        only = fit(
-            found.forms, nuisances(protocol, found, model(protocol, found, [*priors.values()]))
-        )
+        only = fit(found.forms, nuisances(protocol, found, model(protocol, [*priors.values()])))
         pairs = np.array([only[name] for name in names])
         return Posterior(names, np.ones(1), pairs[None, :, 0], pairs[None, :, 1])
     nodes = _nodes(*_around(centre[MU], priors[MU].prior))
     logs, means, sds = [], [], []
     for mu in nodes.tolist():
         fixed = {**priors, MU: Parameter(MU, mu, (mu, _EXACT))}
-        at = fit(found.forms, nuisances(protocol, found, model(protocol, found, [*fixed.values()])))
+        at = fit(found.forms, nuisances(protocol, found, model(protocol, [*fixed.values()])))
         prior = priors[MU].prior
         off = (mu - prior[0]) / prior[1] if prior else 0.0
         logs.append(at.log_volume - 0.5 * (at.chi2 + off**2))
@@ -123,4 +120,5 @@ def _around(found: tuple[float, float], prior: tuple[float, float] | None) -> tu
 
 def _nodes(mean: float, sd: float) -> Array:
     """Evenly spaced; friction has no negative side."""
-    return np.linspace(max(0.0, mean - _REACH * sd), mean + _REACH * sd, NODES)
+    low = max(0.0, mean - _REACH * sd)
+    return np.linspace(low, max(mean, low) + _REACH * sd, NODES)

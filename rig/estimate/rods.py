@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.result import Measured
+from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
 from rig.estimate.joint import fit
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from rig.estimate.forms import Form
     from rig.estimate.joint import Hypothesis
+    from rig.protocol.scene import Protocol
 
     Array = NDArray[np.float64]
 
@@ -26,7 +28,7 @@ RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""
 
 
-def impulses(forms: Sequence[Form]) -> dict[str, Any]:
+def impulses(protocol: Protocol, forms: Sequence[Form]) -> dict[str, Any]:
     """Measure the speed that the chain gains from each rod, ΔV = J/M, at each incline.
 
     Neither Eq. 9 nor the scatter about it pulls at these numbers: the α of every rod is open, and
@@ -44,13 +46,7 @@ def impulses(forms: Sequence[Form]) -> dict[str, Any]:
         ``groups`` of rods (numbers from the bottom rod, 0) with ΔV as measured and by Eq. 9, m/s.
         ``sentence``: whether each rod was resolved.
     """
-    # Unlike chains have rods of their own.
-    like = dict.fromkeys((form.run.incline_deg, form.chain) for form in forms)
-    lines = [
-        _incline(incline, [one for one in forms if (one.run.incline_deg, one.chain) == case])
-        for case in sorted(like, key=lambda case: case[0])
-        for incline in case[:1]
-    ]
+    lines = [_case(protocol, group) for group in by_case(protocol, forms, lambda one: one.run)]
     whole = [line for line in lines if line["resolved"] == line["rods"]]
     if len(whole) == len(lines):
         words = "The gates resolve the impulse of every rod at every incline."
@@ -67,7 +63,9 @@ def impulses(forms: Sequence[Form]) -> dict[str, Any]:
     return {"inclines": lines, "sentence": words}
 
 
-def _incline(incline: float, forms: Sequence[Form]) -> dict[str, Any]:
+def _case(protocol: Protocol, forms: Sequence[Form]) -> dict[str, Any]:
+    incline = forms[0].run.incline_deg
+
     def contact(hypothesis: Hypothesis) -> Hypothesis:
         return with_contact(hypothesis, [incline], (0.0, CONTACT_U))
 
@@ -83,7 +81,7 @@ def _incline(incline: float, forms: Sequence[Form]) -> dict[str, Any]:
     groups = [_group(span, gains, covariance, model) for span in spans]
     chi2 = max(0.0, single.chi2 - each.chi2)
     return {
-        "incline_deg": incline,
+        **protocol.case(forms[0].run),
         "rods": rods,
         "resolved": sum(first == last for first, last in spans),
         "alpha": Measured(*single["α one"]).json(),

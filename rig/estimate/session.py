@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.shared import Shared
-from rig.errors import InputError
+from rig.errors import InputError, RigError
 from rig.estimate import coefficients as of
 from rig.estimate.agreement import agreement
 from rig.estimate.curves import drop_curves
@@ -19,13 +20,13 @@ from rig.estimate.rods import impulses
 from rig.estimate.tail import chi2_tail
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.analysis.session import Analysis
     from rig.estimate.coefficients import Scene
     from rig.estimate.forms import Form
     from rig.estimate.joint import Outcome
-    from rig.protocol.scene import Protocol
+    from rig.protocol.scene import Protocol, Run
 
 
 def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
@@ -41,7 +42,8 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     Returns
     -------
     dict
-        What ``rig estimate --json`` prints.
+        What ``rig estimate --json`` prints. A section that could not be worked out is missing, and
+        ``failed`` says which and why.
 
     Raises
     ------
@@ -60,29 +62,67 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     shared = analysis.lesson.shared if analysis.lesson else Shared(d.model for d in drops.values())
     forms = [form(good[key], drop, shared) for key, drop in drops.items()]
     like = merged(forms)
-    found = of.scene(protocol, like)
     said: dict[str, Any] = {"drops": len(forms), "edges": sum(one.edges for one in forms)}
-    outcome = None
-    if found.forms:
-        outcome = of.best(protocol, found)
-        said |= _coefficients(protocol, found, outcome)
-        said["end_correction"] = end_correction(protocol, found)
-    said["left_out"] = list(found.left_out)
-    said |= _alphas(protocol, found, forms, like, outcome)
-    said["impulses"] = impulses(like)
-    said["comparison"] = agreement(protocol, analysis.runs)
-    first = {good[key].incline_deg: key for key in reversed(drops)}
-    said["curves"] = [
-        drop_curves(protocol, good[key], drops[key], analysis.lesson)
-        for _, key in sorted(first.items())
-    ]
+    found, outcome = None, None
+    with _section(said, "coefficients"):
+        found = of.scene(protocol, like)
+        said["left_out"] = list(found.left_out)
+        if found.forms:
+            outcome = of.best(protocol, found)
+            said |= _coefficients(protocol, found, outcome)
+    with _section(said, "end correction"):
+        if found is not None and found.forms:
+            said["end_correction"] = end_correction(protocol, found)
+    with _section(said, "α"):
+        said |= _alphas(protocol, found, outcome, forms, like)
+    with _section(said, "impulses"):
+        said["impulses"] = impulses(protocol, like)
+    with _section(said, "comparison"):
+        said["comparison"] = agreement(protocol, analysis.runs)
+    with _section(said, "curves"):
+        first = {_case(protocol, good[key]): key for key in reversed(drops)}
+        said["curves"] = [
+            drop_curves(protocol, good[key], drops[key], analysis.lesson)
+            for _, key in sorted(first.items())
+        ]
     return said
+
+
+@contextmanager
+def _section(said: dict[str, Any], name: str) -> Iterator[None]:
+    """Work a section out; one that cannot be must not take the others along."""
+    try:
+        yield
+    except Exception as error:  # whatever it is, it stays to be seen
+        why = error.message if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
+        said.setdefault("failed", []).append({"section": name, "why": why})
+
+
+def _case(protocol: Protocol, run: Run) -> tuple[object, ...]:
+    return tuple(protocol.case(run).values())
 
 
 def _coefficients(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[str, Any]:
     """Least squares and posterior, with correlations and nuisances."""
-    bayes = posterior(protocol, found, outcome)
+    contact = []
+    for incline in found.inclines:
+        height = Measured(*outcome[f"contact {incline:g}"])
+        contact.append(
+            {
+                "incline_deg": incline,
+                "height_m": height.json(),
+                "identified": height.u < of.FOUND * of.CONTACT_U,
+            }
+        )
+    drag = Measured(*outcome[AIR]).json() if AIR in outcome else None
+    said = _told(protocol, found, outcome) if found.stated else {"parameters": []}
+    return said | {"contact": contact, "drag_per_m": drag, "edges_chi2": outcome.chi2}
+
+
+def _told(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[str, Any]:
+    """What is said of the coefficients that are fitted."""
     names = list(found.stated)
+    bayes = posterior(protocol, found, outcome)
     parameters = []
     for name in names:
         mean, sd = bayes.moments(name)
@@ -97,17 +137,6 @@ def _coefficients(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[st
                 "stated": {"value": stated.value, "u": stated.u},
             }
         )
-    contact = []
-    for incline in found.inclines:
-        height = Measured(*outcome[f"contact {incline:g}"])
-        contact.append(
-            {
-                "incline_deg": incline,
-                "height_m": height.json(),
-                "identified": height.u < of.FOUND * of.CONTACT_U,
-            }
-        )
-    drag = Measured(*outcome[AIR]).json() if AIR in outcome else None
     return {
         "parameters": parameters,
         "correlation": {"names": names, "matrix": of.correlation(outcome, names)},
@@ -118,32 +147,38 @@ def _coefficients(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[st
             "means": bayes.means.tolist(),
             "sds": bayes.sds.tolist(),
         },
-        "contact": contact,
-        "drag_per_m": drag,
-        "edges_chi2": outcome.chi2,
     }
 
 
 def _alphas(
     protocol: Protocol,
-    found: Scene,
+    found: Scene | None,
+    outcome: Outcome | None,
     forms: Sequence[Form],
     like: Sequence[Form],
-    outcome: Outcome | None,
 ) -> dict[str, Any]:
-    """The best single α of every run and incline, and whether they agree."""
+    """The best single α of every run and case, and whether they agree.
+
+    A case is an incline, or an incline and a striking chain where chains are unlike.
+    """
+
+    def case(one: Form) -> tuple[object, ...]:
+        return _case(protocol, one.run)
+
     by_run = fit(forms, one_alpha(forms, lambda one: one.run.number))
-    by_incline = fit(like, one_alpha(like, lambda one: one.run.incline_deg))
-    model = _model_alphas(protocol, found, outcome)
-    inclines = []
-    for incline in sorted({one.run.incline_deg for one in like}):
-        alpha = Measured(*by_incline[f"α {incline}"])
-        line = {
-            "incline_deg": incline,
-            "n": sum(one.run.incline_deg == incline for one in forms),
-            "alpha": alpha.json(),
+    by_case = fit(like, one_alpha(like, case))
+    model = {}
+    if found is not None and outcome is not None:
+        alphas = _model_alphas(protocol, found, outcome)
+        model = {case(one): alpha for one, alpha in zip(found.forms, alphas, strict=True)}
+    cases = []
+    for key, one in sorted({case(one): one for one in reversed(like)}.items()):
+        line: dict[str, Any] = {
+            **protocol.case(one.run),
+            "n": sum(case(other) == key for other in forms),
+            "alpha": Measured(*by_case[f"α {key}"]).json(),
         }
-        inclines.append(line | ({"model": model[incline]} if incline in model else {}))
+        cases.append(line | ({"model": model[key]} if key in model else {}))
     runs = []
     for one in forms:
         alpha = Measured(*by_run[f"α {one.run.number}"])
@@ -153,21 +188,20 @@ def _alphas(
             "impact_chain": one.run.impact,
             "alpha": alpha.json(),
         }
-        if one.run.incline_deg in model:
-            line["residual"] = (alpha.value - model[one.run.incline_deg]) / alpha.u
+        if case(one) in model:
+            line["residual"] = (alpha.value - model[case(one)]) / alpha.u
         runs.append(line)
-    said: dict[str, Any] = {"alpha": {"inclines": inclines, "runs": runs}}
     tests = {}
-    if len(forms) > len(inclines):
-        tests["runs_share_alpha"] = _test(by_incline.chi2 - by_run.chi2, len(forms) - len(inclines))
-    free = sum(name not in found.held for name in found.stated)
-    if outcome is not None and len(found.inclines) > free and not found.held:
-        # Without the nuisances, so that both suppose the same but for α.
-        only = [one for one in like if one.run.incline_deg in found.inclines]
-        open_ = fit(only, one_alpha(only, lambda one: one.run.incline_deg))
-        plain = fit(only, of.model(protocol, found, found.parameters))
-        tests["model"] = _test(plain.chi2 - open_.chi2, len(found.inclines) - free)
-    return said | {"tests": tests}
+    if len(forms) > len(cases):
+        tests["runs_share_alpha"] = _test(by_case.chi2 - by_run.chi2, len(forms) - len(cases))
+    if found is not None and found.parameters and not found.held:
+        degrees = len(set(map(case, found.forms))) - len(found.parameters)
+        if degrees > 0:
+            # Without the nuisances, so that both suppose the same but for α.
+            open_ = fit(found.forms, one_alpha(found.forms, case))
+            plain = fit(found.forms, of.model(protocol, found.parameters))
+            tests["model"] = _test(plain.chi2 - open_.chi2, degrees)
+    return {"alpha": {"inclines": cases, "runs": runs}, "tests": tests}
 
 
 def _test(chi2: float, degrees: int) -> dict[str, Any]:
@@ -175,13 +209,8 @@ def _test(chi2: float, degrees: int) -> dict[str, Any]:
     return {"chi2": chi2, "degrees": degrees, "p": chi2_tail(chi2, degrees)}
 
 
-def _model_alphas(protocol: Protocol, found: Scene, outcome: Outcome | None) -> dict[float, float]:
-    """α of the model with the fitted coefficients, by incline."""
-    if outcome is None:
-        return {}
-    model = of.model(protocol, found, found.parameters)
+def _model_alphas(protocol: Protocol, found: Scene, outcome: Outcome) -> list[float]:
+    """α of the model with the fitted coefficients, of each form."""
+    model = of.model(protocol, found.parameters)
     values = outcome.values[: len(found.parameters)]
-    return {
-        one.run.incline_deg: float(model.targets(one, values)[0][: one.alphas.size].mean())
-        for one in found.forms
-    }
+    return [float(model.targets(one, values)[0][: one.alphas.size].mean()) for one in found.forms]

@@ -194,6 +194,29 @@ class Protocol:
         """Whether a free chain falls beside the impact chain."""
         return self.surface is not None and len(self.chains) > 1
 
+    @property
+    def unlike_chains(self) -> bool:
+        """Whether it changes a result which of the two chains strikes."""
+        if not self.two_chains:
+            return False
+        first, second = self.chains.values()
+        return first.chain != second.chain or (
+            self.drag is not None
+            and (first.diameters, first.tilt_deg) != (second.diameters, second.tilt_deg)
+        )
+
+    def striker(self, run: Run) -> str | None:
+        """Name of the chain that strikes, where that makes a result of its own.
+
+        A session's results are by incline and striking chain; like chains are one.
+        """
+        return run.impact if self.unlike_chains else None
+
+    def case(self, run: Run) -> dict[str, float | str]:
+        """Name what a run's result is of: ``incline_deg`` and, if it has one, ``impact_chain``."""
+        striker = self.striker(run)
+        return {"incline_deg": run.incline_deg} | ({"impact_chain": striker} if striker else {})
+
 
 @dataclass(frozen=True, slots=True)
 class Run:

@@ -59,6 +59,7 @@ def _audit(record: Record) -> str:
 
 SUMMARY = (
     Column("incline (°)", _incline),
+    Column("strikes", _text("impact_chain"), numeric=False),
     Column("n", _count("n")),
     Column("Δz ± U (cm)", _quantity(100, 2, "separation_m")),
     Column("predicted Δz (cm)", _number(100, 2, "predicted", "separation_m")),
@@ -68,7 +69,10 @@ SUMMARY = (
     Column("predicted g (m/s²)", _number(1, 4, "predicted", "gravity_m_s2")),
     Column("Eₙ", _number(1, 2, "normalized_error")),
 )
-"""Of `summary`. Eₙ is the normalized error; within ±1 measurement and prediction agree."""
+"""Of `summary`. Unlike chains have a line each.
+
+Eₙ is the normalized error; within ±1 measurement and prediction agree.
+"""
 
 RUNS = (
     Column("run", _count("run")),

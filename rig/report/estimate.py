@@ -39,16 +39,19 @@ def parts(found: Mapping[str, Any]) -> Iterator[Part]:
             found["parameters"],
         )
     elif found.get("left_out"):
-        yield Part("Coefficients of the impacts", found["left_out"])
-    yield Part("Best single α", list(_tests(found)), _ALPHAS, _with_contact(found))
+        words = [f"{left}." for left in found["left_out"]]
+        yield Part("Coefficients of the impacts", words)
+    if "alpha" in found:
+        yield Part("Best single α", list(_tests(found)), _ALPHAS, _with_contact(found))
     if found.get("end_correction"):
         yield Part("End correction", [found["end_correction"]["sentence"]])
-    yield Part(
-        "Speed gained from each rod, measured and by Eq. 9",
-        [found["impulses"]["sentence"]],
-        _IMPULSES,
-        found["impulses"]["inclines"],
-    )
+    if "impulses" in found:
+        yield Part(
+            "Speed gained from each rod, measured and by Eq. 9",
+            [found["impulses"]["sentence"]],
+            _IMPULSES,
+            found["impulses"]["inclines"],
+        )
     if found.get("comparison"):
         yield Part(
             "The protocol's model",
@@ -57,30 +60,37 @@ def parts(found: Mapping[str, Any]) -> Iterator[Part]:
             found["comparison"],
         )
 
+    if found.get("failed"):
+        failed = [f"{one['section']}: {one['why']}." for one in found["failed"]]
+        yield Part("Could not be worked out", failed)
+
 
 def page_parts(found: Mapping[str, Any]) -> Iterator[Part]:
     """Yield the same for a page, with a record for each rod too, or rods known by their sum."""
     yield from parts(found)
     inclines = [
         {"quantity": one["quantity"], **line}
-        for one in found["comparison"]
+        for one in found.get("comparison", ())
         for line in one["inclines"]
     ]
     if inclines:
         yield Part("The protocol's model, incline by incline", (), _INCLINES, inclines)
     rods = [
-        {"incline_deg": line["incline_deg"], **group}
-        for line in found["impulses"]["inclines"]
+        {**line, **group}
+        for line in found.get("impulses", {}).get("inclines", ())
         for group in line["groups"]
     ]
-    yield Part("Single impulses", (), _RODS, rods, "Speed gained from each rod, from the bottom")
+    if rods:
+        heading = "Speed gained from each rod, from the bottom"
+        yield Part("Single impulses", (), _RODS, rods, heading)
 
 
 def _coefficient_words(found: Record) -> list[str]:
     words = [f"{left}." for left in found["left_out"]]
-    names, matrix = found["correlation"]["names"], found["correlation"]["matrix"]
+    names = found.get("correlation", {}).get("names", ())
+    matrix = found.get("correlation", {}).get("matrix", ())
     pairs = [
-        f"{SYMBOLS[one]} and {SYMBOLS[other]} {fixed(matrix[i][j], 2)}"
+        f"{_symbol(one)} and {_symbol(other)} {fixed(matrix[i][j], 2)}"
         for i, one in enumerate(names)
         for j, other in enumerate(names[:i])
     ]
@@ -100,6 +110,12 @@ def _coefficient_words(found: Record) -> list[str]:
     elif "drag_per_m" in found:
         words.append("Air drag is not fitted: it takes a free chain, and rods that are all alike.")
     return words
+
+
+def _symbol(name: str) -> str:
+    """Write a coefficient as its symbol; of given α's each has its chain's name."""
+    what, _, chain = name.partition(" ")
+    return SYMBOLS[what] + (f" of {chain}" if chain else "")
 
 
 def _tests(found: Record) -> Iterator[str]:
@@ -145,8 +161,10 @@ def _p(line: Record) -> str:
     return "" if line["p"] is None else f"{line['p']:.2g}"
 
 
+_STRIKES = Column("strikes", lambda line: str(line.get("impact_chain", "")), numeric=False)
+"""Which chain, where chains are unlike."""
 _COEFFICIENTS = (
-    Column("coefficient", lambda line: SYMBOLS[line["name"]], numeric=False),
+    Column("coefficient", lambda line: _symbol(line["name"]), numeric=False),
     Column("least squares ± U", lambda line: plus_minus(line["least_squares"])),
     Column("posterior, 95 %", _posterior),
     Column("protocol", _stated),
@@ -154,6 +172,7 @@ _COEFFICIENTS = (
 )
 _ALPHAS = (
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
+    _STRIKES,
     Column("n", lambda line: str(line["n"])),
     Column("α ± U", lambda line: plus_minus(line["alpha"])),
     Column("α by coefficients", lambda line: fixed(value_of(line.get("model")), 5)),
@@ -161,6 +180,7 @@ _ALPHAS = (
 )
 _IMPULSES = (
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
+    _STRIKES,
     Column("rods", lambda line: str(line["rods"])),
     Column("resolved", lambda line: str(line["resolved"])),
     Column("χ² of Eq. 9", lambda line: fixed(line["chi2"], 1)),
@@ -170,6 +190,7 @@ _IMPULSES = (
 _INCLINES = (
     Column("quantity", lambda line: _QUANTITIES[line["quantity"]], numeric=False),
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
+    _STRIKES,
     Column("n", lambda line: str(line["n"])),
     Column("measured less model (mm, mm/s)", lambda line: fixed(1e3 * line["difference"], 2)),
     Column("u", lambda line: fixed(1e3 * line["u"], 2)),
@@ -179,6 +200,7 @@ _INCLINES = (
 )
 _RODS = (
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
+    _STRIKES,
     Column("rod", lambda line: "–".join(map(str, dict.fromkeys(line["rods"])))),
     Column("ΔV ± U (m/s)", lambda line: plus_minus(line["gain_m_s"])),
     Column("Eq. 9 (m/s)", lambda line: fixed(line["eq9_m_s"], 5)),

@@ -26,7 +26,8 @@ def estimate_pictures(found: Mapping[str, Any]) -> dict[str, Picture]:
     found
         What ``rig estimate --json`` prints.
     """
-    drawn = {"alpha": _alpha(found), "impulses": _impulses(found), "curves": _curves(found)}
+    makers = {"alpha": _alpha, "impulses": _impulses, "curves": _curves}
+    drawn = {name: make(found) for name, make in makers.items() if name in found}
     names = (found.get("posterior") or {}).get("names", [])
     if {"restitution", "friction"} <= set(names):
         drawn["posterior"] = _posterior(found)

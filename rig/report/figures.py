@@ -269,18 +269,21 @@ def _free_fall_line(axes: Axes, speed: float | None) -> None:
     )
 
 
-def _references(summary: Sequence[Mapping[str, Any]]) -> tuple[dict[float, float], str]:
-    """Return what each inclination's runs are compared with, and the words for it."""
+def _references(
+    summary: Sequence[Mapping[str, Any]],
+) -> tuple[dict[tuple[float, str | None], float], str]:
+    """Return what runs are compared with, by incline and unlike chain, and the words for it."""
+
+    def case(line: Mapping[str, Any]) -> tuple[float, str | None]:
+        return float(line["incline_deg"]), line.get("impact_chain")
+
     predicted = {
-        float(line["incline_deg"]): value_of(nested(line, "predicted", "separation_m"))
-        for line in summary
+        case(line): value_of(nested(line, "predicted", "separation_m")) for line in summary
     }
     words = "model" if any(value is not None for value in predicted.values()) else "mean"
     if words == "mean":
-        predicted = {
-            float(line["incline_deg"]): value_of(line.get("separation_m")) for line in summary
-        }
-    return {incline: value for incline, value in predicted.items() if value is not None}, words
+        predicted = {case(line): value_of(line.get("separation_m")) for line in summary}
+    return {key: value for key, value in predicted.items() if value is not None}, words
 
 
 def _scaled(quantity: object, scale: float) -> float:

@@ -24,7 +24,7 @@ def run_points(
     runs: Sequence[Mapping[str, Any]],
     key: str,
     scale: float,
-    references: Mapping[float, float] | None = None,
+    references: Mapping[tuple[float, str | None], float] | None = None,
 ) -> None:
     """Plot a quantity of every run, a marker for each chain, a cross for runs that do not count."""
     chains = sorted({str(run.get("impact_chain") or "") for run in runs})
@@ -33,7 +33,10 @@ def run_points(
         value = value_of(run.get(key))
         reference = 0.0
         if references is not None:
-            found = references.get(float(run.get("incline_deg") or 0.0))
+            incline = float(run.get("incline_deg") or 0.0)
+            found = references.get(
+                (incline, run.get("impact_chain")), references.get((incline, None))
+            )
             value, reference = (None, 0.0) if found is None else (value, found)
         if value is None:
             continue

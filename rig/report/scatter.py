@@ -20,10 +20,10 @@ _QUANTITIES = {
     "speed_m_s": ("V (mm/s)", 1e3, 2),
     "gravity_m_s2": ("g (mm/s²)", 1e3, 2),
 }
-_HEADINGS = {"incline": "incline (°)", "n": "n", "quantity": "", "mean": "mean"}
-_HEADINGS |= {"SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "half-SD": "SD/2"}
+_HEADINGS = {"incline": "incline (°)", "strikes": "strikes", "n": "n", "quantity": ""}
+_HEADINGS |= {"mean": "mean", "SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "half-SD": "SD/2"}
 _COLUMNS = tuple(
-    Column(heading, itemgetter(key), numeric=key != "quantity")
+    Column(heading, itemgetter(key), numeric=key not in {"quantity", "strikes"})
     for key, heading in _HEADINGS.items()
 )
 
@@ -56,7 +56,8 @@ def _records(summary: Any) -> Iterator[Record]:
             values: dict[str, float | None] = {"mean": value_of(line[name])}
             values |= {kind: bar(line, name, kind) for kind in LABELS}
             yield {
-                "incline": fixed(line["incline_deg"], 0),
+                "incline": f"{line['incline_deg']:g}",
+                "strikes": str(line.get("impact_chain", "")),
                 "n": fixed(line["n"], 0),
                 "quantity": label,
                 **{

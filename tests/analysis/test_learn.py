@@ -8,16 +8,17 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from rig.analysis.components import STATED
+from rig.analysis.components import LEAST_SHARE, STATED
 from rig.analysis.learn import FEWEST
 from rig.analysis.lesson_json import lesson_json
 from rig.analysis.normal import STRAY, normal
 from rig.analysis.quantities import measurands
 from rig.analysis.refine import Budgets
 from rig.analysis.session import analyze
+from rig.model.chain import Chain
 from sim.dials import Dials
 from sim.lab import ChainLab
-from tests.analysis.drops import UNIFORM, case, true_value, with_dials, wrong_rods
+from tests.analysis.drops import FENCE, UNIFORM, case, true_value, with_dials, wrong_rods
 from tests.analysis.sessions import MILD, analysis, cases, lesson
 
 FOUR = (1, 2, 3, 4)
@@ -278,3 +279,37 @@ def test_simpler_scenes_learn_too(scene):
 def test_stated_components_are_what_a_drop_by_itself_takes():
     one = cases(FOUR)[0]
     assert one.analyze() == one.analyze(STATED)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_perfect_rig_is_learned_from_and_not_believed_without_end(seed):
+    """Nothing scatters: what is learned stays above a floor, and numbers stay numbers."""
+    drops = [case(FENCE, Dials.quiet(), seed=seed, run=run) for run in range(1, 11)]
+    found = analysis(drops)
+    assert found.lesson is not None
+    for name in STATED.__slots__:
+        least = LEAST_SHARE * getattr(STATED, name)
+        assert getattr(found.lesson.components, name) >= least * (1.0 - 1e-12), name
+    for result in found.runs:
+        gravity = result.quantities["gravity_m_s2"]
+        assert 0.0 < gravity.u < 0.01
+        assert abs(gravity.value - 9.81) < 4.0 * gravity.u
+
+
+def test_two_rods_have_too_few_impulses_to_learn_their_scatter_from():
+    """Each drop's one impulse is its α: no degree of freedom is left, and what is stated stands."""
+    rods = UNIFORM.chains["A"]
+    short = replace(
+        rods,
+        chain=Chain((1.0, 1.0), (0.0, 0.1)),
+        widths=rods.widths[:2],
+        diameters=rods.diameters[:2],
+    )
+    both = {"A": replace(short, name="A"), "B": replace(short, name="B")}
+    scene = replace(UNIFORM, chains=both, plan=replace(UNIFORM.plan, inclines=(40.0,)))
+    found = analysis([case(scene, MILD, run=run) for run in range(1, 9)])
+    assert found.lesson is not None
+    assert found.lesson.components.impulse == STATED.impulse
+    assert found.lesson.components.impulse_floor == STATED.impulse_floor
+    assert "impulse" not in found.lesson.degrees
+    assert all(result.learned for result in found.runs)

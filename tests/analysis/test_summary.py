@@ -36,8 +36,9 @@ def test_runs_that_scatter_tell_their_own_uncertainty():
     assert found.value == 3.0
     assert found.u == pytest.approx(math.sqrt(7 / 3 + 0.16), rel=1e-14)
     assert found.budget == pytest.approx({"runs": runs_part, "common": 0.4}, rel=1e-14)
-    # Welch–Satterthwaite (GUM G.4) with ν = 2 and ∞.
-    assert found.degrees == pytest.approx(2 * found.u**4 / runs_part**4, rel=1e-13)
+    # Welch–Satterthwaite (GUM G.4) with ν = 2, and the runs' own 500 of what is common.
+    share = runs_part**4 / 2 + 0.4**4 / 500
+    assert found.degrees == pytest.approx(found.u**4 / share, rel=1e-13)
     assert found.expanded == coverage_factor(found.degrees) * found.u
 
 
@@ -45,14 +46,20 @@ def test_runs_that_happen_to_agree_are_no_better_than_each_allows():
     found = mean([measured(x, own=3.0, common=4.0) for x in (10.0, 10.0, 10.3, 9.7)])
     assert found.value == pytest.approx(10.0)
     assert found.u == pytest.approx(math.hypot(3 / 2, 4), rel=1e-14)
-    assert found.degrees == math.inf
-    assert found.expanded == coverage_factor(math.inf) * found.u
+    # Nor are ten fences surer of how sure they are than one.
+    parts = (3 / 2) ** 4 / 500 + 4.0**4 / 500
+    assert found.degrees == pytest.approx(found.u**4 / parts, rel=1e-13)
+    few = mean([replace(measured(10.0, own=3.0), degrees=2.0)] * 10)
+    assert found.expanded == coverage_factor(found.degrees) * found.u
+    assert few.expanded == pytest.approx(4.302652729911275 * 3.0 / math.sqrt(10), rel=1e-9)
 
 
 def test_one_run_is_that_run():
-    one = measured(7.0, own=3.0, common=4.0)
+    one = replace(measured(7.0, own=3.0, common=4.0), degrees=3.0)
     found = mean([one])
-    assert (found.value, found.u, found.degrees) == (7.0, 5.0, math.inf)
+    assert (found.value, found.u, found.degrees) == (7.0, 5.0, 3.0)
+    assert found.json() == one.json()
+    assert found.budget == pytest.approx({"runs": 3.0, "common": 4.0})
 
 
 def test_two_runs_that_disagree_have_one_degree_of_freedom():
@@ -169,8 +176,19 @@ def test_top_rods_of_unlike_chains_start_apart():
     assert set(by_chain) == {"A", "B"}
     assert by_chain["A"] == pytest.approx(REFERENCE[40.0][0] + 0.2 * 1.165, rel=1e-12)
     assert by_chain["B"] < 0.0
-    (both,) = summarize(protocol, drops)
-    assert both.predicted["separation_m"].value == pytest.approx(sum(by_chain.values()) / 2)
+    # Together they stay two results: one mean of both would be of nothing that fell.
+    lines = summarize(protocol, drops)
+    assert [line.json()["impact_chain"] for line in lines] == ["A", "B"]
+    assert {line.impact_chain: line.predicted["separation_m"].value for line in lines} == by_chain
+
+
+def test_like_chains_make_one_result():
+    """B differs in what no result depends on."""
+    b = replace(UNIFORM.chains["A"], name="B", position_u=0.001)
+    protocol = replace(UNIFORM, chains={**UNIFORM.chains, "B": b})
+    (line,) = summarize(protocol, results(protocol, {40.0: [0.1, 0.1]}))
+    assert line.n == 2
+    assert "impact_chain" not in line.json()
 
 
 def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
@@ -184,5 +202,5 @@ def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
     )
     (line,) = summarize(FENCE, [bars])
     assert line.predicted == {"gravity_m_s2": FENCE.gravity}
-    z = 1.959963984540054
-    assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (z * 0.01), rel=2e-6)
+    t = 1.964719837  # of 500 degrees of freedom
+    assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (t * 0.01), rel=1e-6)

@@ -9,15 +9,16 @@ import pytest
 
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
-from rig.errors import InputError
+from rig.errors import InputError, RigError
 from rig.estimate.coefficients import best, scene
 from rig.estimate.forms import merged
 from rig.estimate.hypotheses import one_alpha
 from rig.estimate.joint import fit
-from rig.estimate.posterior import posterior
-from rig.estimate.session import estimate
+from rig.estimate.posterior import Posterior, _nodes, posterior
+from rig.estimate.session import _section, estimate
 from rig.model.impact import alpha_inclined
 from rig.protocol.plan import runs
+from rig.report.estimate import estimate_text
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
@@ -237,3 +238,79 @@ def test_inclines_outside_the_model_tell_no_coefficient():
     # With level ground, which has no friction, one incline is enough.
     assert parameter(found, "friction")["identified"]
     assert parameter(found, "restitution")["identified"]
+
+
+def test_what_is_exact_and_not_told_leaves_the_fit():
+    """One incline leaves μ open, and the protocol gives it no ±: it is no parameter at all."""
+    exact = replace(UNIFORM, surface=replace(UNIFORM.surface, friction=Quantity(0.2)))
+    found = estimate(exact, analysis((50.0,), 4))
+    assert [one["name"] for one in found["parameters"]] == ["restitution"]
+    assert any("friction is not identified" in said for said in found["left_out"])
+    measured = parameter(found, "restitution")
+    # Nothing else pulls at β, so that its posterior is the edges' and its prior's alone.
+    edges, prior = measured["least_squares"], measured["stated"]
+    both = (edges["u"] ** -2 + prior["u"] ** -2) ** -0.5
+    assert measured["posterior"]["u"] == pytest.approx(both, rel=1e-3)
+    # Exactly the same β comes out of a fit in which μ is held as hard as numbers allow.
+    held = replace(UNIFORM, surface=replace(UNIFORM.surface, friction=Quantity(0.2, 1e-7)))
+    other = parameter(estimate(held, analysis((50.0,), 4)), "restitution")["least_squares"]
+    assert edges["value"] == pytest.approx(other["value"], rel=1e-6)
+    assert edges["u"] == pytest.approx(other["u"], rel=1e-4)
+
+
+def test_a_quantile_of_a_distribution_narrower_than_floats_ends():
+    narrow = Posterior(("x",), np.ones(1), np.array([[0.5]]), np.array([[1e-17]]))
+    assert narrow.quantile("x", 0.975) == pytest.approx(0.5, abs=1e-15)
+
+
+def test_nodes_of_friction_stay_above_zero_and_in_order():
+    nodes = _nodes(-3.0, 0.1)
+    assert nodes[0] == 0.0
+    assert (np.diff(nodes) > 0.0).all()
+
+
+def first_four(protocol, inclines):
+    """Numbers of four runs at each incline, A, B, B, A."""
+    at = {
+        incline: [r.number for r in runs(protocol) if r.incline_deg == incline]
+        for incline in inclines
+    }
+    return [number for numbers in at.values() for number in numbers[:4]]
+
+
+@pytest.mark.parametrize("stated", [0.0, 0.02])
+def test_chains_with_an_alpha_of_their_own_are_told_apart(stated):
+    """A by the surface and B given; then both given, and neither is the mean of the two."""
+    a, b = UNIFORM.chains["A"], UNIFORM.chains["B"]
+    given = replace(b, chain=replace(b.chain, alpha=Quantity(0.25, stated)))
+    one = replace(UNIFORM, chains={"A": a, "B": given})
+    found = estimate(one, dropped(one, first_four(one, SURFACE)))
+    assert "failed" not in found
+    assert {line["name"] for line in found["parameters"]} == {"alpha", "restitution", "friction"}
+    alpha = parameter(found, "alpha")["least_squares"]
+    assert abs(alpha["value"] - 0.25) < 4 * alpha["u"]
+    for name in ("alpha", "impulses"):
+        struck = [(line["incline_deg"], line["impact_chain"]) for line in found[name]["inclines"]]
+        assert struck == [(incline, chain) for incline in SURFACE for chain in "AB"]
+    other = replace(a, chain=replace(a.chain, alpha=Quantity(0.15, stated)))
+    two = replace(UNIFORM, chains={"A": other, "B": given})
+    both = estimate(two, dropped(two, first_four(two, (50.0,))))
+    for name, truth in (("alpha A", 0.15), ("alpha B", 0.25)):
+        measured = parameter(both, name)["least_squares"]
+        assert abs(measured["value"] - truth) < 4 * measured["u"] < 0.02
+    assert "α of A" in estimate_text({"simulated": True} | both)
+
+
+def test_a_section_that_cannot_be_worked_out_leaves_the_others():
+    said = {"drops": 4, "edges": 96}
+    with _section(said, "end correction"):
+        raise RigError("the fit does not settle", "look at the drops")
+    with _section(said, "curves"):
+        said["curves"] = [1 / 0]
+    with _section(said, "alpha"):
+        said["tests"] = {}
+    assert said["failed"] == [
+        {"section": "end correction", "why": "the fit does not settle"},
+        {"section": "curves", "why": "ZeroDivisionError: division by zero"},
+    ]
+    assert "end correction: the fit does not settle." in estimate_text(said)
