@@ -5,7 +5,7 @@ often as it likes. Lines on stdin do what hands do at a rig: ``reset``, ``pull S
 cable, and put it in again, perhaps elsewhere), ``mute 1`` (the wire towards the host), ``mute 0``,
 ``mute fall`` (while chains fall), ``block MASK`` (beams), ``stop 1``, ``stop 0``; the end of stdin
 ends it. The log gets a line of JSON for every drop as the board holds it, and for every change of
-phase or outputs: seen `at_s`, and not yet at `after_s`; `gap_s` is the longest time between two
+phase or outputs: true by `at_s`, and not yet at `after_s`; `gap_s` is the longest time between two
 looks since the last line, by which the board may have heard too late.
 """
 
@@ -103,7 +103,7 @@ class Bench:
         self._mute = "0"
         self._begun_ns = time.monotonic_ns()
         self._seen: tuple[int, int] = (0, 0)
-        self._looked_s = time.monotonic()
+        self._looked_s = time.monotonic()  # when the last look began
         self._gap_s = 0.0  # between two looks, the longest since the last line of the log
         self.plug()
 
@@ -143,8 +143,9 @@ class Bench:
                     self._obey(line.decode().split())
             if self._ends is None and time.monotonic() >= self._plug_at:
                 self.plug()
+            begun_s = time.monotonic()
             self._pass_bytes()
-            self._note()
+            self._note(begun_s)
 
     def close(self) -> None:
         """Hang up."""
@@ -186,9 +187,10 @@ class Bench:
             while data:
                 data = data[os.write(far, data) :]
 
-    def _note(self) -> None:
-        before_s, self._looked_s = self._looked_s, time.monotonic()
-        self._gap_s = max(self._gap_s, self._looked_s - before_s)
+    def _note(self, begun_s: float) -> None:
+        # The board's time stood between the two: a busy machine may let long pass in between.
+        before_s, now_s, self._looked_s = self._looked_s, time.monotonic(), begun_s
+        self._gap_s = max(self._gap_s, now_s - before_s)
         seen = (int(self.board.phase()), self.board.outputs())
         if seen == self._seen:
             return
@@ -197,7 +199,7 @@ class Bench:
             drop, events = self.board.held()
             self._write({"drop": drop, "events": events})
         self._seen = seen
-        when = {"at_s": self._looked_s, "after_s": before_s, "gap_s": self._gap_s}
+        when = {"at_s": now_s, "after_s": before_s, "gap_s": self._gap_s}
         self._write(when | {"phase": seen[0], "outputs": seen[1]})
         self._gap_s = 0.0
 

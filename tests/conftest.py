@@ -5,11 +5,22 @@ from __future__ import annotations
 import os
 
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 # As the `rig` command does, before numpy is loaded: with several threads a sum's last digits
 # depend on how busy the machine is, and replays are compared to the last digit.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# `./run test` says the same every time: the same examples, and none that an earlier run has left.
+# To look for new ones is for `./run bench search`, which keeps what it finds under .hypothesis/.
 # A busy machine is no fault of the code: no example is timed.
-settings.register_profile("rig", deadline=None)
-settings.load_profile("rig")
+settings.register_profile("same", derandomize=True, database=None, deadline=None)
+settings.register_profile("search", max_examples=2000, deadline=None)
+settings.load_profile("same")
+
+
+def pytest_configure() -> None:
+    # Hypothesis also tries numbers that stand in the project's modules, those loaded so far: what
+    # they are depends on which tests ran before in this process.
+    if settings().derandomize:
+        providers._get_local_constants = providers.Constants

@@ -101,8 +101,10 @@ def _leg(
 ) -> float:
     """Time in which the chain comes down by `distance`, by Newton's method from above.
 
-    The way fallen is a convex function of time, so from a time that is too long the method comes
-    down to the root and never jumps over it.
+    The way fallen, s, is a convex function of time, so from a time that is too long the method
+    comes down to the root and never jumps over it. With s' t − s summed up by itself, which has
+    no negative part, a step t ← (d + s' t − s)/s' keeps all digits however far it goes; where the
+    pull is many times the speed, t − (s − d)/s' would lose as many as it comes down by.
     """
     if distance == 0.0:
         return 0.0
@@ -113,13 +115,12 @@ def _leg(
     for _ in range(_STEPS):
         x = duration / tau
         one, two = _ramp(x)
-        fallen = (speed + 0.5 * gravity * duration) * duration + tau * (first * one + second * two)
-        one, two = _risen(x, one, two)
-        grown = first * one + second * two
-        step = (fallen - distance) / (speed + gravity * duration + grown)
-        if not step > 1e-17 * duration:
+        risen, other = _risen(x, one, two)
+        ahead = 0.5 * gravity * duration**2 + tau * (first * _left(x, one, risen) + second * risen)
+        later = (distance + ahead) / (speed + gravity * duration + first * risen + second * other)
+        if not later < duration:
             break
-        duration -= step
+        duration = later
     return duration
 
 
@@ -149,3 +150,13 @@ def _risen(x: float, one: float, two: float) -> tuple[float, float]:
     if x > _SERIES:
         return -math.expm1(-x) - x * math.exp(-x), -math.expm1(-x)
     return two - one, -math.expm1(-x)
+
+
+def _left(x: float, one: float, risen: float) -> float:
+    """Product of x and speed less the way, of the first stage: 2 − (2 + 2x + x²)e⁻ˣ.
+
+    Of the second stage it is the speed gained by the first.
+    """
+    if x > _SERIES:
+        return 2.0 - (2.0 + (2.0 + x) * x) * math.exp(-x)
+    return x * risen - one

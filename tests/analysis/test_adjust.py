@@ -7,13 +7,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.analysis.adjust import DONE, adjust, uncertainty
 from rig.analysis.equations import Equations, Residuals
 from tests.analysis.drops import SCENES, case
+from tests.examples import examples
 
 HUBER = 4.0
 GROUPS = {"place": [slice(0, 2)], "edges": [slice(2, 3)], "rest": [slice(3, 5)]}
@@ -142,7 +143,7 @@ def test_edges_that_scatter_more_count_less(factor):
     assert u == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-9)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.integers(0, 10**6), st.tuples(*[st.floats(-3, 3)] * 5))
 def test_squares_of_the_parts_add_up(seed, gradient):
     found = adjust(Linear(seed), ALL, np.zeros(5))

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.align import EXTRA, MISSED, align
@@ -15,6 +15,7 @@ from rig.analysis.trains import Side, Train
 from rig.analysis.trajectory import free_trajectory
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
+from tests.examples import examples
 
 GRAVITY = 9.81
 START = 0.5
@@ -75,7 +76,7 @@ def cheapest(observed, expected) -> float:
     return rest(0, 0)
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(gates)
 def test_no_matching_is_cheaper(drawn):
     built = [build(number, *one) for number, one in enumerate(drawn)]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.pattern import ALPHAS
@@ -15,6 +15,7 @@ from rig.model.impact import impact_on
 from rig.records import Edge
 from sim.dials import Dials
 from tests.analysis.drops import FENCE, HZ, SCENES, UNIFORM, Case, case
+from tests.examples import examples
 
 DELAY = 0.020
 KNOWN = Dials(delay=DELAY, delay_sd=0.0)  # so that the truth knows the release times
@@ -94,7 +95,7 @@ def test_a_pile_of_edges_looks_like_no_chain(share, seed):
     assert any("does not look like this chain falling" in reason for reason in result.reasons)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     st.sampled_from([RECORD, case(FENCE, Dials.quiet())]),
     st.lists(st.tuples(st.integers(-HZ, 3 * HZ), st.integers(0, 15), st.booleans()), max_size=25),

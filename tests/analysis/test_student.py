@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 from rig.analysis.student import coverage_factor
+from tests.examples import examples
 
 EPS = 2.0**-53
 
@@ -40,7 +41,7 @@ def test_the_factor_covers_what_it_says(degrees, probability):
     assert_covers(degrees, probability)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.floats(0, 5).map(lambda exponent: 10.0**exponent))
 def test_any_real_number_of_degrees(degrees):
     assert_covers(degrees, 0.95)

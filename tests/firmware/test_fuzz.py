@@ -6,10 +6,11 @@ import struct
 import subprocess
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
+from tests.examples import examples
 from tests.firmware.toolchain import FIRMWARE, make
 
 
@@ -66,7 +67,7 @@ steps = st.one_of(
 )
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(st.lists(steps, max_size=60).map(b"".join))
 def test_no_input_breaks_the_core_or_holds_the_release(survivor, script):
     assert survivor(script) >= 0

@@ -5,12 +5,13 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.link.epochs import epochs
 from rig.link.samples import TICK
 from rig.records import Ping
+from tests.examples import examples
 from tests.link.clocks import HZ, Clock, compared
 
 WRAP_S = 2**32 / HZ
@@ -31,7 +32,7 @@ def test_two_hours_are_27_wraps_and_no_epoch():
     assert all(a % 2**32 == b.tick for a, b in zip(ticks, pings, strict=True))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     gap=st.floats(1e-3, 17_000.0),
     off=st.floats(-0.0055, 0.0055),
@@ -54,7 +55,7 @@ def test_a_restart_begins_an_epoch_whether_it_was_told_or_shows():
     assert [len(p) for p in epochs(one + same, HZ, [25 * 10**9]).pings] == [len(one), len(same)]
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(when=st.floats(21.0, 590.0), late=st.floats(0.0, 0.9))
 def test_a_tick_finds_its_place_from_about_when_it_was(when, late):
     clock = Clock(7, last=700)

@@ -6,12 +6,13 @@ import random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
 from rig.link.rate import tick_rate
 from rig.records import Ping
+from tests.examples import examples
 from tests.link.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
 
 TRIALS = 300
@@ -111,7 +112,7 @@ SAMPLES = compared(Clock(4, last=100), 4, 50.0)
 RATE = tick_rate(SAMPLES, HZ)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(
     shift=st.integers(-(10**16), 10**17),
     offset=st.integers(0, 2**32 - 1),

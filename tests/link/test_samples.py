@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from bisect import bisect_left
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.link.epochs import epochs
 from rig.link.hosttime import one_axis
 from rig.link.samples import samples
 from rig.records import HostBreak, Ping
+from tests.examples import examples
 from tests.link.clocks import HZ
 
 WRAP = 2**32
@@ -84,7 +85,7 @@ def axis_one_by_one(pings, breaks):
     return found, lives
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(conversations())
 def test_epochs_are_those_of_one_sample_after_the_other(drawn):
     pings, cuts, _ = drawn
@@ -92,7 +93,7 @@ def test_epochs_are_those_of_one_sample_after_the_other(drawn):
     assert found == epochs_one_by_one(pings, cuts)
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(conversations())
 def test_the_axis_is_that_of_one_sample_after_the_other(drawn):
     pings, boots, breaks = drawn

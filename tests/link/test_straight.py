@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
@@ -13,6 +13,7 @@ from rig.link.assembly import Assembly
 from rig.link.frames import PAYLOAD_LIMIT, FrameError, cobs_decode
 from rig.link.records import Event, Events
 from rig.link.wiretypes import EVENTS, read_field
+from tests.examples import examples
 from tests.link.strategies import LONG, MESSAGES
 
 STATES = st.integers(0, 2**16 - 1) | st.integers(0, 3)
@@ -36,7 +37,7 @@ def unstuffed(data: bytes) -> bytes | None:
     return bytes(out)
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(
     st.binary(max_size=40)
     | st.lists(st.integers(1, 5) | st.integers(250, 255), max_size=20).map(bytes)
@@ -62,7 +63,7 @@ def field_by_field(code: int, payload: bytes) -> list | None:
     return values if at == len(payload) else None
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(
     MESSAGES.map(wire.pack)
     | st.tuples(st.sampled_from(list(wire.TABLE)), st.binary(max_size=PAYLOAD_LIMIT))
@@ -124,7 +125,7 @@ def gaps_one_by_one(known, begin, total, at_most):
     return found
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.data())
 def test_a_drop_is_put_together_as_from_single_events(data):
     drop, known = Assembly(wire.pack_label(1, 1)), {}

@@ -8,7 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import DomainError
@@ -19,6 +19,7 @@ from rig.model.fall import fall
 from rig.model.impact import impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
+from tests.examples import examples
 from tests.model.chains import (
     ALPHAS,
     DROPS,
@@ -51,7 +52,7 @@ def falls_of(chain, rows):
     return falls(chain.masses, chain.heights, given_impacts(alpha, gamma), drop, gravity, speed)
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(chains(), ONE_OR_MANY)
 def test_one_chain_falls_as_it_does_alone(chain, rows):
     found = falls_of(chain, rows)
@@ -59,7 +60,7 @@ def test_one_chain_falls_as_it_does_alone(chain, rows):
     assert ends(found) == [end(chain, *row) for row in rows]
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(st.data())
 def test_every_fall_may_have_its_own_chain(data):
     rods = data.draw(st.integers(2, 8))
@@ -83,7 +84,7 @@ def test_every_fall_may_have_its_own_chain(data):
     assert ends(found) == [end(c, *row) for c, row in zip(same, rows, strict=True)]
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(most=4), st.floats(-120, 120), st.lists(
     st.tuples(ALPHAS, GAMMAS, st.one_of(st.just(0.0), decades(-120, 120)), decades(-150, 150),
               st.one_of(st.just(0.0), decades(-120, 120))), min_size=1, max_size=4))  # fmt: skip
@@ -197,7 +198,7 @@ def weight_of_a_digit(theta_deg, mu, xi, xi_z):
     return (cos + free * (sin + mu * cos)) / abs(cos + free * (sin - mu * cos))
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(st.lists(SURFACES, min_size=1, max_size=6), st.booleans(), st.booleans())
 def test_impacts_are_those_of_one_surface(rows, own_z, piled):
     pile = Pile(20.0, Quantity(-0.37)) if piled else None

@@ -8,7 +8,7 @@ from statistics import StatisticsError, stdev
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.model.camera import FRAME_RATE_HZ, SPEED_FRAMES, film, frame_times, read_frames
@@ -16,6 +16,7 @@ from rig.model.chain import Chain
 from rig.model.fall import free_fall_speed, kicks
 from rig.model.impact import alpha_inclined, gamma_finite
 from rig.model.motion import Motion
+from tests.examples import examples
 from tests.model.chains import even_chain
 
 FRAME = 1.0 / 480.0
@@ -74,7 +75,7 @@ def test_a_straight_line_gives_the_exact_speed(speed, separation, phase, rate):
     assert reading.separation_m == pytest.approx(1.0 + separation - speed * phase / rate, abs=1e-13)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(SPEEDS, st.floats(-1.0, 1.0), st.floats(0.01, 0.2))
 def test_a_film_of_straight_lines(speed, parting, separation):
     """V is exact and does not scatter; Δz is half a frame's parting low, spread evenly over one."""
@@ -92,7 +93,7 @@ def test_a_film_of_straight_lines(speed, parting, separation):
     assert seen.separation_bar == pytest.approx(steps / 2, abs=1e-13)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.lists(st.floats(-0.1, 0.1), min_size=4, max_size=4), st.floats(0.0, 1.0))
 def test_the_line_is_that_of_least_squares(heights, phase):
     times = frame_times(0.5, phase)

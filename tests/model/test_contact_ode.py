@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import DomainError, RigError
@@ -21,6 +21,7 @@ from rig.model.contact_ode import (
     integrate_contact,
 )
 from rig.model.fall import fall, kicks
+from tests.examples import examples
 from tests.model.chains import close, decades, even_chain
 
 MODEL = Path(__file__).parents[2] / "rig" / "model"
@@ -135,7 +136,7 @@ def test_without_pulls_it_is_free_fall(method):
     assert close(found.fall.time_s, wanted.time_s, 1e-14)
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(decades(-9, -1), decades(-9, 0), st.floats(1e-3, 2.0), st.floats(0.1, 5.0))
 def test_random_pulls_by_lsoda(tau, alpha, drop, speed):
     chain = Chain((3.0, 2.0, 1.0, 1.0), (0.0, 0.2, 0.25, 0.9))

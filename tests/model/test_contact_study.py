@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -21,6 +21,7 @@ from rig.model.contact_study import (
 )
 from rig.model.fall import fall, free_fall_speed, kicks
 from rig.model.impact import alpha_inclined
+from tests.examples import examples
 from tests.model.chains import (
     ALPHAS,
     DROPS,
@@ -56,7 +57,7 @@ def change(measurand, tau, incline_deg=40.0):
     return getattr(end, name) / getattr(instant, name) - 1.0
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_the_discrete_fall_from_gains(chain, alpha, gamma, drop, gravity, speed):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -100,7 +101,7 @@ def test_the_order_is_another_once_they_are_not():
     assert abs(overlapping.speed - 1.0) > 0.1
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(decades(-12, 3), decades(-12, 3), decades(-9, -1), st.floats(-3.0, 3.0), st.floats(1.1, 9.0))
 def test_orders_of_known_powers(separation, speed, tau, power, ratio):
     found = [

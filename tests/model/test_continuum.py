@@ -6,12 +6,13 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.errors import DomainError
 from rig.model.continuum import UniformChain, end, end_tanh_sinh, speed
+from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 from tests.model.continuum_reference import closed_end, printed_end, printed_squared_speed
 
@@ -59,14 +60,14 @@ def test_agrees_with_the_printed_equations_in_50_digits(case):
                 assert abs(printed / closed - 1) < mp.mpf(10) ** -25
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, SPEEDS)
 def test_agrees_with_the_closed_form(length, reach, alpha, drop, gravity, initial_speed):
     case = (length, reach, alpha, drop, gravity, initial_speed)
     check(end(chain_of(*case)), closed_end(*case), TIGHT)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(decades(-3, 3), REACHES, ALPHAS, st.sampled_from([0.0, 1e-3, 1.0, 1e6]), GRAVITIES)
 def test_a_second_rule_agrees_without_the_substitution(length, reach, alpha, share, gravity):
     chain = chain_of(length, reach, alpha, share * length, gravity)
@@ -76,7 +77,7 @@ def test_a_second_rule_agrees_without_the_substitution(length, reach, alpha, sha
     assert one.speed_m_s == other.speed_m_s
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(
     decades(-3, 3), decades(-15, 6), ALPHAS, DROPS, GRAVITIES, SPEEDS, st.floats(0.0, 1.0)
 )  # fmt: skip
@@ -96,7 +97,7 @@ def test_above_the_surface_the_chain_falls_freely():
     assert speed(chain, 2.0) == chain.strike_speed == 13.0
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, GRAVITIES)
 def test_separation_does_not_depend_on_gravity(length, reach, alpha, drop, here, there):
     one, other = (end(chain_of(length, reach, alpha, drop, g)) for g in (here, there))
@@ -106,7 +107,7 @@ def test_separation_does_not_depend_on_gravity(length, reach, alpha, drop, here,
     assert close(one.time_s, other.time_s * root, TIGHT)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, SPEEDS, st.integers(-15, 15))
 def test_a_larger_scene_is_the_same_scene(length, reach, alpha, drop, gravity, start, n):
     """All lengths by 4^n and speeds by 2^n: Δz by 4^n, t by 2^n, to the last bit."""
@@ -120,7 +121,7 @@ def test_a_larger_scene_is_the_same_scene(length, reach, alpha, drop, gravity, s
     assert other.time_s == one.time_s * root
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(decades(-3, 3), REACHES, ALPHAS, decades(-6, 3), GRAVITIES, st.floats(0.0, 1.0))
 def test_the_drop_can_be_cut_in_two(length, reach, alpha, drop, gravity, share):
     lower = drop * share
@@ -132,7 +133,7 @@ def test_the_drop_can_be_cut_in_two(length, reach, alpha, drop, gravity, share):
     assert close(rest.time_s + passing / gravity, whole.time_s, TIGHT)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(decades(-3, 3), REACHES, ALPHAS, DROPS, GRAVITIES, SPEEDS, decades(-3, 1))
 def test_a_stronger_pull_is_never_slower(length, reach, alpha, drop, gravity, start, more):
     weak = end(chain_of(length, reach, alpha, drop, gravity, start))

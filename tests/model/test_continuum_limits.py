@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -17,6 +17,7 @@ from rig.model.continuum import (
     separation_leading_order,
     speed,
 )
+from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 
 LENGTHS = decades(-3, 3)
@@ -39,7 +40,7 @@ def printed_s17(alpha, length, reach):
         return float((a / (1 + a) - rho * braces / (1 + a)) * mp.mpf(length))
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(ALPHAS, LENGTHS, RATIOS)
 def test_equation_15_keeps_its_digits(alpha, length, ratio):
     reach = ratio * length
@@ -47,7 +48,7 @@ def test_equation_15_keeps_its_digits(alpha, length, ratio):
     assert close(found, printed_15(alpha, length, reach), 1e-14)
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(ALPHAS, LENGTHS, RATIOS)
 def test_equation_s17_keeps_its_digits(alpha, length, ratio):
     reach = ratio * length
@@ -64,7 +65,7 @@ def test_limits_of_the_limits():
     assert separation_fast(0.1, 1.0, 1e9) == pytest.approx(0.1 / 2e9, rel=1e-8)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(LENGTHS, st.one_of(st.just(0.0), RATIOS), GRAVITIES)
 def test_small_alpha_from_rest_is_equation_15(length, ratio, gravity):
     reach = ratio * length
@@ -73,7 +74,7 @@ def test_small_alpha_from_rest_is_equation_15(length, ratio, gravity):
         assert close(found, separation_leading_order(alpha, length, reach), 1e-13)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(LENGTHS, RATIOS, ALPHAS, decades(-3, 3), st.sampled_from([0.0, 0.18]))
 def test_without_gravity_it_is_equation_s17(length, ratio, alpha, start, drop):
     reach = ratio * length
@@ -87,7 +88,7 @@ def test_without_gravity_it_is_equation_s17(length, ratio, alpha, start, drop):
     assert found.time_s == pytest.approx(found.lay_down_s + drop / start, rel=1e-14)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(LENGTHS, RATIOS, ALPHAS, decades(16, 30), GRAVITIES)
 def test_a_very_high_drop_is_equation_s17(length, ratio, alpha, drop, gravity):
     reach = ratio * length
@@ -95,7 +96,7 @@ def test_a_very_high_drop_is_equation_s17(length, ratio, alpha, drop, gravity):
     assert close(found.separation_m, separation_fast(alpha, length, reach), 1e-13)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(LENGTHS, st.one_of(st.just(0.0), RATIOS), decades(-9, 6), GRAVITIES)
 def test_without_pull_it_is_free_fall(length, ratio, drop, gravity):
     found = end(UniformChain(length, ratio * length, 0.0, 1.0, drop, gravity))
@@ -104,7 +105,7 @@ def test_without_pull_it_is_free_fall(length, ratio, drop, gravity):
     assert close(found.time_s, math.sqrt(2 * (drop + length) / gravity), 1e-13)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(LENGTHS, ALPHAS, st.one_of(st.just(0.0), decades(-6, 3)), GRAVITIES)
 def test_without_an_end_effect_the_end_is_infinitely_fast(length, alpha, drop, gravity):
     """The speed diverges as γs → 0, but Δz and t do not: they settle."""

@@ -7,12 +7,13 @@ from fractions import Fraction
 from itertools import accumulate, pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.errors import DomainError
 from rig.model.density import Exponential, Tabulated, Uniform, pull
+from tests.examples import examples
 from tests.model.chains import close, decades
 
 SHARES = st.one_of(st.just(0.0), decades(-15, 0), st.just(1.0))
@@ -26,7 +27,7 @@ def test_an_even_density_has_its_length_above(length, share, reach):
     assert Exponential(length, 0.0).mass_over_density(z) == z
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(
     decades(-3, 3),
     SHARES,
@@ -69,7 +70,7 @@ def exact_mass_over_density(table, z):
     raise AssertionError
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(tables(), SHARES)
 def test_a_table_is_joined_by_straight_lines(table, share):
     z = share * table.length_m

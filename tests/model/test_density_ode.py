@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -17,6 +17,7 @@ from rig.model import continuum, density_ode
 from rig.model.chain import Chain
 from rig.model.density import Exponential, Tabulated, Uniform
 from rig.model.fall import fall
+from tests.examples import examples
 from tests.model.chains import close, decades
 
 LENGTH, GRAVITY = 1.165, 9.81
@@ -34,7 +35,7 @@ def check(found, wanted, relative):
     assert close(found.time_s, wanted.time_s, relative)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     decades(-12, 0).filter(lambda alpha: alpha <= 0.5),
     decades(-9, 3),
@@ -156,7 +157,7 @@ def test_a_kinked_density_without_gravity():
     assert close(found.speed_m_s, float(wanted), TIGHT)
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(st.floats(-5.0, 15.0), decades(-3, 1), st.one_of(st.just(0.0), decades(-6, 2)))
 def test_separation_does_not_depend_on_gravity(powers, reach, drop):
     density = Exponential(LENGTH, powers)
@@ -165,7 +166,7 @@ def test_separation_does_not_depend_on_gravity(powers, reach, drop):
     assert close(here.speed_m_s / there.speed_m_s, math.sqrt(9.81 / 1.62), TIGHT)
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(st.floats(-5.0, 10.0), decades(-3, 1), st.one_of(st.just(0.0), decades(-6, 2)))
 def test_a_bottom_heavy_chain_gains_more(powers, reach, drop):
     flat, steep = (ode(Exponential(LENGTH, p), 0.2, reach, drop) for p in (powers, powers + 1.0))

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -25,6 +25,7 @@ from rig.model.drag import (
     terminal_speed,
 )
 from rig.model.fall import fall, hits, kicks
+from tests.examples import examples
 from tests.model.chains import (
     ALPHAS,
     DROPS,
@@ -76,7 +77,7 @@ def tolerance(kappa, distance):
     return 2e-15 * (1.0 + kappa * distance)
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(DISTANCES, SPEEDS, GRAVITIES, KAPPAS)
 def test_a_leg_against_many_digits(distance, speed, gravity, kappa):
     with mp.workdps(120):
@@ -86,7 +87,7 @@ def test_a_leg_against_many_digits(distance, speed, gravity, kappa):
         assert close(duration, wanted[1], tolerance(kappa, distance))
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(DISTANCES, GRAVITIES, decades(-6, 2), st.floats(-17, 0), st.sampled_from([-1, 1]))
 def test_a_leg_at_about_the_terminal_speed(distance, gravity, kappa, off, side):
     speed = terminal_speed(gravity, kappa) * (1.0 + side * 10.0**off)
@@ -111,7 +112,7 @@ def test_a_leg_against_quadrature(kappa, speed):
     assert close(distance, way, 1e-12)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(DISTANCES, decades(-3, 3), decades(-6, 2))
 def test_without_gravity_speed_dies_away(distance, speed, kappa):
     assume(kappa * distance < 300)
@@ -125,7 +126,7 @@ def test_without_gravity_speed_dies_away(distance, speed, kappa):
     assert close(faint[1], duration, 1e-14 * (1 + x))
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(GRAVITIES, decades(-3, 2), st.one_of(st.just(0.0), decades(-3, 4)))
 def test_every_long_leg_ends_at_the_terminal_speed(gravity, kappa, share):
     terminal = terminal_speed(gravity, kappa)
@@ -152,7 +153,7 @@ def test_without_gravity_a_leg_may_have_no_end(speed, kappa):
     assert drag_leg(0.0, speed, 0.0, kappa) == (speed, 0.0)
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(decades(-4, 3), SPEEDS, GRAVITIES, KAPPAS)
 def test_free_motion_against_many_digits(time, speed, gravity, kappa):
     assume(math.sqrt(kappa * gravity) * time < 1e5)
@@ -165,7 +166,7 @@ def test_free_motion_against_many_digits(time, speed, gravity, kappa):
         assert close(falling_speed(time, gravity, kappa, speed), wanted, 3e-15)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(decades(-4, 3), SPEEDS, GRAVITIES)
 def test_free_motion_without_drag(time, speed, gravity):
     way = Fraction(time) * (Fraction(speed) + Fraction(gravity) * Fraction(time) / 2)
@@ -173,7 +174,7 @@ def test_free_motion_without_drag(time, speed, gravity):
     assert close(falling_speed(time, gravity, 0.0, speed), speed + gravity * time, 1e-15)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_without_drag_it_is_the_plain_fall_to_the_last_bit(
     chain, alpha, gamma, drop, gravity, speed
@@ -188,7 +189,7 @@ def test_without_drag_it_is_the_plain_fall_to_the_last_bit(
     )
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(chains(most=8), ALPHAS, GAMMAS, DROPS, decades(-2, 2), SPEEDS, AIR)
 def test_like_drag_keeps_every_digit_of_the_separation(
     chain, alpha, gamma, drop, gravity, speed, kappa
@@ -209,7 +210,7 @@ def test_like_drag_keeps_every_digit_of_the_separation(
         assert close(end.time_s, wanted[2], many)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(chains(most=8, mass_decades=2), ALPHAS, GAMMAS, DROPS, decades(-2, 2), SPEEDS, st.data())
 def test_unlike_drag_costs_last_places_of_the_way(chain, alpha, gamma, drop, gravity, speed, data):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -225,7 +226,7 @@ def test_unlike_drag_costs_last_places_of_the_way(chain, alpha, gamma, drop, gra
         assert close(end.time_s, wanted[2], many)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), st.data())
 def test_drag_of_a_leg_is_that_of_what_still_falls(chain, data):
     size = chain.rods
@@ -273,7 +274,7 @@ def test_a_whole_fall_against_a_general_solver(drags):
     assert close(end.time_s, wanted[2], TIGHT)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(chains(most=6, mass_decades=2), ALPHAS, DROPS, decades(-1, 2), SPEEDS, st.data())
 def test_energy_is_balanced_by_the_work_of_the_drag(chain, alpha, drop, gravity, speed, data):
     """What falls loses height, gains speed, and leaves Σc ∫v² dz in the air."""
@@ -296,7 +297,7 @@ def test_energy_is_balanced_by_the_work_of_the_drag(chain, alpha, drop, gravity,
         before = event.speed_after
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, GRAVITIES, AIR)
 def test_separation_does_not_depend_on_gravity_in_air_either(
     chain, alpha, gamma, drop, here, there, kappa
@@ -311,7 +312,7 @@ def test_separation_does_not_depend_on_gravity_in_air_either(
     assert close(one.speed_m_s * math.sqrt(there / here), other.speed_m_s, many)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, AIR, decades(-2, 1))
 def test_more_drag_is_slower(chain, alpha, gamma, drop, gravity, speed, kappa, more):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -337,7 +338,7 @@ def test_drag_of_the_order_met_with_light_rods():
     assert close(twin, air.separation_m, 1e-14)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(DISTANCES, SPEEDS, GRAVITIES, AIR, st.floats(0.01, 0.99))
 def test_a_leg_in_air_can_be_cut_anywhere(distance, speed, gravity, kappa, share):
     upper = share * distance
@@ -350,7 +351,7 @@ def test_a_leg_in_air_can_be_cut_anywhere(distance, speed, gravity, kappa, share
     assert close(first + second, whole[1], many)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, AIR, st.integers(-15, 15))
 def test_a_larger_scene_in_air_as_much_thinner(chain, alpha, gamma, drop, gravity, speed, kappa, n):
     """Lengths by 4^n, κ by 4^−n, speeds by 2^n: not a bit is rounded."""
@@ -364,7 +365,7 @@ def test_a_larger_scene_in_air_as_much_thinner(chain, alpha, gamma, drop, gravit
     assert other.time_s == one.time_s * 2.0**n
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), st.data(), decades(-9, 9), st.integers(-60, 60))
 def test_only_ratios_of_drag_to_mass_matter(chain, data, scale, power):
     drags = [m * data.draw(decades(-4, 0)) for m in chain.masses]

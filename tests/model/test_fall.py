@@ -7,12 +7,13 @@ from fractions import Fraction
 from itertools import accumulate, pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
 from rig.model.fall import fall, free_fall_speed, hits, kicks
+from tests.examples import examples
 from tests.model.chains import (
     ALPHAS,
     DROPS,
@@ -30,7 +31,7 @@ from tests.model.reference import reference_fall
 TIGHT = 1e-13
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_agrees_with_the_second_implementation(chain, alpha, gamma, drop, gravity, speed):
     end = fall(chain, alpha, gamma, drop, gravity, speed)
@@ -40,7 +41,7 @@ def test_agrees_with_the_second_implementation(chain, alpha, gamma, drop, gravit
     assert close(end.time_s, wanted.time, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), GAMMAS, DROPS, decades(-200, 3))
 def test_keeps_its_digits_however_small_alpha_and_gravity(chain, gamma, drop, gravity):
     end = fall(chain, 1e-12, gamma, drop, gravity)
@@ -62,7 +63,7 @@ def test_a_long_irregular_chain():
     assert all(close(one, other, TIGHT) for one, other in zip(found, wanted, strict=True))
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(most=6), ALPHAS, GAMMAS, DROPS, decades(-3, 3))
 def test_without_gravity_it_is_a_product_of_speeds(chain, alpha, gamma, drop, start):
     speed, time, before = Fraction(start), Fraction(0), -Fraction(drop)
@@ -87,7 +88,7 @@ def test_without_gravity_or_speed_there_is_no_fall(drop):
         fall(even_chain(3), 0.1, 1.0, drop, 0.0)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_without_impulse_it_is_free_fall(chain, gamma, drop, gravity, speed):
     end = fall(chain, 0.0, gamma, drop, gravity, speed)
@@ -98,7 +99,7 @@ def test_without_impulse_it_is_free_fall(chain, gamma, drop, gravity, speed):
     assert close(end.speed_m_s, free, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), GAMMAS, st.data())
 def test_kicks_are_equation_9_to_the_last_digits(chain, gamma, data):
     size = chain.rods
@@ -112,7 +113,7 @@ def test_kicks_are_equation_9_to_the_last_digits(chain, gamma, data):
         assert close(gain, float(impulse / rest), 4e-15)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_hits_tell_the_same_fall(chain, alpha, gamma, drop, gravity, speed):
     gains = kicks(chain, [alpha] * chain.rods, gamma)
@@ -136,7 +137,7 @@ def test_hits_tell_the_same_fall(chain, alpha, gamma, drop, gravity, speed):
         assert close(other.speed_before**2, grown, 1e-14)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES)
 def test_separation_is_the_height_at_which_the_twin_still_is(chain, alpha, gamma, drop, gravity):
     end = fall(chain, alpha, gamma, drop, gravity)

@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import math
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.model.fall import hits, kicks
 from rig.model.impact import gamma_finite
+from tests.examples import examples
 from tests.model.chains import DROPS, GRAVITIES, chains, decades
 
 ROUNDING = 1.0 + 1e-13
@@ -27,7 +28,7 @@ INERTIAS = decades(-3, 0)
 PULLS = st.one_of(st.just(0.0), st.floats(1e-12, 0.5))
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), PULLS, INERTIAS, DROPS, GRAVITIES)
 def test_an_impact_gives_the_chain_no_more_than_the_rod_brings(
     chain, alpha, inertia, drop, gravity
@@ -39,7 +40,7 @@ def test_an_impact_gives_the_chain_no_more_than_the_rod_brings(
         assert 0.0 <= gained <= alpha * chain.masses[k] * hit.speed_before**2 * ROUNDING
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), PULLS, st.floats(1.0, 10.0), DROPS, GRAVITIES)
 def test_what_still_falls_never_has_more_energy_than_the_chain_had(
     chain, alpha, excess, drop, gravity

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rig.model.chain import Chain
 from rig.model.fall import fall, kicks
 from rig.model.motion import Motion
+from tests.examples import examples
 from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, decades
 
 TIGHT = 1e-13
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, GRAVITIES)
 def test_separation_does_not_depend_on_gravity(chain, alpha, gamma, drop, here, there):
     one, other = (fall(chain, alpha, gamma, drop, gravity) for gravity in (here, there))
@@ -26,7 +27,7 @@ def test_separation_does_not_depend_on_gravity(chain, alpha, gamma, drop, here, 
     assert close(one.time_s / root, other.time_s, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, st.integers(-20, 20))
 def test_gravity_can_be_traded_for_time(chain, alpha, gamma, drop, gravity, speed, n):
     """A clock that runs 2^n times as fast: g by 4^n and speeds by 2^n, not a bit is rounded."""
@@ -37,7 +38,7 @@ def test_gravity_can_be_traded_for_time(chain, alpha, gamma, drop, gravity, spee
     assert other.time_s == one.time_s / 2.0**n
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, decades(-9, 9), st.integers(-60, 60))
 def test_only_ratios_of_masses_matter(chain, alpha, gamma, drop, gravity, speed, scale, power):
     one = fall(chain, alpha, gamma, drop, gravity, speed)
@@ -50,7 +51,7 @@ def test_only_ratios_of_masses_matter(chain, alpha, gamma, drop, gravity, speed,
     assert close(one.time_s, other.time_s, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, st.integers(-15, 15))
 def test_a_larger_scene_is_the_same_scene(chain, alpha, gamma, drop, gravity, n):
     """All lengths by 4^n: Δz by 4^n, V and t by 2^n, exactly."""
@@ -62,7 +63,7 @@ def test_a_larger_scene_is_the_same_scene(chain, alpha, gamma, drop, gravity, n)
     assert other.time_s == one.time_s * 2.0**n
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, decades(-3, 2), GRAVITIES, st.floats(0.0, 1.0))
 def test_the_drop_can_be_cut_in_two(chain, alpha, gamma, drop, gravity, share):
     """Released higher, or on its way already as it passes a lower place: the same fall."""
@@ -75,7 +76,7 @@ def test_the_drop_can_be_cut_in_two(chain, alpha, gamma, drop, gravity, share):
     assert close(rest.time_s + passing / gravity, whole.time_s, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, st.data())
 def test_a_rod_without_mass_changes_nothing(chain, alpha, gamma, drop, gravity, speed, data):
     at = data.draw(st.integers(1, chain.rods - 1))
@@ -91,7 +92,7 @@ def test_a_rod_without_mass_changes_nothing(chain, alpha, gamma, drop, gravity, 
     assert close(one.time_s, other.time_s, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, decades(-3, 1))
 def test_a_stronger_pull_is_never_slower(chain, alpha, gamma, drop, gravity, more):
     """Greater α: faster at every height, so earlier, so further ahead of the twin."""
@@ -104,7 +105,7 @@ def test_a_stronger_pull_is_never_slower(chain, alpha, gamma, drop, gravity, mor
     assert strong.time_s <= weak.time_s * (1.0 + TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, decades(-3, 2), DROPS, GRAVITIES)
 def test_a_larger_gamma_weakens_the_pull(chain, alpha, gamma, more, drop, gravity):
     firm = fall(chain, alpha, gamma, drop, gravity)
@@ -114,7 +115,7 @@ def test_a_larger_gamma_weakens_the_pull(chain, alpha, gamma, more, drop, gravit
     assert firm.time_s <= loose.time_s * (1.0 + TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(mass_decades=2), ALPHAS, GAMMAS, decades(-3, 1), GRAVITIES, SPEEDS, st.floats(0, 1))
 def test_the_fall_can_be_cut_anywhere(chain, alpha, gamma, drop, gravity, speed, share):
     """What has not struck yet, let go again where it is and as fast as it is, ends the fall."""

@@ -6,13 +6,14 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from rig.model.fall import fall
+from tests.examples import examples
 from tests.model.chains import DROPS, GAMMAS, GRAVITIES, chains, close, even_chain
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(mass_decades=2), GAMMAS, DROPS, GRAVITIES)
 def test_small_alpha_is_linear(chain, gamma, drop, gravity):
     """To first order rod j, struck at free-fall speed V_j, gives ΔV_j (T − t_j) of separation.

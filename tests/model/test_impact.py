@@ -6,7 +6,7 @@ import math
 from fractions import Fraction
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -15,6 +15,7 @@ from rig.model.chain import Chain
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
+from tests.examples import examples
 from tests.model.chains import close, decades, even_chain
 from tests.model.reference import printed_alpha
 
@@ -84,7 +85,7 @@ def test_level_alpha_is_the_papers():
     assert gamma_finite(1 / 3, 1.0) == pytest.approx(2 / 3, rel=1e-15)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(RESTITUTIONS, INERTIAS, INERTIAS, decades(-6, 6))
 def test_equations_8_to_10_solve_the_equations_of_motion(beta, xi, xi_above, mass_above):
     wanted = float(level_impulse(beta, xi, xi_above, mass_above))
@@ -92,7 +93,7 @@ def test_equations_8_to_10_solve_the_equations_of_motion(beta, xi, xi_above, mas
     assert close(found, wanted, 1e-14)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(RESTITUTIONS, FRICTIONS, st.floats(0.01, 89.0), INERTIAS)
 def test_equations_12_and_13_solve_the_equations_of_motion(beta, mu, theta, xi):
     with mp.workdps(50):
@@ -102,7 +103,7 @@ def test_equations_12_and_13_solve_the_equations_of_motion(beta, mu, theta, xi):
     assert close(alpha_inclined(beta, mu, theta, xi), float(wanted), 1e-13)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(RESTITUTIONS, FRICTIONS, INERTIAS)
 def test_no_incline_is_level(beta, mu, xi):
     level = alpha_level(beta, xi)
@@ -114,7 +115,7 @@ def test_no_incline_is_level(beta, mu, xi):
     assert found == pytest.approx(slope, rel=1e-4, abs=100 * theta**2)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(RESTITUTIONS, st.floats(0.0, 90.0))
 def test_without_friction_a_uniform_rod_has_the_papers_g(beta, theta):
     sin, cos = (f(math.radians(theta)) for f in (math.sin, math.cos))
@@ -122,14 +123,14 @@ def test_without_friction_a_uniform_rod_has_the_papers_g(beta, theta):
     assert alpha_inclined(beta, 0.0, theta) == pytest.approx(wanted, rel=1e-14, abs=1e-17)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(RESTITUTIONS, FRICTIONS, st.floats(0.01, 1.0), st.floats(1.0, 89.0), INERTIAS)
 def test_friction_raises_alpha(beta, mu, more, theta, xi):
     assume(math.tan(math.radians(theta)) > mu + more)
     assert alpha_inclined(beta, mu + more, theta, xi) > alpha_inclined(beta, mu, theta, xi)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(st.floats(0.002, 0.3), st.floats(0.1, 5.0), st.floats(0.02, 89.0))
 def test_singular_exactly_between_the_roots_of_g(xi, mu, theta):
     """With t = tan θ, g(θ) ≤ 0 means γ t² − (γ − 1) μ t + 1 ≤ 0."""
@@ -145,7 +146,7 @@ def test_singular_exactly_between_the_roots_of_g(xi, mu, theta):
         assert alpha_inclined(0.5, mu, theta, xi) > 0.0
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(st.floats(-1.0, 1.0), st.floats(0.02, 1.0), decades(-4, 4))
 def test_the_energy_lost_is_the_work_of_the_surface(beta, xi, mass_above):
     """Level impact of one rod (m = V = 1) under a chain, with all rotations (Eqs. S1 to S6).
@@ -205,7 +206,7 @@ def test_central_values_can_be_replaced():
     assert impact_on(PILED, RODS, 10.0, restitution=0.1, friction=0.3).alpha == alpha_level(0.1)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(st.floats(-2.0, 3.0), FRICTIONS, st.one_of(st.just(0.0), st.floats(1e-6, 89.0)))
 def test_notes_say_when_and_only_when_the_domain_is_left(beta, mu, incline):
     impact = impact_on(Surface(Quantity(beta), Quantity(mu)), RODS, incline)

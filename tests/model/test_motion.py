@@ -6,7 +6,7 @@ import math
 from itertools import accumulate, pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -14,6 +14,7 @@ from rig.model.chain import Chain
 from rig.model.fall import fall, hits, kicks
 from rig.model.impact import alpha_inclined, gamma_finite
 from rig.model.motion import Motion
+from tests.examples import examples
 from tests.model.chains import (
     ALPHAS,
     DROPS,
@@ -62,7 +63,7 @@ def legs_in_many_digits(chain, alpha, gamma, drop, gravity, speed):
     return found
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(chains(most=8), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_ends_as_the_fall_does(chain, alpha, gamma, drop, gravity, speed):
     motion = motion_of(chain, alpha, gamma, drop, gravity, speed)
@@ -86,7 +87,7 @@ def test_short_legs_at_the_end_of_a_long_fall_keep_their_digits():
     assert close(motion.at(motion.end_s).separation_m, exact.separation, TIGHT)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     chains(most=6, mass_decades=1.0),
     ALPHAS,
@@ -114,7 +115,7 @@ def test_between_impacts_it_is_the_reference(chain, alpha, gamma, drop, gravity,
             assert close(drop - found.height_m, fallen, loose + TIGHT * float(drop / fallen))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, SHARES)
 def test_the_chains_only_part(chain, alpha, gamma, drop, gravity, speed, shares):
     motion = motion_of(chain, alpha, gamma, drop, gravity, speed)
@@ -153,7 +154,7 @@ def test_the_papers_chain_parts_only_after_its_first_impact():
     assert PAPERS.at(PAPERS.end_s).separation_m == pytest.approx(0.11546810526538031, rel=1e-14)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.floats(0.0, 1.0))
 def test_separation_is_against_a_twin_in_free_fall(share):
     now = PAPERS.at(share * PAPERS.end_s)
@@ -172,7 +173,7 @@ def above(chain):
     return [*list(accumulate(reversed(chain.masses[1:])))[::-1], 0.0]
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_the_pulls_are_equation_9_and_make_up_the_speed(chain, alpha, gamma, drop, gravity, speed):
     motion = motion_of(chain, alpha, gamma, drop, gravity, speed)
@@ -191,7 +192,7 @@ def test_the_pulls_are_equation_9_and_make_up_the_speed(chain, alpha, gamma, dro
     assert close(speed + gravity * motion.end_s + gained, motion.hits[-1].speed_before, TIGHT)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS, SHARES)
 def test_energy_is_what_gravity_has_done(chain, alpha, gamma, drop, gravity, speed, shares):
     """What moves, and what stayed in the rods that struck: the work of gravity on the way.
@@ -222,7 +223,7 @@ def test_energy_is_what_gravity_has_done(chain, alpha, gamma, drop, gravity, spe
     assert abs(math.fsum(blow.lost for blow in blows) - everything - start) <= TIGHT * size
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(chains(), PULLS, decades(-3, 0), DROPS, GRAVITIES, SPEEDS)
 def test_no_rod_passes_on_more_than_it_brings(chain, alpha, inertia, drop, gravity, speed):
     motion = motion_of(chain, alpha, gamma_finite(inertia), drop, gravity, speed)

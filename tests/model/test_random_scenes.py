@@ -6,12 +6,13 @@ import math
 from itertools import accumulate
 from typing import NamedTuple
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.predictions import predictions
 from rig.protocol.reader import parse
+from tests.examples import examples
 from tests.model.air_reference import reference_air_fall
 from tests.model.chains import close, decades
 from tests.model.reference import printed_alpha, reference_fall
@@ -92,7 +93,7 @@ def check(text: str, wanted: tuple[mp.mpf, ...], relative: float) -> None:
         assert close(line[key], value, relative), key
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(scenes())
 def test_a_scene_is_predicted_to_the_last_digits(scene):
     alpha, gamma = scene.coefficients()
@@ -103,7 +104,7 @@ def test_a_scene_is_predicted_to_the_last_digits(scene):
     check(scene.text(), wanted, TIGHT)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(scenes(), decades(0, 3))
 def test_a_scene_in_air_too(scene, terminal):
     alpha, gamma = scene.coefficients()

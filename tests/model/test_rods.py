@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -22,6 +22,7 @@ from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
+from tests.examples import examples
 from tests.model.chains import close, decades, even_chain
 
 TIGHT = 1e-13
@@ -101,7 +102,7 @@ def unlike_chains(most=6, mass_decades=2.0):
     return st.builds(build, masses, st.lists(INERTIAS, min_size=most, max_size=most))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(unlike_chains(), RESTITUTIONS)
 def test_unlike_rods_solve_the_equations_of_motion_on_the_level(chain, beta):
     found = rod_impacts(Surface(Quantity(beta), Quantity(0.2)), chain, 0.0)
@@ -119,7 +120,7 @@ def test_unlike_rods_solve_the_equations_of_motion_on_the_level(chain, beta):
         assert gain * math.fsum(rest) == pytest.approx(wanted, rel=loose, abs=1e-15 * m)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(unlike_chains(), RESTITUTIONS, FRICTIONS, INCLINES, st.one_of(st.none(), INERTIAS))
 def test_unlike_rods_solve_the_equations_of_motion_on_an_incline(
     chain, beta, mu, incline, inertia_z
@@ -133,7 +134,7 @@ def test_unlike_rods_solve_the_equations_of_motion_on_an_incline(
         assert impact.alpha == pytest.approx(float(pull) / mass / SPEED, rel=loose, abs=1e-15)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(RESTITUTIONS, FRICTIONS, INCLINES, st.floats(0.02, 0.98), INERTIAS)
 def test_unlike_axes_solve_the_equations_of_motion(beta, mu, incline, inertia, inertia_z):
     """Eq. 13 with ξ_y ≠ ξ_z, for a chain of like rods."""
@@ -154,7 +155,7 @@ def test_the_axis_matters_only_on_an_incline():
     )
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(unlike_chains(), st.floats(0.02, 1.0), st.sampled_from([0.0, 20.0, 40.0, 80.0]))
 def test_like_rods_given_one_by_one_are_like_rods(chain, inertia, incline):
     one_by_one = replace(chain, inertias=(inertia,) * chain.rods)
@@ -167,7 +168,7 @@ def test_like_rods_given_one_by_one_are_like_rods(chain, inertia, incline):
             assert replace(found, gamma=wanted.gamma) == wanted
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(unlike_chains(most=4))
 def test_splitting_a_rod_above_changes_nothing_below(chain):
     """I' is a sum: two half rods in the place of one turn the chain above as it did."""
@@ -218,7 +219,7 @@ def test_one_singular_rod_is_enough():
     assert rod_impacts(slow, replace(chain, inertias=(0.3, 0.3, 0.4)), 20.0)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(unlike_chains(mass_decades=4.0), RESTITUTIONS, FRICTIONS, INCLINES, decades(-3, 1))
 def test_unlike_rods_lose_energy_and_never_gain_any(chain, beta, mu, incline, drop):
     impacts = rod_impacts(Surface(Quantity(beta), Quantity(mu)), chain, incline)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from rig.errors import InputError
 from rig.protocol.describe import describe
 from rig.protocol.reader import parse, read
+from tests.examples import examples
 
 READY = sorted((Path(__file__).parents[2] / "protocols").glob("*.yaml"))
 GOOD = """\
@@ -205,7 +206,7 @@ PIECES = [
 
 
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=8))
-@settings(max_examples=400)
+@examples(400)
 def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
     text = GOOD[:start] + "".join(pieces) + GOOD[start + cut :]
     found = ()

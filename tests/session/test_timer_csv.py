@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
@@ -14,6 +14,7 @@ from rig.records import Drop
 from rig.session.edges_csv import TICK_HZ
 from rig.session.timer_csv import read_timer
 from rig.session.timer_table import is_logger_table
+from tests.examples import examples
 
 VERNIER = (
     "Vernier Format 2\nfence.cmbl\nRun 1\nTime\tGateState\tDistance\nT\tS\tD\ns\t\tm\n\n"
@@ -141,7 +142,7 @@ def test_own_files_are_told_from_others(tmp_path):
 SHAPES = st.sampled_from(["\t", ";", ","]), st.booleans(), st.integers(1, 4)
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(*SHAPES, st.lists(st.integers(1, 10**7), min_size=2, max_size=20))
 def test_what_is_written_is_read(tmp_path, separator, comma, runs, steps):
     """Any separator, decimals by comma or by point, any number of runs beside each other."""
@@ -162,7 +163,7 @@ def test_what_is_written_is_read(tmp_path, separator, comma, runs, steps):
         assert [edge.blocked for edge in drop.edges] == [n % 2 == 0 for n in range(len(steps))]
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.one_of(
         st.binary(max_size=120),

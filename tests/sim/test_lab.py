@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
@@ -20,6 +20,7 @@ from rig.protocol import reader
 from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
+from tests.examples import examples
 from tests.sim.chance import with_dials
 from tests.sim.falls import (
     DELAY,
@@ -166,7 +167,7 @@ def test_hanging_chains_leave_the_beams_free_unless_hung_too_low():
 labels = st.tuples(st.integers(1, 108), st.integers(1, 3))
 
 
-@settings(max_examples=6)
+@examples(6)
 @given(st.lists(labels, min_size=1, max_size=3), st.randoms(use_true_random=False))
 def test_a_drop_depends_on_seed_run_and_attempt_alone(asked, order: random.Random):
     lab = ChainLab(UNIFORM, Dials(), 3)
@@ -193,7 +194,7 @@ def test_a_run_the_plan_does_not_have_is_bad_input():
             ask(pack_label(109, 1))
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     st.builds(
         Dials,

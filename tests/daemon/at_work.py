@@ -1,0 +1,35 @@
+"""A daemon's worker inside the test's own process."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rig.daemon.hub import Hub
+from rig.daemon.lease import Lease
+from rig.daemon.worker import Worker
+from tests.waiting import PATIENCE_S
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rig.bench.stand import Stand
+
+
+@contextmanager
+def working(stand: Stand) -> Iterator[tuple[Worker, Callable[..., Any]]]:
+    """Have a worker at a board, with a session open, and a way to ask it; control never lapses."""
+    lease = Lease(lambda: 0.0)
+    lease.take("me", "a test")
+    worker = Worker(str(stand.port), Hub(), lease)
+    worker.start()
+
+    def ask(work: Callable[..., Any]) -> Any:
+        return worker.submit(work, "me").result(PATIENCE_S)
+
+    try:
+        ask(lambda desk: desk.open_session(str(stand.protocol), str(stand.session)))
+        yield worker, ask
+    finally:
+        worker.end()
+        worker.join()
