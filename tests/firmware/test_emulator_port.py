@@ -178,6 +178,12 @@ def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
         open_port(url(**settings))
 
 
+def test_a_board_is_no_name_before_the_settings():
+    with pytest.raises(InputError, match="found 'uno' before the") as caught:
+        open_port(url().replace("?", "uno?"))
+    assert "emu://?board=mega" in caught.value.hint
+
+
 def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
     package = tmp_path / "rig"
     (package / "flash").mkdir(parents=True)
