@@ -11,6 +11,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING
 
 from rig import __version__
+from rig.boards import BOARDS
 from rig.errors import RigError
 
 if TYPE_CHECKING:
@@ -219,7 +220,7 @@ def _parser() -> argparse.ArgumentParser:
     _session(command("replay", "feed the recorded bytes through the whole stack and compare"))
 
     flash = command("flash", "write the firmware onto a board and verify it")
-    flash.add_argument("--board", required=True, choices=("mega", "uno"), help="its kind")
+    flash.add_argument("--board", required=True, choices=tuple(BOARDS), help="its kind")
     flash.add_argument(
         "--port", required=True, metavar="PATH", help="its device, such as /dev/ttyACM0"
     )

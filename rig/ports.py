@@ -9,6 +9,7 @@ from rig.errors import InputError
 
 SIMULATED = ("sim", "emu")
 """URL schemes behind which no real chain falls."""
+_EXAMPLES = {"sim": "seed=3", "emu": "board=mega"}
 _BYTES = "surrogateescape"  # a file's name need not be UTF-8
 _FILES = {"protocol", "truth"}
 
@@ -43,7 +44,7 @@ def completed(url: str, protocol: Path, session: Path, seed: int | None, before:
     if not is_simulated(url):
         return url
     parts = _split(url)
-    settings = _settings(parts)
+    settings = read_settings(url)
     if seed is not None:
         settings["seed"] = str(seed)
     old = _split(before)
@@ -60,6 +61,42 @@ def completed(url: str, protocol: Path, session: Path, seed: int | None, before:
     settings.setdefault("truth", str(truth_file(session)))
     settings.setdefault("seed", "0")
     return _joined(parts, settings)
+
+
+def check_name(url: str) -> None:
+    """See that a simulation's URL has nothing but settings: a name in it would mean nothing.
+
+    Raises
+    ------
+    InputError
+        Something stands before the ``?`` or behind a ``#``.
+    """
+    parts = _split(url)
+    if parts.scheme not in SIMULATED:
+        return
+    example = f"{parts.scheme}://?{_EXAMPLES[parts.scheme]}"
+    if name := parts.netloc + parts.path:
+        raise InputError(
+            f"{url}: found {name!r} before the ?, where nothing is accepted",
+            f"leave it out; what is wanted is said behind the ?, as in {example}",
+        )
+    if parts.fragment:
+        raise InputError(
+            f"{url}: found {'#' + parts.fragment!r} at its end, where nothing is accepted",
+            "leave it out; a # that belongs to a setting is written %23",
+        )
+
+
+def read_settings(url: str) -> dict[str, str]:
+    """Take apart what a simulation's URL says behind the ``?``.
+
+    Raises
+    ------
+    InputError
+        A setting that is given twice, or see `check_name`.
+    """
+    check_name(url)
+    return _settings(_split(url))
 
 
 def told(url: str) -> str:

@@ -21,6 +21,15 @@ def predictions(protocol: Protocol) -> list[dict[str, Any]]:
     return [_free_fall(protocol)] if protocol.surface is None else _impacts(protocol)
 
 
+def notes(protocol: Protocol) -> list[str]:
+    """Every note on a planned incline, the same ones of several inclines together."""
+    at: dict[str, list[str]] = {}
+    for one in predictions(protocol):
+        for note in one["notes"]:
+            at.setdefault(note, []).append(f"{one['incline_deg']:g}°")
+    return [f"{', '.join(inclines)}: {note}" for note, inclines in at.items()]
+
+
 def _free_fall(protocol: Protocol) -> dict[str, Any]:
     """Predict the fall of a chain that strikes nothing."""
     (rods,) = protocol.chains.values()

@@ -12,10 +12,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rig.link.messages import pack_label
+from rig.ports import read_settings
 from rig.protocol import reader
 from sim.dials import read_dials
 from sim.lab import ChainLab
-from sim.scene import read_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,9 +7,10 @@ switches all disturbances off. The truth file gets one line of JSON a drop.
 
 from __future__ import annotations
 
+from rig.ports import read_settings
 from sim.board import VirtualBoard
 from sim.clock import VirtualClock
-from sim.scene import read_settings, set_scene
+from sim.scene import set_scene
 from sim.serial_port import SimulatedSerial
 
 

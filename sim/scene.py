@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
-from urllib.parse import parse_qsl, urlsplit
 
 from rig.errors import InputError
 from rig.protocol import reader
@@ -61,23 +60,6 @@ class Scene:
         """Length of the wired reference's second; `None` where none is wired."""
         error = self.dials.reference
         return None if math.isnan(error) else round(1e9 / (1.0 + error))
-
-
-def read_settings(url: str) -> dict[str, str]:
-    """Take a URL's query apart.
-
-    Raises
-    ------
-    InputError
-        A setting that is given twice.
-    """
-    parts = urlsplit(url)
-    settings: dict[str, str] = {}
-    for name, text in parse_qsl(parts.query, keep_blank_values=True):
-        if name in settings:
-            raise InputError(f"{parts.scheme}://: {name} is given twice")
-        settings[name] = text
-    return settings
 
 
 def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:

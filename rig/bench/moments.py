@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from rig.daemon.station import RECORD_MS
 from rig.link.messages import Phase
+from rig.protocol.measurable import LEAST_RECORD_MS
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -21,7 +21,7 @@ STATES = ("idle", "armed", "firing", "falling", "collecting", "stored", "judging
 session's log and not yet on the board; falling; held by the board and not in the file (being read,
 or committed); in the file and not forgotten by the board; recorded and not judged."""
 
-_RECORD_S = RECORD_MS / 1000
+_RECORD_S = LEAST_RECORD_MS / 1000
 # How often to aim at what, the phase to wait for, and how long after its beginning to strike. Left
 # to chance alone, nearly all moments fall upon a rig that settles or a chain that falls.
 _AIMS: tuple[tuple[float, Phase | None, float, float], ...] = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
 
@@ -13,5 +14,6 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Describe a protocol."""
-    print(describe(reader.read(arguments.protocol)))
+    protocol = reader.read(arguments.protocol)
+    print(describe(protocol, notes(protocol)))
     return 0

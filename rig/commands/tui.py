@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
+from rig.ports import check_name
 from rig.tui.app import RigApp
 from rig.tui.keys import read_keys
 from rig.tui.options import Options
@@ -43,6 +44,7 @@ def _options(arguments: Namespace) -> Options:
     offline = bool(arguments.session) and not (
         arguments.port or arguments.protocol or arguments.socket
     )
+    check_name(arguments.port or "")  # before a daemon is started for it
     session = Path(arguments.session) if arguments.session else _fresh()
     return Options(
         files=files,

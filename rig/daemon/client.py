@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rig.session.schema import RunState
 
 _LOOK_S = 0.1  # a signal waits no longer than this
-_ANSWER_S = 60.0  # everything but waiting is over by then, or the daemon hangs
+_ANSWER_S = 100.0  # everything but waiting is over by then, a recording too, or the daemon hangs
 
 
 class Client:

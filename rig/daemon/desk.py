@@ -24,11 +24,13 @@ from rig.link.messages import TEST_RUN, Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
+from rig.protocol.measurable import check_board
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rig.link.messages import Identity
     from rig.link.port import Port
     from rig.protocol.scene import Protocol
     from rig.records import Drop
@@ -141,7 +143,7 @@ class Desk:
             self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
             self._home.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
-            self.connect()
+            check_board(scene, self.connect().as_board())
             self._home.bound = True
             with self.interrupts.held():
                 opened.put_results([], __version__)  # of less than there will be
@@ -184,7 +186,7 @@ class Desk:
 
     # ------------------------------------------------------------------ the link
 
-    def connect(self, port: Port | None = None) -> None:
+    def connect(self, port: Port | None = None) -> Identity:
         """Connect, with the port that is open already if there is one.
 
         Raises
@@ -207,10 +209,11 @@ class Desk:
             book, url, self.interrupts, view=View(self.hub), halted=self._halted,
             meet=self._home.meet,
         )  # fmt: skip
-        station.connect(port)
+        identity = station.connect(port)
         self.hub.set(port={"url": self.url, "simulated": is_simulated(url), "path": self._home.now})
         self.station = station
         self.hub.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+        return identity
 
     def disconnect(self) -> None:
         """Let go of a port that fails."""

@@ -17,6 +17,7 @@ from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
 from rig.link.port import open_port, port_clock
 from rig.link.transcript import Received
 from rig.ports import told
+from rig.protocol.measurable import record_ms
 from rig.records import Ping, Pulse
 from rig.session.schema import RunState
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from rig.protocol.scene import Protocol
     from rig.records import Drop
 
-RECORD_MS = 1500
-"""How long after the release to record: no drop of a lab lasts longer."""
 ARM_TIMEOUT_MS = 10_000
 DISCARD = "taking the power from the board discards the drop, a reset does not"
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
@@ -244,7 +243,7 @@ class Station:
                         release=1 << release.channel,
                         pulse_us=round(release.pulse * 1e6),
                         timeout_ms=ARM_TIMEOUT_MS,
-                        record_ms=RECORD_MS,
+                        record_ms=record_ms(protocol),
                     )
             except (StoppedError, KeyboardInterrupt):
                 self.abort()  # the device may have heard what it did not answer

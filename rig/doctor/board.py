@@ -57,7 +57,7 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
 
 def _shipped(identity: Identity) -> str:
     for target in TARGETS.values():
-        if target.name == identity.board:
+        if target.board.name == identity.board:
             return read_image(target.shipped, target).firmware
     return ""
 

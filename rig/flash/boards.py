@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from rig.boards import MEGA, UNO, Board
+
 FIRMWARE = "chainrig"
 """What a firmware of this project begins its name with; its version follows."""
 
@@ -15,8 +17,8 @@ class Target:
 
     Attributes
     ----------
-    name
-        What its firmware calls the board, as `Identity.board` has it.
+    board
+        The board.
     part, programmer, baudrate
         The chip and the boot loader's protocol and rate, as avrdude wants them.
     image
@@ -25,7 +27,7 @@ class Target:
         First address that belongs to the boot loader.
     """
 
-    name: str
+    board: Board
     part: str
     programmer: str
     baudrate: int
@@ -39,7 +41,7 @@ class Target:
 
 
 TARGETS = {
-    "mega": Target("Arduino Mega 2560", "m2560", "wiring", 115200, "atmega2560.hex", 0x3E000),
-    "uno": Target("Arduino Uno", "m328p", "arduino", 115200, "atmega328p.hex", 0x7E00),
+    "mega": Target(MEGA, "m2560", "wiring", 115200, "atmega2560.hex", 0x3E000),
+    "uno": Target(UNO, "m328p", "arduino", 115200, "atmega328p.hex", 0x7E00),
 }
 """By the word for ``--board``. Both boot loaders' rates are those of the makers' own tools."""

@@ -39,9 +39,9 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
                 f"{port} was flashed, but the firmware does not answer",
                 "pull the board's plug, put it in again, then rig selftest",
             ) from error
-    if (identity.board, identity.firmware) != (target.name, firmware):
+    if (identity.board, identity.firmware) != (target.board.name, firmware):
         raise DeviceError(
-            f"{port} was flashed with {firmware} for an {target.name}, but answers as "
+            f"{port} was flashed with {firmware} for an {target.board.name}, but answers as "
             f"{identity.board}, {identity.firmware}",
             "is this the port of the board that was flashed? rig ports",
         )

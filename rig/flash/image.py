@@ -65,13 +65,13 @@ def read_image(path: Path, target: Target) -> Image:
         raise InputError(f"{path} is no Intel HEX file") from None
     flash = _flash(text, path)
     versions = set(_VERSION.findall(flash))
-    boards = [t.name for t in TARGETS.values() if t.name.encode() + b"\0" in flash]
+    boards = [t.board.name for t in TARGETS.values() if t.board.name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
         raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
-    if boards != [target.name]:
-        raise InputError(f"{path} is for an {boards[0]}, not for an {target.name}")
+    if boards != [target.board.name]:
+        raise InputError(f"{path} is for an {boards[0]}, not for an {target.board.name}")
     if len(flash) > target.flash_limit:
-        raise InputError(f"{path} would overwrite the boot loader of an {target.name}")
+        raise InputError(f"{path} would overwrite the boot loader of an {target.board.name}")
     return Image(path, versions.pop().decode(), len(flash))
 
 

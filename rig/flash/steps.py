@@ -60,7 +60,7 @@ def flash(
     # Avrdude tries for ever to open a port that is not there, and does not ask who uses it.
     with closing(open_port(port)):
         pass
-    say(f"writing {file.firmware} ({file.size} bytes) to the {target.name} at {port}")
+    say(f"writing {file.firmware} ({file.size} bytes) to the {target.board.name} at {port}")
     write_flash(program, target, port, file.path)
     say("written; asking the board who it is")
     return identify(port, target, file.firmware)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.boards import LONGEST_RECORD_MS
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.exchange import Exchange
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 BOOT_WAIT_S = 2.0
 """The Mega's boot loader listens this long before it starts the firmware."""
-_LONGEST_RECORD_S = 65.535  # record_ms is a u16
 _LATE_S = 0.25  # how much later than announced a certificate may come before the host asks
 _SMALLEST_READ = 4
 _FIRE_WAIT_S = 0.05
@@ -263,7 +263,7 @@ class Device:
             timeout = self._record_ms.get(label, 0) / 1000 + _LATE_S
         drop = self.transcript.assembly(label)
         now = self._line.clock.now_ns
-        hopeless = now() + round((_LONGEST_RECORD_S + timeout) * 1e9)
+        hopeless = now() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)
         ask = now() + round(timeout * 1e9)
         while drop.certificate is None:
             self._line.receive()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.boards import GATES
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -21,7 +23,7 @@ class GateStates(NamedTuple):
 
 def listed(mask: int) -> str:
     """Name the gates of a mask, as in ``gates 1, 8``."""
-    numbers = [str(n) for n in range(16) if mask >> n & 1]
+    numbers = [str(n) for n in range(GATES) if mask >> n & 1]
     return f"gate{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
 
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated, Any, TypeAlias
 
+from rig.boards import Board
 from rig.link.frames import PAYLOAD_LIMIT
 from rig.link.records import Event
 from rig.link.wiretypes import (
@@ -237,6 +238,13 @@ class Identity:
     streams: U8
     late_ticks: U16
     channels: Line
+
+    def as_board(self) -> Board:
+        """What this board can do, as it says itself."""
+        pulse = self.max_pulse_us / 1e6
+        return Board(
+            self.board, self.gates, self.releases, pulse, self.capacity, bool(self.streams)
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ import serial
 from rig.errors import DeviceError, InputError, RigError
 from rig.link.clock import Clock, SystemClock
 from rig.link.network import NETWORK, REACH, NetworkPort, why_unreachable
+from rig.ports import check_name
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
@@ -72,7 +73,10 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
     ------
     DeviceError
         When it cannot be opened; the hint says what to try.
+    InputError
+        A simulation's URL says what it does not know.
     """
+    check_name(url)
     _add_handlers()
     try:
         with warnings.catch_warnings():
@@ -102,8 +106,9 @@ def check_url(url: str) -> None:
     Raises
     ------
     InputError
-        No such kind of URL.
+        No such kind of URL, or a simulation's with a name that means nothing.
     """
+    check_name(url)
     _add_handlers()
     try:
         serial.serial_for_url(url, do_not_open=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.boards import GATES
 from rig.errors import DeviceError
 from rig.link.messages import PROTOCOL_VERSION, DisarmReason, Reason
 
@@ -98,7 +99,7 @@ class DeviceRefusedError(DeviceError):
 
     def __init__(self, reason: Reason, detail: int, disarmed: DisarmReason | None = None) -> None:
         message, hint = ADVICE[reason] if disarmed is None else DISARMED[disarmed]
-        gates = [str(n) for n in range(16) if detail >> n & 1]
+        gates = [str(n) for n in range(GATES) if detail >> n & 1]
         named = f"gate {gates[0]} is" if len(gates) == 1 else f"gates {', '.join(gates)} are"
         if not gates:  # a flicker so short that the device cannot say whose
             named = "a gate is"

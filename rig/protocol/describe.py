@@ -6,26 +6,29 @@ import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rig.protocol.measurable import unmeasurable
+from rig.boards import BOARDS
+from rig.protocol.measurable import lacking, longest_fall, record_ms, too_long, unmeasurable
 from rig.protocol.plan import runs
 from rig.protocol.scene import AT_REST, SIDES
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.protocol.scene import Drag, Gate, Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
-DEVICE_EVENTS = 1024
-"""Events the timer holds before the host must have read them."""
 
 
-def describe(protocol: Protocol) -> str:
+def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     """Describe a protocol in plain text.
 
     Parameters
     ----------
     protocol
         A checked protocol.
+    notes
+        What else is known of it, see `rig.predictions.notes`.
 
     Returns
     -------
@@ -36,7 +39,7 @@ def describe(protocol: Protocol) -> str:
     sections = {
         "Scene": _scene(protocol),
         "Gates": _gates(protocol),
-        "What follows": _consequences(protocol),
+        "What follows": [*_consequences(protocol), *(f"note: {note}" for note in notes)],
         "Left out": _left_out(protocol),
     }
     blocks = [protocol.title]
@@ -152,18 +155,35 @@ def _consequences(protocol: Protocol) -> list[str]:
     if protocol.gates is None:
         return lines
     lines += [f"note: only predicted, not run: {reason}" for reason in unmeasurable(protocol)]
+    if (problem := too_long(protocol)) is not None:
+        lines.append(f"note: not run: {problem}")
     edges = 0
     for side in SIDES:
         per_chain = [_passing(protocol, gate) for gate in protocol.gates.on(side)]
         edges += 2 * max(sum(each[name] for each in per_chain) for name in protocol.chains)
-    fits = "fits" if edges <= DEVICE_EVENTS else "does not fit"
-    lines.append(f"at most {edges} edges a drop; {fits} the timer's memory of {DEVICE_EVENTS}")
-    reach = max(rods.chain.length for rods in protocol.chains.values()) + protocol.drop.value
-    fall = math.sqrt(2 * reach / protocol.gravity.value)
-    minutes = len(planned) * (plan.settle + protocol.release.pulse + fall) / 60
+    lines.append(f"at most {edges} edges a drop; {_memory(edges)}")
+    seconds = record_ms(protocol) / 1e3
+    lines.append(
+        f"recorded for {seconds:g} s; the longest fall takes {longest_fall(protocol):.2g} s"
+    )
+    for word, board in BOARDS.items():
+        if problems := lacking(protocol, board):
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            lines.append(f"note: not with board {word}: {problems[0]}{more}")
+    minutes = len(planned) * (plan.settle + seconds) / 60
     lines.append(f"about {minutes:.0f} min, settling {plan.settle:g} s before each drop; "
                  "hanging the chains comes on top")  # fmt: skip
     return lines
+
+
+def _memory(edges: int) -> str:
+    """Say whether so many edges fit those boards that keep them all."""
+    kept = [board for board in BOARDS.values() if not board.streams]
+    return "; ".join(
+        f"{'fits' if edges <= board.events else 'too many for'} the {board.events} that an "
+        f"{board.name} keeps"
+        for board in kept
+    )
 
 
 def _uses_surface(protocol: Protocol) -> bool:

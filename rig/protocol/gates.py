@@ -6,6 +6,7 @@ import math
 from itertools import count
 from typing import TYPE_CHECKING
 
+from rig.boards import GATES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.scene import SIDES, Gate, Gates, RodChain, Side
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 HEIGHT = Range(Dimension.LENGTH, 0.0, 100.0, "m", open_low=True)
 HEIGHT_UNCERTAINTY = Range(Dimension.LENGTH, 0.0, 0.1, "mm")
-CHANNELS = 16
 CLEARANCE_M = 0.001
 """A beam is some millimetres wide and a hanging chain sways: the least margin around a rod, m."""
 _COMMON_U = "write the uncertainty of all gates as height_uncertainty"
@@ -81,7 +81,7 @@ def _gate(node: Node, key: str, faults: Faults, side: Side, used: dict[int, int]
     if inner is None:
         return None
     section = Section(inner, key, faults, ("channel", "height"))
-    channel = section.take("channel", fields.whole(0, CHANNELS - 1), required="0")
+    channel = section.take("channel", fields.whole(0, GATES - 1), required="0")
     height = section.take("height", fields.exact(HEIGHT, _COMMON_U), required="25 mm")
     if channel is not None:
         line = section.place("channel").line

@@ -1,14 +1,58 @@
-"""What can be predicted but not measured: the rig drops chains from rest, in air as it is."""
+"""What keeps a drop from being measured, said before anything is hung.
+
+The rig drops chains from rest, in air as it is; a recording ends at some time; a board has so many
+inputs and outputs.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from rig.errors import InputError
-from rig.protocol.scene import AT_REST
+from rig.boards import LONGEST_RECORD_MS
+from rig.errors import InputError, Problem
+from rig.protocol.scene import AT_REST, SIDES
+from rig.protocol.yamltree import load, place_of
 
 if TYPE_CHECKING:
+    from rig.boards import Board
     from rig.protocol.scene import Protocol
+
+LEAST_RECORD_MS = 1500
+"""Long enough for the drops of most labs, and then the same for all."""
+_SURE = 3.0  # standard uncertainties by which everything may make a fall longer
+_AIR = 1.5  # light rods, with a terminal speed of 10 m/s, take 1.4 times as long for 25 m
+_MARGIN_S = 0.25  # for the mechanism that lets go
+
+
+def longest_fall(protocol: Protocol) -> float:
+    """Time from the release to the last edge, if every uncertainty makes it longer, s.
+
+    That of free fall through √(2 h/g): an impact only makes a chain faster, α being above zero.
+    """
+    chains, gates, gravity = protocol.chains.values(), protocol.gates, protocol.gravity
+    lowest = min((gate.height for gate in gates.gates), default=0.0) if gates else 0.0
+    reach = max(
+        rods.chain.length + max(rods.widths) / 2.0 + _SURE * rods.position_u for rods in chains
+    )
+    u = math.hypot(protocol.drop.u, gates.height_u if gates else 0.0)
+    weakest = max(gravity.value - _SURE * gravity.u, gravity.value / 2.0)
+    return math.sqrt(2.0 * (protocol.drop.value + reach + _SURE * u - lowest) / weakest)
+
+
+def record_ms(protocol: Protocol) -> int:
+    """How long after the release a drop is recorded, ms; at least `LEAST_RECORD_MS`.
+
+    The chain may hang until the pulse ends, and the air, which a protocol that is measured leaves
+    out, makes the fall longer. More than `LONGEST_RECORD_MS` is too much for any board.
+    """
+    wanted_s = (
+        _AIR * longest_fall(protocol)
+        + protocol.release.pulse
+        + protocol.accept.release_skew
+        + _MARGIN_S
+    )
+    return max(LEAST_RECORD_MS, math.ceil(wanted_s * 1e3))
 
 
 def unmeasurable(protocol: Protocol) -> list[str]:
@@ -35,3 +79,56 @@ def check_measurable(protocol: Protocol) -> None:
             f"{protocol.source}: only predicted, never measured, because of {'; '.join(reasons)}",
             "rig predict says what the model expects; to measure, leave these keys out",
         )
+    if (problem := too_long(protocol)) is not None:
+        raise InputError(problems=[problem])
+
+
+def too_long(protocol: Protocol) -> Problem | None:
+    """Say that a fall takes more time than any board can record, when it does."""
+    if record_ms(protocol) <= LONGEST_RECORD_MS:
+        return None
+    place = place_of(load(protocol.text, protocol.source), "drop")
+    message = (
+        f"from here a fall takes up to {longest_fall(protocol):.3g} s, to be recorded for "
+        f"{record_ms(protocol) / 1e3:.3g} s; no board records for more than "
+        f"{LONGEST_RECORD_MS / 1e3:g} s: let the chains fall less far, or with more gravity"
+    )
+    return Problem(protocol.source, place.line, place.column, "drop", message)
+
+
+def lacking(protocol: Protocol, board: Board) -> list[Problem]:
+    """Say what a protocol wants of a board that it does not have, in the order of the file."""
+    found = []
+
+    def note(what: str, has: str, *path: str | int) -> None:
+        place = place_of(load(protocol.text, protocol.source), *path)
+        key = ""
+        for step in path:
+            key += f"[{step}]" if isinstance(step, int) else f".{step}" if key else step
+        message = f"found {what}; the board ({board.name}) has {has}: change it, or take another"
+        found.append(Problem(protocol.source, place.line, place.column, key, message))
+
+    release = protocol.release
+    if release.channel >= board.releases:
+        note(str(release.channel), f"releases 0 to {board.releases - 1}", "release", "channel")
+    if release.pulse > board.longest_pulse:
+        most = f"pulses of at most {board.longest_pulse * 1e3:g} ms"
+        note(f"{release.pulse * 1e3:g} ms", most, "release", "pulse")
+    for side in SIDES:
+        for n, gate in enumerate(protocol.gates.on(side) if protocol.gates else ()):
+            if gate.channel >= board.gates:
+                has = f"gates 0 to {board.gates - 1}"
+                note(str(gate.channel), has, "gates", side, n, "channel")
+    return sorted(found)
+
+
+def check_board(protocol: Protocol, board: Board) -> None:
+    """Refuse a protocol that wants more than a board has.
+
+    Raises
+    ------
+    InputError
+        With every problem.
+    """
+    if problems := lacking(protocol, board):
+        raise InputError(problems=problems)

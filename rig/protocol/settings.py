@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, cast
 
+from rig.boards import RELEASES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.scene import Accept, Order, Plan, Release
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 # A coil that is held longer than this burns; one pulsed shorter does not pull.
 PULSE = Range(Dimension.TIME, 0.001, 2.0, "ms")
-RELEASE_CHANNELS = 8
 INCLINE = Range(Dimension.ANGLE, 0.0, 90.0, "deg")
 SETTLE = Range(Dimension.TIME, 0.0, 3600.0, "s")
 MOST_REPEATS = 10_000
@@ -46,7 +46,7 @@ def _release(node: Node, key: str, faults: Faults) -> Release | None:
         return None
     section = Section(inner, key, faults, ("channel", "pulse"))
     usual = Release()
-    channel = section.take("channel", fields.whole(0, RELEASE_CHANNELS - 1), usual.channel)
+    channel = section.take("channel", fields.whole(0, RELEASES - 1), usual.channel)
     pulse = section.take("pulse", fields.exact(PULSE), usual.pulse)
     return None if channel is None or pulse is None else Release(channel, pulse)
 

@@ -92,6 +92,21 @@ class Mapping:
 Node = Scalar | Sequence | Mapping
 
 
+def place_of(root: Node, *path: str | int) -> Place:
+    """Find where the value at a path of keys and list indices stands, or as much as is there."""
+    node = root
+    for step in path:
+        inner: list[Node] = []
+        if isinstance(node, Mapping):
+            inner = [value for key, value in node.entries if getattr(key, "text", None) == step]
+        elif isinstance(node, Sequence) and isinstance(step, int):
+            inner = node.items[step : step + 1]
+        if not inner:
+            break
+        node = inner[0]
+    return node.place
+
+
 def load(text: str, source: str) -> Node:
     """Read one YAML document.
 

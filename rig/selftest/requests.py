@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.boards import GATES, RELEASES
 from rig.link import messages as wire
 
 if TYPE_CHECKING:
@@ -28,9 +29,9 @@ UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
 def beyond(identity: wire.Identity) -> Iterator[dict[str, int]]:
     """Ask for what this very device says it has not."""
     yield {"pulse_us": identity.max_pulse_us + 1}
-    if identity.gates < 16:
+    if identity.gates < GATES:
         yield {"gates": 1 << identity.gates}
-    if identity.releases < 8:
+    if identity.releases < RELEASES:
         yield {"release": 1 << identity.releases}
 
 

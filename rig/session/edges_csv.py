@@ -13,6 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.boards import GATES
 from rig.errors import InputError
 from rig.files import write_atomic
 from rig.records import Drop, Edge
@@ -27,7 +28,6 @@ TICK_HZ = 10**12
 MAX_BYTES = 200_000_000
 MAX_SPAN_S = 3600
 """A drop lasts half a second; an hour inside one run means a wrong unit or a wrong run."""
-CHANNELS = 16
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}")
 _DECIMAL = re.compile(r"([+-]?)([0-9]{0,30})(?:\.([0-9]{0,60}))?(?:[eE]([+-]?[0-9]{1,2}))?")
@@ -125,7 +125,7 @@ class _Table:
 
     def add(self, place: _Place, record: list[str]) -> None:
         run = place.whole(record, 0, 1, None, "runs count from 1")
-        channel = place.whole(record, 1, 0, CHANNELS - 1, f"channels are 0 to {CHANNELS - 1}")
+        channel = place.whole(record, 1, 0, GATES - 1, f"channels are 0 to {GATES - 1}")
         time = place.time(record, 2)
         state = place.whole(record, 3, 0, 1, "1 is blocked, 0 is clear")
         if run is None or channel is None or time is None or state is None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rig.boards import MEGA, UNO
+
 
 @dataclass(frozen=True, slots=True)
 class Known:
@@ -26,7 +28,7 @@ class Known:
     board: bool
 
 
-_MEGA, _UNO = "Arduino Mega 2560", "Arduino Uno"
+_MEGA, _UNO = MEGA.name, UNO.name
 
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8. Chips: their makers'.
 KNOWN = (

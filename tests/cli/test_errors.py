@@ -209,12 +209,41 @@ def test_simulated_and_real_data_are_never_mixed(call, finished, protocol, tmp_p
     real = tmp_path / "real"
     assert call("run", protocol, "--port", "/dev/nonexistent", "--session", real).code == 4
     before = real.read_bytes()
-    for port in ("sim://", "emu://mega"):
+    for port in ("sim://", "emu://?board=mega"):
         done = call("run", protocol, "--port", port, "--session", real)
         assert_told(done)
         assert f"is a real session and {port}" in done.err
     assert real.read_bytes() == before
     assert not (tmp_path / "real.truth.jsonl").exists()
+
+
+@pytest.mark.parametrize(
+    ("port", "found", "instead"),
+    [
+        ("sim://anything", "found 'anything' before the ?", "sim://?seed=3"),
+        ("sim://lab/7?seed=1", "found 'lab/7' before the ?", "sim://?seed=3"),
+        ("emu://pico", "found 'pico' before the ?", "emu://?board=mega"),
+        ("emu://uno?board=mega", "found 'uno' before the ?", "emu://?board=mega"),
+        ("sim://?seed=1#2", "found '#2' at its end", "%23"),
+    ],
+)
+def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port, found, instead):
+    session = tmp_path / "new.session"
+    socket = tmp_path / "place" / "rig.sock"
+    for arguments in (
+        ("run", protocol, "--port", port, "--session", session, "--yes"),
+        ("tui", protocol, "--port", port, "--session", session),
+        ("daemon", "--port", port, "--socket", socket),
+        ("selftest", "--port", port),
+        ("doctor", "--port", port),
+        ("bench", "accuracy", "--port", port),
+    ):
+        done = call(*arguments)
+        assert_told(done)
+        assert f"{port}: {found}" in done.err
+        assert "nothing is accepted" in done.err
+        assert instead in done.err
+    assert list(tmp_path.iterdir()) == [protocol]
 
 
 # ------------------------------------------------- where the output goes

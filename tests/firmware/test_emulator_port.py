@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 import pytest
 
+import rig.boards
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
@@ -176,6 +177,22 @@ def test_opening_resets_the_board():
 def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
     with pytest.raises(InputError, match=complaint):
         open_port(url(**settings))
+
+
+@pytest.mark.parametrize("word", rig.boards.BOARDS)
+def test_the_table_of_boards_says_what_the_firmware_says(word):
+    port = open_port(url(board=word))
+    assert Device(port, port_clock(port)).connect().as_board() == rig.boards.BOARDS[word]
+
+
+def test_every_board_of_the_table_can_be_emulated():
+    assert rig.boards.BOARDS.keys() == BOARDS.keys()
+
+
+def test_a_board_is_no_name_before_the_settings():
+    with pytest.raises(InputError, match="found 'uno' before the") as caught:
+        open_port(url().replace("?", "uno?"))
+    assert "emu://?board=mega" in caught.value.hint
 
 
 def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):

@@ -75,7 +75,7 @@ def test_the_gates_are_as_many_as_the_firmware_says(board):
     text = (FIRMWARE / board / "board.h").read_text()
     said = int(re.search(r"#define BOARD_GATES (\d+)", text)[1])
     assert len(read_pins(board).gates) == said
-    assert read_pins(board).board in {target.name for target in TARGETS.values()}
+    assert read_pins(board).board in {target.board.name for target in TARGETS.values()}
 
 
 @EACH

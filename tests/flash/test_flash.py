@@ -48,10 +48,10 @@ def options(argv):
 @pytest.mark.parametrize("board", TARGETS)
 def test_a_board_is_flashed_and_asked(board, avrdude, flash):
     target = TARGETS[board]
-    with PtyBoard(board=target.name, firmware=VERSION) as there:
+    with PtyBoard(board=target.board.name, firmware=VERSION) as there:
         code, out, err = flash("--port", there.path, board=board)
     assert code == 0, err
-    assert out.startswith(f"{target.name}, {VERSION}, 16 gates, id ")
+    assert out.startswith(f"{target.board.name}, {VERSION}, 16 gates, id ")
     assert out.endswith(": flashed and verified\n")
     assert out.count("\n") == 1
     assert "Writing | ######## | 100%" in err

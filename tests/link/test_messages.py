@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig import boards
 from rig.link import messages as wire
 from rig.link.frames import PAYLOAD_LIMIT
 from rig.link.records import Event, Tail
@@ -108,3 +109,10 @@ def test_every_refusal_has_advice(reason):
     error = DeviceRefusedError(reason, 0x0005)
     assert error.hint
     assert "{" not in error.message
+
+
+def test_the_wire_has_room_for_what_the_table_of_boards_allows():
+    width = {field.name: 8 * field.wire.size for field in wire.FIELDS[wire.Arm]}
+    assert width["gates"] == boards.GATES
+    assert width["release"] == boards.RELEASES
+    assert 2 ** width["record_ms"] - 1 == boards.LONGEST_RECORD_MS

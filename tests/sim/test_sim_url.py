@@ -16,6 +16,7 @@ from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
 from rig.link.rate import tick_rate
 from rig.records import Drop, Ping
+from sim.protocol_sim import Serial
 from tests.sim.falls import PROTOCOLS
 
 if TYPE_CHECKING:
@@ -199,6 +200,11 @@ def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
 def test_a_setting_given_twice_is_bad_input():
     with pytest.raises(InputError, match="seed is given twice"):
         open_port(url(seed=1) + "&seed=2")
+
+
+def test_a_name_is_bad_input_for_whoever_opens_the_port():
+    with pytest.raises(InputError, match="found 'rig' before the"):
+        Serial(url().replace("?", "rig?"))
 
 
 def test_a_percent_sign_need_not_be_escaped():

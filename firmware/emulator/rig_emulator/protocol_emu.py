@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from rig.errors import InputError
+from rig.ports import read_settings
 from rig_emulator.board import EmulatedBoard
 from rig_emulator.wiring import board_named, firmware_for
 from sim.clock import VirtualClock
-from sim.scene import read_settings, set_scene
+from sim.scene import set_scene
 from sim.serial_port import SimulatedSerial
 
 if TYPE_CHECKING:

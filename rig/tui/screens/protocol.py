@@ -9,6 +9,7 @@ from textual.content import Content
 from textual.style import Style
 
 from rig.errors import InputError
+from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.measurable import check_measurable
@@ -126,7 +127,7 @@ class ProtocolPage(Page):
 
 
 def _described(protocol: Protocol) -> Content:
-    lines = [plain(line, 200) for line in describe(protocol).splitlines()]
+    lines = [plain(line, 200) for line in describe(protocol, notes(protocol)).splitlines()]
     title, *rest = lines
     parts = [Content.styled(title, "bold")]
     parts += [

@@ -1,0 +1,47 @@
+"""What timers can do: every board that the firmware runs on, and what the wire can carry to any.
+
+A board that is there says the same of itself (`rig.link.messages.Identity`), and then that counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+GATES = 16
+"""Gate inputs that the wire has bits for."""
+RELEASES = 8
+"""Release outputs that the wire has bits for."""
+LONGEST_RECORD_MS = 0xFFFF
+"""The longest recording that the wire can ask for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """What one kind of board can do.
+
+    Attributes
+    ----------
+    name
+        What its firmware calls it.
+    gates, releases
+        How many inputs and outputs it has.
+    longest_pulse
+        For which it drives a release, s.
+    events
+        Edges that it can keep.
+    streams
+        Whether it keeps the latest ones only, so that a drop may have any number of them.
+    """
+
+    name: str
+    gates: int
+    releases: int
+    longest_pulse: float
+    events: int
+    streams: bool
+
+
+MEGA = Board("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
+UNO = Board("Arduino Uno", 12, 2, 0.5, 191, streams=True)
+BOARDS = {"mega": MEGA, "uno": UNO}
+"""By the word for them at the command line."""

@@ -1,0 +1,78 @@
+"""What a protocol's drops need is known before the first: how long to record, and which board."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rig.session.store import Session
+from tests.cli.lab import short
+
+GATES = """\
+gates:
+  impact: [{channel: 0, height: 25 mm}, {channel: 1, height: 80 mm}, {channel: 2, height: TOP}]
+  free: [{channel: 8, height: 20 mm}, {channel: 9, height: 140 mm}, {channel: 10, height: TOP}]
+"""
+
+
+def changed(old: str, new: str, top: str = "") -> str:
+    """Write a protocol of two drops, changed in one place; with a gate below the hanging chains."""
+    text = short(repeats=1).replace(old, new)
+    if top:
+        begin, end = text.index("gates:"), text.index("  height_uncertainty")
+        text = text[:begin] + GATES.replace("TOP", top) + text[end:]
+    return text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "top"),
+    [
+        ("drop: 180 mm ± 2 mm", "drop: 12 m ± 5 mm", "11.9 m"),
+        ("gravity: 9.81 m/s^2", "gravity: 1 m/s^2", "100 mm"),
+    ],
+)
+def test_a_long_fall_is_recorded_to_its_end(call, tmp_path, old, new, top):
+    path, session = tmp_path / "long.yaml", tmp_path / "long.session"
+    path.write_text(changed(old, new, top), "utf-8")
+    done = call("run", path, "--port", "sim://", "--session", session, "--yes", "--json")
+    assert done.code == 0, done.err
+    runs = json.loads(done.out)["runs"]
+    assert [run["verdict"] for run in runs] == ["accepted", "accepted"]
+    assert "recorded for 2.79" in call("check", path).out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("channel: 0, pulse", "channel: 5, pulse", "32:20: release.channel: found 5;"),
+        ("pulse: 80 ms", "pulse: 800 ms", "32:30: release.pulse: found 800 ms;"),
+    ],
+)
+def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
+    call, tmp_path, old, new, problem
+):
+    path, session = tmp_path / "p.yaml", tmp_path / "p.session"
+    path.write_text(changed(old, new), "utf-8")
+    done = call("run", path, "--port", "sim://", "--session", session)
+    assert (done.code, done.out) == (2, "")
+    (line,) = done.err.splitlines()
+    assert f"{path}:{problem} the board (virtual) has" in line
+    with Session.open(session, readonly=True) as made:
+        assert made.states() == []
+    said = call("check", path)
+    assert said.code == 0
+    for word in ("mega", "uno"):
+        assert f"note: not with board {word}: {path}:" in said.out
+
+
+def test_a_fall_that_nothing_can_record_is_refused_before_a_session_is_made(call, tmp_path):
+    path, session = tmp_path / "p.yaml", tmp_path / "p.session"
+    text = changed("drop: 180 mm ± 2 mm", "drop: 100 m").replace("9.81 m/s^2", "0.01 m/s^2")
+    path.write_text(text, "utf-8")
+    done = call("run", path, "--port", "sim://", "--session", session)
+    assert done.code == 2
+    assert f"{path}:10:7: drop: from here a fall takes up to 142 s" in done.err
+    assert "no board records for more than 65.535 s" in done.err
+    assert not session.exists()
+    assert f"note: not run: {path}:10:7: drop: from here" in call("check", path).out
