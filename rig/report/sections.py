@@ -1,0 +1,54 @@
+"""Sections that fail alone: one that cannot be made is named, and takes no other along."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+T = TypeVar("T")
+
+
+class Sections:
+    """Makes the sections of one result.
+
+    Attributes
+    ----------
+    failed
+        A sentence for each section that could not be made, by the section's name.
+    """
+
+    def __init__(self) -> None:
+        self.failed: dict[str, str] = {}
+
+    def make(self, name: str, make: Callable[[], T]) -> T | None:
+        """Make one section; `None`, and a sentence in `failed`, where that fails.
+
+        Parameters
+        ----------
+        name
+            What stands before "could not be made".
+        make
+            Makes the section, or raises.
+
+        Raises
+        ------
+        ImportError, RigError
+            A package is not installed: every section would lack it, and the user can help that.
+        """
+        try:
+            return make()
+        except ImportError:
+            raise
+        except Exception as error:
+            if isinstance(error.__cause__, ImportError):
+                raise
+            # A mistake in the program is to be seen for what it is.
+            why = (
+                error.message if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
+            )
+            self.failed[name] = f"{name} could not be made: {' '.join(why.split())}"
+            return None
