@@ -190,7 +190,9 @@ def _calibration(session: Reader, pings: Samples) -> Calibration:
     by_host = Source("pings", ping_rate(found), 0.0 if session.simulated else HOST_U)
     sources = [by_host] if by_host.rate.n else []
     if pulses := session.pulses():
-        reference_u = reader.parse(session.protocol_text, session.protocol_source).reference_u
+        reference_u = reader.parse(
+            session.protocol_text, session.protocol_source, kept=True
+        ).reference_u
         shifted = [
             pulse._replace(
                 host_send_ns=pulse.host_send_ns + shift, host_recv_ns=pulse.host_recv_ns + shift

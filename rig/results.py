@@ -35,7 +35,7 @@ def protocol_of(session: Reader) -> Protocol:
 
     Other timers may have had fewer than the protocol; a board's beams are those of the protocol.
     """
-    protocol = reader.parse(session.protocol_text, session.protocol_source)
+    protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
     had = next((one["beams"] for _, one in session.identities() if "beams" in one), None)
     if had is None or protocol.gates is None:
         return protocol

@@ -9,6 +9,7 @@ from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
 from rig.report.estimate import estimate_text
 from rig.results import detailed, protocol_of
+from rig.sections import Sections
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -21,15 +22,18 @@ def main(arguments: Namespace) -> int:
         analysis, _ = detailed(session, progress("analysing run"))
         found = {"simulated": session.simulated}
         found |= estimate(protocol_of(session), analysis)
+    sections = Sections()
     if arguments.json:
         print_json(found)
     else:
-        print(estimate_text(found))
+        print(estimate_text(found, sections))
     if arguments.output is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
         folder = make_folder(arguments.output)
-        for name, picture in estimate_pictures(found).items():
+        for name, picture in estimate_pictures(found, sections).items():
             write_atomic(folder / f"{name}.svg", picture.svg)
             say(f"{folder / name}.svg")
+    for sentence in sections.failed.values():
+        say(sentence)
     return 0

@@ -11,6 +11,9 @@ from rig.protocol import reader
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Mapping
+
+    from rig.protocol.scene import Protocol
 
 
 def main(arguments: Namespace) -> int:
@@ -22,16 +25,20 @@ def main(arguments: Namespace) -> int:
         return 0
     if arguments.protocol is None:
         raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
-    found = predictions(reader.read(arguments.protocol))
+    protocol = reader.read(arguments.protocol)
+    found = predictions(protocol)
     if arguments.json:
         print_json({"predictions": found})
     else:
-        print(table(found))
+        print(table(protocol, found))
     return 0
 
 
-def table(found: list[dict[str, Any]]) -> str:
-    """Lay predictions out as text, notes below."""
+def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
+    """Lay predictions out as text, notes below; without columns of what the scene does not have."""
+    if protocol.surface is None:
+        columns = {"speed (m/s)": ("speed_m_s", 1.0, ".4f"), "t (s)": ("fall_time_s", 1.0, ".5f")}
+        return _laid_out(columns, found)
     columns = {
         "incline (°)": ("incline_deg", 1.0, "g"),
         "α": ("alpha", 1.0, ".4f"),
@@ -42,6 +49,12 @@ def table(found: list[dict[str, Any]]) -> str:
         "t (s)": ("fall_time_s", 1.0, ".5f"),
         "free fall V (m/s)": ("free_fall_speed_m_s", 1.0, ".4f"),
     }
+    if not protocol.two_chains:
+        del columns["Δz (cm)"], columns["u (cm)"]
+    return _laid_out(columns, found)
+
+
+def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[str, Any]]) -> str:
     shown = {
         heading: what
         for heading, what in columns.items()

@@ -18,6 +18,7 @@ from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
 from rig.report.pictures import pictures
 from rig.results import protocol_of, with_analysis
+from rig.sections import Sections
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -34,17 +35,26 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         protocol = protocol_of(session)
         found, analysis = with_analysis(session, progress("analysing run"))
+        sections = Sections()
+        curves = sections.make("The model's curve", lambda: model_curves(protocol))
         figures = pictures(
             found,
-            model_curves(protocol),
+            curves,
             session.simulated,
             skew_limit_s=protocol.accept.release_skew,
             site_m_s2={"value": protocol.gravity.value, "U95": 2.0 * protocol.gravity.u},
             bars=arguments.bars,
+            sections=sections,
         )
-        estimated = _estimated(protocol, analysis, simulated=session.simulated)
+        parts = sections.make("The paired differences", lambda: list(effects_parts(found))) or []
+        simulated = session.simulated
+        estimated = sections.make(
+            "The estimate of the impacts",
+            lambda: _estimated(protocol, analysis, simulated=simulated),
+        )
         if estimated:
-            figures += estimate_pictures(estimated).values()
+            figures += estimate_pictures(estimated, sections).values()
+            parts += page_parts(estimated, sections)
         write_report(
             arguments.output,
             ReportContext(
@@ -65,11 +75,14 @@ def main(arguments: Namespace) -> int:
                 identities=[identity for _, identity in session.identities()],
                 clock=found["clock"],
                 notes=[*clock_lines(found), *air_lines(found)],
-                parts=[*effects_parts(found), *(page_parts(estimated) if estimated else ())],
+                parts=parts,
+                sections=sections,
             ),
         )
     if arguments.figures is not None:
         _write_figures(Path(arguments.figures), figures)
+    for sentence in sections.failed.values():
+        say(sentence)
     say(f"report: {arguments.output}")
     return 0
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.shared import Shared
-from rig.errors import InputError, RigError
+from rig.errors import InputError
 from rig.estimate import coefficients as of
 from rig.estimate.agreement import agreement
 from rig.estimate.curves import drop_curves
@@ -18,9 +17,10 @@ from rig.estimate.joint import fit
 from rig.estimate.posterior import posterior
 from rig.estimate.rods import impulses
 from rig.estimate.tail import chi2_tail
+from rig.sections import Sections
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from rig.analysis.session import Analysis
     from rig.estimate.coefficients import Scene
@@ -43,7 +43,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     -------
     dict
         What ``rig estimate --json`` prints. A section that could not be worked out is missing, and
-        ``failed`` says which and why.
+        ``failed`` has a sentence on it.
 
     Raises
     ------
@@ -63,39 +63,32 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     forms = [form(good[key], drop, shared) for key, drop in drops.items()]
     like = merged(forms)
     said: dict[str, Any] = {"drops": len(forms), "edges": sum(one.edges for one in forms)}
+    sections = Sections()
     found, outcome = None, None
-    with _section(said, "coefficients"):
+    with sections.alone("The coefficients"):
         found = of.scene(protocol, like)
         said["left_out"] = list(found.left_out)
         if found.forms:
             outcome = of.best(protocol, found)
             said |= _coefficients(protocol, found, outcome)
-    with _section(said, "end correction"):
+    with sections.alone("The end correction"):
         if found is not None and found.forms:
             said["end_correction"] = end_correction(protocol, found)
-    with _section(said, "α"):
+    with sections.alone("The best single α"):
         said |= _alphas(protocol, found, outcome, forms, like)
-    with _section(said, "impulses"):
+    with sections.alone("The speed gained from each rod"):
         said["impulses"] = impulses(protocol, like)
-    with _section(said, "comparison"):
+    with sections.alone("The comparison with the model"):
         said["comparison"] = agreement(protocol, analysis.runs)
-    with _section(said, "curves"):
+    with sections.alone("The curves"):
         first = {_case(protocol, good[key]): key for key in reversed(drops)}
         said["curves"] = [
             drop_curves(protocol, good[key], drops[key], analysis.lesson)
             for _, key in sorted(first.items())
         ]
+    if sections.failed:
+        said["failed"] = [*sections.failed.values()]
     return said
-
-
-@contextmanager
-def _section(said: dict[str, Any], name: str) -> Iterator[None]:
-    """Work a section out; one that cannot be must not take the others along."""
-    try:
-        yield
-    except Exception as error:  # whatever it is, it stays to be seen
-        why = error.message if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
-        said.setdefault("failed", []).append({"section": name, "why": why})
 
 
 def _case(protocol: Protocol, run: Run) -> tuple[object, ...]:

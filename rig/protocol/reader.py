@@ -81,7 +81,7 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     return parse(text, source)
 
 
-def parse(text: str, source: str = "protocol") -> Protocol:
+def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protocol:
     """Read a protocol from its text.
 
     Parameters
@@ -90,6 +90,9 @@ def parse(text: str, source: str = "protocol") -> Protocol:
         The file's text.
     source
         Its name, for messages and for the session.
+    kept
+        Whether a session keeps this text, which cannot be changed any more: an order of turns,
+        which means nothing to a single chain, is passed over there.
 
     Returns
     -------
@@ -104,13 +107,13 @@ def parse(text: str, source: str = "protocol") -> Protocol:
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a page of text")
     faults = Faults(source)
-    protocol = _protocol(load(text, source), faults, text)
+    protocol = _protocol(load(text, source), faults, text, kept=kept)
     if faults.problems or protocol is None:
         raise InputError(problems=faults.problems.values())
     return protocol
 
 
-def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
+def _protocol(node: Node, faults: Faults, text: str, *, kept: bool) -> Protocol | None:
     """Read the root mapping; ``None`` (and faults) if anything is wrong."""
     root = fields.mapping(node, "", faults)
     if root is None:
@@ -132,7 +135,7 @@ def _protocol(node: Node, faults: Faults, text: str) -> Protocol | None:
     start = top.take("initial_speed", fields.quantity(INITIAL_SPEED), AT_REST)
     drag = _drag(top, chains) if "drag" in top else None
     reference = top.take("reference", fields.exact(REFERENCE), PPS_U)
-    release, plan, accept = _settings(top)
+    release, plan, accept = _settings(top, turns=kept or count > 1)
     gates = _gates(top, chains, drop) if has_gates else None
     if title is None or chains is None or gravity is None or drop is None:
         return None
@@ -164,13 +167,13 @@ def _version(node: Node, key: str, faults: Faults) -> int | None:
     return None
 
 
-def _settings(top: Section) -> tuple[Release | None, Plan | None, Accept | None]:
+def _settings(top: Section, *, turns: bool) -> tuple[Release | None, Plan | None, Accept | None]:
     """Read ``release``, ``plan`` and ``accept``."""
     if not any(key in top for key in ("release", "plan", "accept")):
         return Release(), Plan(), Accept()
     from rig.protocol.settings import read_settings  # noqa: PLC0415 - see above
 
-    return read_settings(top)
+    return read_settings(top, turns=turns)
 
 
 def _surface(top: Section, chains: dict[str, RodChain] | None) -> Surface | None:

@@ -26,12 +26,15 @@ RELEASE_SKEW = Range(Dimension.TIME, 0.0, 10.0, "ms", open_low=True)
 MISSED_EDGES = Range(Dimension.NUMBER, 0.0, 1.0, "%")
 
 
-def read_settings(top: Section) -> tuple[Release | None, Plan | None, Accept | None]:
+def read_settings(
+    top: Section, *, turns: bool
+) -> tuple[Release | None, Plan | None, Accept | None]:
     """Read all three from the root of a protocol; `None` for what is faulty.
 
-    Without a surface there is nothing to incline.
+    Without a surface there is nothing to incline; `turns` says whether an order may be given in
+    which chains take turns.
     """
-    plan = _plan(surface="surface" in top)
+    plan = _plan(surface="surface" in top, turns=turns)
     return (
         top.take("release", _release, Release()),
         top.take("plan", plan, Plan()),
@@ -63,7 +66,7 @@ def _accept(node: Node, key: str, faults: Faults) -> Accept | None:
     return None if skew is None or missed is None else Accept(skew, missed)
 
 
-def _plan(*, surface: bool) -> Converter[Plan]:
+def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:
     """Return the converter to the plan."""
 
     def convert(node: Node, key: str, faults: Faults) -> Plan | None:
@@ -79,6 +82,11 @@ def _plan(*, surface: bool) -> Converter[Plan]:
         inclines = section.take("incline", _inclines, usual.inclines)
         repeats = section.take("repeats", fields.whole(1, MOST_REPEATS), usual.repeats)
         order = section.take("order", fields.choice("ABBA", "alternate", "fixed"), usual.order)
+        if "order" in section and order in {"ABBA", "alternate"} and not turns:
+            message = (
+                f"found {order}; the scene has one chain, which cannot take turns; leave it out"
+            )
+            section.fault("order", message)
         mixed = fields.choice("none", "incline", "all")
         randomize = section.take("randomize", mixed, usual.randomize)
         seed = section.take("seed", fields.whole(0, LARGEST_SEED), usual.seed)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.report.numbers import decimals_for, fixed
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -21,7 +23,8 @@ def clock_lines(analysis: Mapping[str, Any]) -> list[str]:
     said = analysis.get("calibration") or {}
     if not said:
         return []
-    u = f"{_COVERAGE * said['u_ppm']:.2g}"
+    expanded = _COVERAGE * said["u_ppm"]
+    u = fixed(expanded, decimals_for(expanded))
     if said["source"] == "pings":
         where = f"from {said['pings']} clock samples by the host's clock"
     elif said["source"] == "reference":
@@ -30,5 +33,5 @@ def clock_lines(analysis: Mapping[str, Any]) -> list[str]:
         where = "as the board states it"
     else:
         return [f"time scale: as the file gives it, ± {u} ppm (95 %)", *said["notes"]]
-    rate = f"{said['rate_ppm']:.2f}".replace("-", "−")
+    rate = fixed(said["rate_ppm"], 2)
     return [f"time scale: board {rate} ± {u} ppm off (95 %), {where}", *said["notes"]]

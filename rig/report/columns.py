@@ -47,9 +47,12 @@ def _text(key: str) -> Cell:
     return lambda record: str(record.get(key) or "")
 
 
-def _incline(record: Record) -> str:
+def incline(record: Record) -> str:
+    """Write a record's inclination; nothing where nothing is struck, so nothing is inclined."""
     value = value_of(record.get("incline_deg"))
-    return "" if value is None else f"{value:g}".replace("-", "−")
+    if value is None or "gravity_m_s2" in record or record.get("impact_chain", "") is None:
+        return ""
+    return f"{value:g}".replace("-", "−")
 
 
 def _audit(record: Record) -> str:
@@ -58,7 +61,7 @@ def _audit(record: Record) -> str:
 
 
 SUMMARY = (
-    Column("incline (°)", _incline),
+    Column("incline (°)", incline),
     Column("strikes", _text("impact_chain"), numeric=False),
     Column("n", _count("n")),
     Column("Δz ± U (cm)", _quantity(100, 2, "separation_m")),
@@ -77,7 +80,7 @@ Eₙ is the normalized error; within ±1 measurement and prediction agree.
 RUNS = (
     Column("run", _count("run")),
     Column("attempt", _count("attempt")),
-    Column("incline (°)", _incline),
+    Column("incline (°)", incline),
     Column("impact chain", _text("impact_chain"), numeric=False),
     Column("Δz ± U (cm)", _quantity(100, 2, "separation_m")),
     Column("raw Δz ± U (cm)", _quantity(100, 2, "separation_raw_m")),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.report.columns import Column
+from rig.report.columns import Column, incline
 from rig.report.numbers import fixed, nested, plus_minus, value_of
 from rig.report.parts import Part
 
@@ -47,7 +47,7 @@ def _number(name: str) -> Callable[[Record], str]:
 
 
 _COLUMNS = (
-    Column("incline (°)", _number("incline_deg")),
+    Column("incline (°)", incline),
     Column("blocks", _number("blocks")),
     Column("Δz ± U (mm)", _quantity(1000.0, "chain", "separation_m")),
     Column("V ± U (mm/s)", _quantity(1000.0, "chain", "speed_m_s")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.report.columns import Column
@@ -10,79 +11,96 @@ from rig.report.parts import Part
 from rig.report.table import aligned
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
+
+    from rig.sections import Sections
 
     Record = Mapping[str, Any]
+    _Make = Callable[[str, Record], Part | None]
 
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
 _QUANTITIES = {"separation_m": "Δz", "speed_m_s": "V"}
 
 
-def estimate_text(found: Mapping[str, Any]) -> str:
-    """Write everything for a terminal."""
+def estimate_text(found: Mapping[str, Any], sections: Sections) -> str:
+    """Write everything for a terminal; what cannot be written is noted in `sections`."""
     lines = ["SIMULATED DATA"] if found.get("simulated") else []
     lines.append(f"{found['drops']} good drops, {found['edges']} edges")
-    for part in parts(found):
-        lines += ["", part.heading]
-        lines += aligned(part.columns, part.records) if part.records else []
-        lines += part.sentences
+    for heading, make in _PARTS.items():
+        lines += (
+            sections.make(f'The section "{heading}"', partial(_lines, heading, make, found)) or ()
+        )
     return "\n".join(lines)
 
 
-def parts(found: Mapping[str, Any]) -> Iterator[Part]:
-    """Yield what there is to say, in order."""
-    if found.get("parameters"):
-        yield Part(
-            "Coefficients of the impacts",
-            _coefficient_words(found),
-            _COEFFICIENTS,
-            found["parameters"],
-        )
-    elif found.get("left_out"):
-        words = [f"{left}." for left in found["left_out"]]
-        yield Part("Coefficients of the impacts", words)
-    if "alpha" in found:
-        yield Part("Best single α", list(_tests(found)), _ALPHAS, _with_contact(found))
-    if found.get("end_correction"):
-        yield Part("End correction", [found["end_correction"]["sentence"]])
-    if "impulses" in found:
-        yield Part(
-            "Speed gained from each rod, measured and by Eq. 9",
-            [found["impulses"]["sentence"]],
-            _IMPULSES,
-            found["impulses"]["inclines"],
-        )
-    if found.get("comparison"):
-        yield Part(
-            "The protocol's model",
-            ["Uncertainties of the rig and of the model's parameters are common to the inclines."],
-            _COMPARISON,
-            found["comparison"],
-        )
-
-    if found.get("failed"):
-        failed = [f"{one['section']}: {one['why']}." for one in found["failed"]]
-        yield Part("Could not be worked out", failed)
+def _lines(heading: str, make: _Make, found: Record) -> list[str]:
+    part = make(heading, found)
+    if part is None:
+        return []
+    table = aligned(part.columns, part.records) if part.records else []
+    return ["", part.heading, *table, *part.sentences]
 
 
-def page_parts(found: Mapping[str, Any]) -> Iterator[Part]:
+def page_parts(found: Mapping[str, Any], sections: Sections) -> Iterator[Part]:
     """Yield the same for a page, with a record for each rod too, or rods known by their sum."""
-    yield from parts(found)
+    for heading, make in (_PARTS | _PAGE_PARTS).items():
+        part = sections.make(f'The section "{heading}"', partial(make, heading, found))
+        if part is not None:
+            yield part
+
+
+def _coefficients(heading: str, found: Record) -> Part | None:
+    if found.get("parameters"):
+        return Part(heading, _coefficient_words(found), _COEFFICIENTS, found["parameters"])
+    words = [f"{left}." for left in found.get("left_out") or ()]
+    return Part(heading, words) if words else None
+
+
+def _single_alphas(heading: str, found: Record) -> Part | None:
+    if not found.get("alpha"):
+        return None
+    return Part(heading, list(_tests(found)), _ALPHAS, _with_contact(found))
+
+
+def _end_correction(heading: str, found: Record) -> Part | None:
+    said = found.get("end_correction")
+    return Part(heading, [said["sentence"]]) if said else None
+
+
+def _impulses(heading: str, found: Record) -> Part | None:
+    said = found.get("impulses")
+    return Part(heading, [said["sentence"]], _IMPULSES, said["inclines"]) if said else None
+
+
+def _comparison(heading: str, found: Record) -> Part | None:
+    if not found.get("comparison"):
+        return None
+    words = "Uncertainties of the rig and of the model's parameters are common to the inclines."
+    return Part(heading, [words], _COMPARISON, found["comparison"])
+
+
+def _failed(heading: str, found: Record) -> Part | None:
+    words = [f"{one}." for one in found.get("failed") or ()]
+    return Part(heading, words) if words else None
+
+
+def _incline_by_incline(heading: str, found: Record) -> Part | None:
     inclines = [
         {"quantity": one["quantity"], **line}
-        for one in found.get("comparison", ())
+        for one in found.get("comparison") or ()
         for line in one["inclines"]
     ]
-    if inclines:
-        yield Part("The protocol's model, incline by incline", (), _INCLINES, inclines)
+    return Part(heading, (), _INCLINES, inclines) if inclines else None
+
+
+def _single_impulses(heading: str, found: Record) -> Part | None:
     rods = [
         {**line, **group}
-        for line in found.get("impulses", {}).get("inclines", ())
+        for line in (found.get("impulses") or {}).get("inclines", ())
         for group in line["groups"]
     ]
-    if rods:
-        heading = "Speed gained from each rod, from the bottom"
-        yield Part("Single impulses", (), _RODS, rods, heading)
+    folded = "Speed gained from each rod, from the bottom"
+    return Part(heading, (), _RODS, rods, folded) if rods else None
 
 
 def _coefficient_words(found: Record) -> list[str]:
@@ -107,7 +125,7 @@ def _coefficient_words(found: Record) -> list[str]:
             f"Air: κ = ({plus_minus(drag, 1e6)})·10⁻⁶ /m in g − κv², "
             + ("which slows the chains." if seen else "none to be seen.")
         )
-    elif "drag_per_m" in found:
+    elif "drag_per_m" in found and has_free_chain(found):
         words.append("Air drag is not fitted: it takes a free chain, and rods that are all alike.")
     return words
 
@@ -118,8 +136,13 @@ def _symbol(name: str) -> str:
     return SYMBOLS[what] + (f" of {chain}" if chain else "")
 
 
+def has_free_chain(found: Mapping[str, Any]) -> bool:
+    """Whether a chain falls beside the one that strikes."""
+    return any("separation_m" in curve for curve in found.get("curves") or ())
+
+
 def _tests(found: Record) -> Iterator[str]:
-    tests = found["tests"]
+    tests = found.get("tests") or {}
     if "runs_share_alpha" in tests:
         yield f"Runs of one incline share one α: {_chi2(tests['runs_share_alpha'])}."
     if "model" in tests:
@@ -214,3 +237,17 @@ _COMPARISON = (
     Column("largest |Eₙ|", lambda line: fixed(
         max(abs(one["normalized_error"]) for one in line["inclines"]), 2)),
 )  # fmt: skip
+
+# In order; each is made by itself, and none where there is nothing to say.
+_PARTS: dict[str, _Make] = {
+    "Coefficients of the impacts": _coefficients,
+    "Best single α": _single_alphas,
+    "End correction": _end_correction,
+    "Speed gained from each rod, measured and by Eq. 9": _impulses,
+    "The protocol's model": _comparison,
+    "Could not be worked out": _failed,
+}
+_PAGE_PARTS: dict[str, _Make] = {
+    "The protocol's model, incline by incline": _incline_by_incline,
+    "Single impulses": _single_impulses,
+}

@@ -2,36 +2,52 @@
 
 from __future__ import annotations
 
+from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
 from rig.report.embed import Picture
+from rig.report.estimate import has_free_chain
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from matplotlib.axes import Axes
+
+    from rig.sections import Sections
 
 _SHOWN = 3
 _STYLES = (("o", MODEL), ("s", SECOND), ("^", INK))
 
 
-def estimate_pictures(found: Mapping[str, Any]) -> dict[str, Picture]:
+def estimate_pictures(found: Mapping[str, Any], sections: Sections) -> dict[str, Picture]:
     """Draw everything there is, by file name without its ending.
 
     Parameters
     ----------
     found
         What ``rig estimate --json`` prints.
+    sections
+        Where a picture that cannot be drawn is noted.
     """
-    makers = {"alpha": _alpha, "impulses": _impulses, "curves": _curves}
-    drawn = {name: make(found) for name, make in makers.items() if name in found}
-    names = (found.get("posterior") or {}).get("names", [])
-    if {"restitution", "friction"} <= set(names):
-        drawn["posterior"] = _posterior(found)
-    return drawn
+    wanted: dict[str, tuple[str, Callable[[Mapping[str, Any]], Picture | None]]] = {}
+    if found.get("alpha"):
+        wanted["alpha"] = "The picture of α", _alpha
+    if found.get("impulses"):
+        wanted["impulses"] = "The picture of the impulses", _impulses
+    if found.get("curves"):
+        wanted["curves"] = "The picture of Δz(t) and V²(z)", _curves
+        if not has_free_chain(found):
+            wanted["curves"] = "The picture of V²(z)", _curves
+    if {"restitution", "friction"} <= set((found.get("posterior") or {}).get("names", ())):
+        wanted["posterior"] = "The picture of the posterior", _posterior
+    drawn = {
+        name: sections.make(what, partial(draw, found)) for name, (what, draw) in wanted.items()
+    }
+    return {name: picture for name, picture in drawn.items() if picture is not None}
 
 
 def _alpha(found: Mapping[str, Any]) -> Picture:
@@ -136,9 +152,11 @@ def _curves(found: Mapping[str, Any]) -> Picture:
         drawing.axes[0].legend(loc="upper left")
     return Picture(
         drawing.svg,
-        "Separation against time and squared speed against height",
-        "Single drops: Δz(t) at simultaneous release and V²(z), with 95 % bands; dashed, the model "
-        "with the protocol's coefficients.",
+        "Separation against time and squared speed against height"
+        if free
+        else "Squared speed against height",
+        f"Single drops: {'Δz(t) at simultaneous release and V²(z)' if free else 'V²(z)'}, with "
+        "95 % bands; dashed, the model with the protocol's coefficients.",
     )
 
 
@@ -158,8 +176,8 @@ def _banded(
     axes.plot(at, scale * np.array(curve[f"{key}_model"]), "--", color=color, linewidth=0.8)
 
 
-def _posterior(found: Mapping[str, Any]) -> Picture:
-    """Contours of β and μ."""
+def _posterior(found: Mapping[str, Any]) -> Picture | None:
+    """Contours of β and μ; none where the posterior has no spread to draw."""
     mixture = found["posterior"]
     beta, mu = (mixture["names"].index(name) for name in ("restitution", "friction"))
     weights = np.array(mixture["weights"])
@@ -168,6 +186,8 @@ def _posterior(found: Mapping[str, Any]) -> Picture:
     spread = float(np.sqrt(weights @ (sds[:, beta] ** 2 + (means[:, beta] - middle) ** 2)))
     # Smooth from node to node: more of them for the eye.
     kept = weights > 1e-6 * weights.max()
+    if np.ptp(means[kept, mu]) <= 0.0 or spread <= 0.0:
+        return None
     nodes = np.linspace(means[kept, mu].min(), means[kept, mu].max(), 161)
     logs, centre, width = (
         np.interp(nodes, means[kept, mu], values[kept])
@@ -183,10 +203,13 @@ def _posterior(found: Mapping[str, Any]) -> Picture:
     ordered = np.sort(density, axis=None)[::-1]
     held = np.cumsum(ordered) / ordered.sum()
     levels = [float(ordered[np.searchsorted(held, share)]) for share in (0.95, 0.683)]
+    levels.append(float(density.max()) * 1.001)
+    if not all(low < high for low, high in pairwise(levels)):
+        return None  # narrower than the grid
     with canvas((3.2,), 4.2, simulated=found["simulated"]) as drawing:
         (axes,) = drawing.axes
         axes.contourf(
-            grid, nodes, density.T, levels=[*levels, float(density.max()) * 1.001],
+            grid, nodes, density.T, levels=levels,
             colors=[MODEL_BAND, MODEL],
         )  # fmt: skip
         line = {one["name"]: one["least_squares"]["value"] for one in found["parameters"]}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rig.files import write_atomic
 from rig.report.columns import AUDIT, RUNS, SUMMARY, Column, filled
 from rig.report.embed import dark_figure_css, embedded
+from rig.sections import Sections
 
 if TYPE_CHECKING:
     import os
@@ -48,6 +50,8 @@ class ReportContext:
         Sentences for the reader: warnings, what was left out.
     parts
         Further sections, after the runs.
+    sections
+        What could not be made so far is said on the page; what fails there joins it.
     """
 
     title: str
@@ -62,6 +66,7 @@ class ReportContext:
     clock: Mapping[str, object] = field(default_factory=dict)
     notes: Sequence[str] = ()
     parts: Sequence[Part] = ()
+    sections: Sections = field(default_factory=Sections)
 
 
 def write_report(path: str | os.PathLike[str], context: ReportContext) -> None:
@@ -86,16 +91,20 @@ def report_html(context: ReportContext) -> str:
     title = escape(context.title)
     stamp = '<p class="stamp">SIMULATED DATA</p>' if context.simulated else ""
     mark = "SIMULATED – " if context.simulated else ""
+    make = context.sections.make
     parts = [
-        f"<header><h1>{title}</h1>{_subtitle(context)}{stamp}</header>",
-        _notes(context),
-        _summary(context.analysis),
-        "".join(embedded(picture, number) for number, picture in enumerate(context.figures, 1)),
-        _runs(context.analysis),
-        "".join(map(_part, context.parts)),
-        _budget(context.analysis),
-        _provenance(context),
+        make("The table of results", lambda: _summary(context.analysis)),
+        *(
+            make(f"Figure {number}", partial(embedded, picture, number))
+            for number, picture in enumerate(context.figures, 1)
+        ),
+        make("The table of runs", lambda: _runs(context.analysis)),
+        *(make(f'The section "{part.heading}"', partial(_part, part)) for part in context.parts),
+        make("The uncertainty budget", lambda: _budget(context.analysis)),
+        make("The provenance", lambda: _provenance(context)),
     ]
+    header = f"<header><h1>{title}</h1>{_subtitle(context)}{stamp}</header>"
+    parts = [header, _notes(context), *parts]  # notes last made: by then all failures are known
     css = files("rig.report").joinpath("page.css").read_text(encoding="utf-8") + dark_figure_css()
     body = "\n".join(filter(None, parts))
     return (
@@ -123,7 +132,8 @@ def _subtitle(context: ReportContext) -> str:
 
 
 def _notes(context: ReportContext) -> str:
-    return "".join(f'<p class="note">{escape(note)}</p>' for note in context.notes)
+    notes = (*context.notes, *context.sections.failed.values())
+    return "".join(f'<p class="note">{escape(note)}</p>' for note in notes)
 
 
 def _summary(analysis: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.report.bars import Bars
+    from rig.sections import Sections
 
 
 def pictures(
@@ -22,6 +23,7 @@ def pictures(
     skew_limit_s: float | None = None,
     site_m_s2: object = None,
     bars: Bars = "U95",
+    sections: Sections,
 ) -> list[Picture]:
     """Draw the figures of a report.
 
@@ -39,6 +41,8 @@ def pictures(
         Expected gravity, for scenes without a surface.
     bars
         What the bars on means of several runs stand for.
+    sections
+        Where a figure that cannot be drawn is noted.
 
     Raises
     ------
@@ -50,30 +54,38 @@ def pictures(
     def measured(key: str) -> bool:
         return any(value_of(run.get(key)) is not None for run in runs)
 
-    found = []
+    drawn = []
     if measured("separation_m") or measured("speed_m_s"):
-        found.append(
-            Picture(
-                incline_figure(analysis, curves, simulated, bars),
-                "Separation and end speed against inclination",
-                "Separation of the top rods and speed of the impact chain's end just before it "
-                "reaches the surface, against inclination; lines are the model.",
+        both = "Separation and end speed" if measured("separation_m") else "End speed"
+        apart = "Separation of the top rods and speed" if measured("separation_m") else "Speed"
+        chain = "impact chain" if measured("separation_m") else "chain"
+        drawn.append(
+            (
+                lambda: incline_figure(analysis, curves, simulated, bars),
+                f"{both} against inclination",
+                f"{apart} of the {chain}'s end just before it reaches the surface, against "
+                "inclination; lines are the model.",
             )
         )
     if measured("separation_m"):
-        found.append(
-            Picture(
-                runs_figure(analysis, simulated, skew_limit_s),
+        drawn.append(
+            (
+                lambda: runs_figure(analysis, simulated, skew_limit_s),
                 "Runs in order",
                 "Every run in the order of execution. Bars are expanded uncertainties (95 %).",
             )
         )
     if measured("gravity_m_s2"):
-        found.append(
-            Picture(
-                gravity_figure(analysis, simulated, site_m_s2),
+        drawn.append(
+            (
+                lambda: gravity_figure(analysis, simulated, site_m_s2),
                 "Acceleration of each run",
                 "Acceleration in free fall, run by run. Bars are expanded uncertainties (95 %).",
             )
         )
+    found = []
+    for draw, alt, caption in drawn:
+        svg = sections.make(f'The figure "{alt}"', draw)
+        if svg is not None:
+            found.append(Picture(svg, alt, caption))
     return found

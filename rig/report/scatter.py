@@ -6,7 +6,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.report.bars import LABELS, bar
-from rig.report.columns import Column
+from rig.report.columns import Column, incline
 from rig.report.numbers import fixed, value_of
 from rig.report.parts import Part
 
@@ -56,7 +56,7 @@ def _records(summary: Any) -> Iterator[Record]:
             values: dict[str, float | None] = {"mean": value_of(line[name])}
             values |= {kind: bar(line, name, kind) for kind in LABELS}
             yield {
-                "incline": f"{line['incline_deg']:g}",
+                "incline": incline(line),
                 "strikes": str(line.get("impact_chain", "")),
                 "n": fixed(line["n"], 0),
                 "quantity": label,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from rig.session.reading import Reader
 
+_LISTS = ("budget", "causes")  # of objects, for which a cell has no room
 _UNITS = {
     "_deg": "degrees",
     "_m_s2": "m/s²",
@@ -84,15 +85,22 @@ def export_csv(
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make the folder {place}: {error.strerror or error}") from error
-    superseded = analysis.get("superseded", [])
-    runs = [flatten(run) for run in analysis.get("runs", [])]
+    latest, superseded = analysis.get("runs", []), analysis.get("superseded", [])
+    # Where nothing is struck, nothing is inclined either.
+    struck = any(run.get("impact_chain", "") is not None for run in (*latest, *superseded))
+    no_columns = _LISTS if struck else (*_LISTS, "incline_deg", "impact_chain")
+
+    def row(record: Mapping[str, Any]) -> dict[str, object]:
+        return flatten({key: record[key] for key in record if key not in no_columns})
+
+    runs = [row(run) for run in latest]
     if superseded:
         runs = [{**run, "superseded": 0} for run in runs]
-        runs += [{**flatten(run), "superseded": 1} for run in superseded]
+        runs += [{**row(run), "superseded": 1} for run in superseded]
         runs.sort(key=lambda run: (run.get("run", 0), run.get("attempt", 0)))
     tables = {
         "runs.csv": runs,
-        "summary.csv": [flatten(line) for line in analysis.get("summary", [])],
+        "summary.csv": [row(line) for line in analysis.get("summary", [])],
         "states.csv": [
             {**entry._asdict(), "reasons": "; ".join(entry.reasons)} for entry in session.states()
         ],

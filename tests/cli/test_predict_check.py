@@ -172,3 +172,22 @@ def test_check_says_what_predict_notes(call, tmp_path):
 def test_check_counts_the_runs(call, finished):
     done = call("check", finished.protocol)
     assert "  4 runs: 2 at each incline (40, 60 deg)" in done.out.splitlines()
+
+
+def test_a_table_has_no_columns_of_what_is_not_there(call):
+    fence = call("predict", PROTOCOLS / "picket-fence.yaml").out.splitlines()
+    assert fence[0].split() == ["speed", "(m/s)", "t", "(s)", "model"]
+    assert len(fence) == 2
+    single = call("predict", PROTOCOLS / "single-chain.yaml").out
+    assert "V (m/s)" in single
+    assert "Δz" not in single
+    assert "(cm)" not in single
+
+
+def test_turns_mean_nothing_to_one_chain(call, tmp_path):
+    path = tmp_path / "one.yaml"
+    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8")
+    path.write_text(text.replace("repeats: 12", "repeats: 12, order: ABBA"), "utf-8")
+    done = call("check", path)
+    assert (done.code, done.out) == (2, "")
+    assert "plan.order: found ABBA; the scene has one chain" in done.err

@@ -9,16 +9,17 @@ import pytest
 
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
-from rig.errors import InputError, RigError
+from rig.errors import InputError
 from rig.estimate.coefficients import best, scene
 from rig.estimate.forms import merged
 from rig.estimate.hypotheses import one_alpha
 from rig.estimate.joint import fit
 from rig.estimate.posterior import Posterior, _nodes, posterior
-from rig.estimate.session import _section, estimate
+from rig.estimate.session import estimate
 from rig.model.impact import alpha_inclined
 from rig.protocol.plan import runs
 from rig.report.estimate import estimate_text
+from rig.sections import Sections
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
@@ -298,19 +299,4 @@ def test_chains_with_an_alpha_of_their_own_are_told_apart(stated):
     for name, truth in (("alpha A", 0.15), ("alpha B", 0.25)):
         measured = parameter(both, name)["least_squares"]
         assert abs(measured["value"] - truth) < 4 * measured["u"] < 0.02
-    assert "α of A" in estimate_text({"simulated": True} | both)
-
-
-def test_a_section_that_cannot_be_worked_out_leaves_the_others():
-    said = {"drops": 4, "edges": 96}
-    with _section(said, "end correction"):
-        raise RigError("the fit does not settle", "look at the drops")
-    with _section(said, "curves"):
-        said["curves"] = [1 / 0]
-    with _section(said, "alpha"):
-        said["tests"] = {}
-    assert said["failed"] == [
-        {"section": "end correction", "why": "the fit does not settle"},
-        {"section": "curves", "why": "ZeroDivisionError: division by zero"},
-    ]
-    assert "end correction: the fit does not settle." in estimate_text(said)
+    assert "α of A" in estimate_text(both, Sections())

@@ -168,6 +168,19 @@ def test_one_chain_has_no_free_side():
     assert line.startswith("f:10:3: gates.free: the scene has one chain")
 
 
+@pytest.mark.parametrize("order", ["ABBA", "alternate"])
+def test_one_chain_takes_no_turns(order):
+    two = GOOD.replace("repeats: 4", f"order: {order}")
+    text = two.replace("  B: {like: A}\n", "")
+    text = text.replace("  free: [{channel: 8, height: 20 mm}]\n", "")
+    (line,) = problems(text)
+    assert line.startswith(f"f:10:41: plan.order: found {order}; the scene has one chain")
+    assert parse(two, "f").plan.order == order
+    assert parse(text.replace(order, "fixed"), "f").plan.order == "fixed"
+    # A session's own copy was accepted once, and cannot be changed any more.
+    assert parse(text, "f", kept=True).plan.order == order
+
+
 def test_proposed_heights_are_clear():
     (line,) = problems(GOOD.replace("20 mm", "230 mm"))
     for height in line.rpartition("heights are ")[2].split(" or "):

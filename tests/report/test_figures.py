@@ -7,6 +7,7 @@ import pytest
 
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.pictures import pictures
+from rig.sections import Sections
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
@@ -73,8 +74,13 @@ def test_without_a_prediction_the_mean_takes_its_place() -> None:
 
 
 def test_pictures_follow_the_scene() -> None:
-    assert len(pictures(TWO, CURVES)) == 2
-    assert [picture.alt for picture in pictures(fake_analysis.gravity())] == [
+    assert len(pictures(TWO, CURVES, sections=Sections())) == 2
+    assert [picture.alt for picture in pictures(fake_analysis.gravity(), sections=Sections())] == [
         "Acceleration of each run"
     ]
-    assert pictures({"runs": [], "summary": []}) == []
+    assert pictures({"runs": [], "summary": []}, sections=Sections()) == []
+    single = fake_analysis.two_chains()
+    for line in (*single["runs"], *single["summary"]):
+        line.pop("separation_m", None)
+    (picture,) = pictures(single, sections=Sections())
+    assert "eparation" not in picture.alt + picture.caption

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rig.report.html import ReportContext, report_html, write_report
 from rig.report.pictures import pictures
+from rig.sections import Sections
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains(repeats=4)
@@ -16,7 +17,7 @@ CONTEXT = ReportContext(
     title="Uniform rod chains",
     analysis=TWO,
     simulated=True,
-    figures=pictures(TWO, fake_analysis.curves(), True, skew_limit_s=0.005),
+    figures=pictures(TWO, fake_analysis.curves(), True, skew_limit_s=0.005, sections=Sections()),
     protocol_text="protocol: 1\n",
     protocol_source="uniform.yaml",
     protocol_sha256="ab" * 32,

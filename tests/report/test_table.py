@@ -2,8 +2,10 @@
 
 import pytest
 
+from rig.report.clock import clock_lines
+from rig.report.columns import RUNS
 from rig.report.numbers import decimals_for, fixed, plus_minus
-from rig.report.table import summary_table
+from rig.report.table import aligned, summary_table
 from tests.report import fake_analysis
 
 
@@ -47,3 +49,22 @@ def test_digits_follow_the_uncertainty(quantity: object, text: str) -> None:
 def test_small_helpers() -> None:
     assert fixed(-0.0001, 2) == "0.00"
     assert [decimals_for(u) for u in (0.0094, 0.0096, 0.0996, 1.0, 9.96)] == [4, 4, 2, 1, 0]
+
+
+def test_where_nothing_is_struck_nothing_is_inclined() -> None:
+    fence = fake_analysis.gravity()
+    assert "incline" not in summary_table(fence)
+    void = {**fence["runs"][0], "verdict": "void"}
+    del void["gravity_m_s2"]
+    heading = aligned(RUNS, [void, fence["runs"][1]])[0]
+    assert "incline" not in heading
+    assert "impact" not in heading
+    assert "incline" in aligned(RUNS, fake_analysis.single_chain()["runs"])[0]
+
+
+def test_the_clock_is_told_in_plain_numbers() -> None:
+    pings = {"source": "pings", "pings": 6, "rate_ppm": -1214.6, "notes": []}
+    (line,) = clock_lines({"calibration": {**pings, "u_ppm": 74.0}})
+    assert "board −1214.60 ± 148 ppm off (95 %)" in line
+    (line,) = clock_lines({"calibration": {**pings, "u_ppm": 0.00049}})
+    assert "± 0.00098 ppm" in line

@@ -89,3 +89,25 @@ def test_no_place(tmp_path: Path, session: Session) -> None:
 
 def test_flatten_leaves_objects_in_lists_out() -> None:
     assert flatten({"a": {"b": [1, 2], "c": [{"d": 1}]}}) == {"a_b": "1; 2"}
+
+
+def test_a_fence_has_no_columns_of_an_impact(session, tmp_path):
+    run = {
+        "run": 1, "attempt": 1, "incline_deg": 0.0, "impact_chain": None,
+        "gravity_m_s2": {"value": 9.81, "u": 0.01, "U95": 0.02}, "causes": [],
+        "verdict": "accepted",
+    }  # fmt: skip
+    summary = {"incline_deg": 0.0, "n": 1, "gravity_m_s2": run["gravity_m_s2"]}
+    export_csv(tmp_path, session, {"runs": [run], "summary": [summary]})
+    heads = [
+        (tmp_path / name).read_text("utf-8").split("\n")[0] for name in ("runs.csv", "summary.csv")
+    ]
+    quantity = "gravity_m_s2,gravity_m_s2_u,gravity_m_s2_U95"
+    assert heads == [f"run,attempt,{quantity},verdict", f"n,{quantity}"]
+    struck = {**run, "impact_chain": "A", "causes": [{"edge": 1}]}
+    export_csv(tmp_path, session, {"runs": [struck], "summary": []})
+    assert (
+        (tmp_path / "runs.csv")
+        .read_text("utf-8")
+        .startswith("run,attempt,incline_deg,impact_chain,gr")
+    )

@@ -1,0 +1,138 @@
+"""Sections of a page or a text fail alone, and say so."""
+
+from __future__ import annotations
+
+import copy
+import json
+
+import pytest
+
+from rig.errors import InputError
+from rig.report.estimate import estimate_text, page_parts
+from rig.report.estimate_pictures import estimate_pictures
+from rig.report.html import ReportContext, report_html
+from rig.report.pictures import pictures
+from rig.sections import Sections
+from tests.cli.lab import PROTOCOLS
+from tests.report import fake_analysis
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory):
+    """Make a session of a single chain with four good drops."""
+    from rig.cli import main
+
+    folder = tmp_path_factory.mktemp("single")
+    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8")
+    text = text.replace("{incline: 40 deg, repeats: 12, settle: 10 s}",
+                        "{incline: [40 deg, 60 deg], repeats: 2, settle: 1 s}")  # fmt: skip
+    (folder / "p.yaml").write_text(text, "utf-8")
+    arguments = ["run", folder / "p.yaml", "--port", "sim://", "--session", folder / "s", "--yes"]
+    assert main([*map(str, arguments)]) == 0
+    return folder / "s"
+
+
+@pytest.fixture(scope="module")
+def found(single):
+    from rig.commands.estimate import estimate
+    from rig.results import detailed, protocol_of
+    from rig.session.store import Session
+
+    with Session.open(single, readonly=True) as session:
+        said = estimate(protocol_of(session), detailed(session)[0])
+    return {"simulated": True} | json.loads(json.dumps(said))
+
+
+def test_a_single_chain_s_estimate_speaks_of_no_other(found):
+    sections = Sections()
+    text = estimate_text(found, sections)
+    assert "Best single α" in text
+    for word in ("free chain", "Δz"):
+        assert word not in text
+    drawn = estimate_pictures(found, sections)
+    assert "Δz" not in drawn["curves"].alt + drawn["curves"].caption
+    assert not sections.failed
+
+
+def test_a_part_that_fails_takes_no_other_along(found):
+    broken = copy.deepcopy(found)
+    del broken["impulses"]["inclines"][0]["groups"]
+    sections = Sections()
+    headings = [part.heading for part in page_parts(broken, sections)]
+    assert "Best single α" in headings
+    assert "The protocol's model" in headings
+    assert sections.failed['The section "Single impulses"'] == (
+        "The section \"Single impulses\" could not be made: KeyError: 'groups'"
+    )
+    drawn = estimate_pictures(broken, sections)
+    assert set(drawn) == set(estimate_pictures(found, Sections())) - {"impulses"}
+    assert "The picture of the impulses" in sections.failed
+
+
+@pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
+def test_a_posterior_without_spread_has_no_picture(found, what):
+    narrow = copy.deepcopy(found)
+    narrow["parameters"] = [
+        {"name": name, "least_squares": {"value": 0.5, "u": 0.1, "U95": 0.2}}
+        for name in ("restitution", "friction")
+    ]
+    nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
+    narrow["posterior"] = {
+        "names": ["restitution", "friction"],
+        "weights": [1.0 / len(nodes)] * len(nodes),
+        "means": nodes,
+        "sds": [[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes),
+    }
+    sections = Sections()
+    assert "posterior" not in estimate_pictures(narrow, sections)
+    assert not sections.failed
+
+
+def test_a_page_says_what_it_lacks():
+    two = fake_analysis.two_chains(repeats=4)
+    two["runs"][0]["budget"] = [{"name": "clock", "quantity": "speed_m_s", "u": "much"}]
+    sections = Sections()
+    uneven = {"incline_deg": [0.0, 10.0], "separation_m": [0.1], "speed_m_s": [6.0]}
+    (figure,) = pictures(two, uneven, sections=sections)
+    assert figure.alt == "Runs in order"
+    page = report_html(
+        ReportContext(title="t", analysis=two, simulated=True, figures=[figure], sections=sections)
+    )
+    assert "The uncertainty budget could not be made: ValueError: " in page
+    assert (
+        "Separation and end speed against inclination&quot; could not be made: IndexError" in page
+    )
+    assert "<h2>Runs</h2>" in page
+
+
+def test_a_missing_package_is_no_failed_section():
+    sections = Sections()
+
+    def fail(error: Exception, cause: Exception | None = None) -> None:
+        raise error from cause
+
+    with pytest.raises(ModuleNotFoundError):
+        sections.make("one", lambda: fail(ModuleNotFoundError("no scipy", name="scipy")))
+    with pytest.raises(InputError):
+        sections.make("one", lambda: fail(InputError("no figures"), ImportError("matplotlib")))
+    assert not sections.failed
+    assert sections.make("one", lambda: fail(InputError("no good drop", "see why"))) is None
+    assert sections.failed == {"one": "one could not be made: no good drop"}
+
+
+def test_a_report_is_written_without_its_estimate(single, tmp_path, capsys, monkeypatch):
+    from rig.cli import main
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("float division\nby zero")
+
+    monkeypatch.setattr("rig.commands.report.estimate", fail)
+    assert main(["report", str(single), "-o", str(tmp_path / "r.html")]) == 0
+    sentence = (
+        "The estimate of the impacts could not be made: ZeroDivisionError: float division by zero"
+    )
+    assert capsys.readouterr().err.splitlines() == [sentence, f"report: {tmp_path / 'r.html'}"]
+    html = (tmp_path / "r.html").read_text("utf-8")
+    assert sentence in html
+    assert "<h2>Runs</h2>" in html
+    assert "End speed against inclination" in html
