@@ -9,7 +9,7 @@ from textual.containers import Horizontal
 from textual.content import Content
 
 from rig.analysis.student import coverage_factor
-from rig.analysis.summary import predicted_run
+from rig.predictions import predicted_run
 from rig.report.columns import AUDIT
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import chain_pictures
