@@ -1,13 +1,20 @@
-"""From a protocol to what the model expects of it, loading only the mechanics its scene has."""
+"""What the model expects of a protocol's scene: the one predictor, with and without air.
+
+Mechanics that a scene does not have are not loaded.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.scene import Protocol, RodChain
+    from rig.model.predict import Prediction
+    from rig.protocol.scene import Protocol, Run
 
 
 def predictions(protocol: Protocol) -> list[dict[str, Any]]:
@@ -18,7 +25,91 @@ def predictions(protocol: Protocol) -> list[dict[str, Any]]:
     list of dict
         As ``rig predict --json`` prints them, one an incline; one alone where nothing is struck.
     """
-    return [_free_fall(protocol)] if protocol.surface is None else _impacts(protocol)
+    if protocol.surface is None:
+        return [_free_fall(protocol)]
+    struck, free = ends(protocol)
+    found = []
+    for incline in dict.fromkeys(protocol.plan.inclines):
+        one = predict_incline(protocol, incline, struck, free)
+        notes = list(one.notes)
+        if free is not None and _unlike(protocol, struck, free):
+            notes.append(f"chains are unlike: {struck} strikes")
+        found.append(
+            {
+                "incline_deg": incline,
+                "model": one.model,
+                "alpha": one.alpha,
+                "gamma": one.gamma,
+                "separation_m": one.separation,
+                "separation_u_m": one.separation_u,
+                "speed_m_s": one.speed,
+                "speed_u_m_s": one.speed_u,
+                "fall_time_s": one.time,
+                "free_fall_speed_m_s": one.free_fall_speed,
+                "in_domain": one.in_domain,
+                "notes": notes,
+            }
+        )
+    return found
+
+
+def ends(protocol: Protocol) -> tuple[str, str | None]:
+    """Name the chain that strikes and the one that falls beside it, where no run says."""
+    first, *others = protocol.chains
+    return first, others[0] if others else None
+
+
+def predict_incline(
+    protocol: Protocol, incline_deg: float, struck: str, free: str | None = None
+) -> Prediction:
+    """Predict the fall of a chain that strikes a surface, beside one that does not.
+
+    Parameters
+    ----------
+    protocol
+        With a surface.
+    struck, free
+        Names of the chains; without a second one Δz is from a twin of the first.
+    """
+    from rig.model.predict import predict  # noqa: PLC0415 - only where something is struck
+
+    assert protocol.surface is not None
+    chain, kappas = protocol.chains[struck].chain, air_of(protocol, struck)
+    found = predict(
+        chain,
+        protocol.surface,
+        incline_deg,
+        protocol.drop,
+        protocol.gravity,
+        initial_speed=protocol.initial_speed,
+        kappas=kappas,
+        drag_u=0.0 if protocol.drag is None else protocol.drag.relative_u,
+    )
+    if free is None or found.separation is None or found.time is None:
+        return found
+    # Top rods of unlike chains start at unlike heights.
+    longer = protocol.chains[free].chain.length - chain.length
+    held = _held_back(protocol, kappas, air_of(protocol, free), found.time)
+    return replace(found, separation=found.separation + longer + held)
+
+
+def predicted_run(protocol: Protocol, run: Run) -> tuple[Quantity | None, Quantity | None]:
+    """Δz and V of one run by the model; `None` outside its domain of definition."""
+    assert run.impact is not None
+    found = predict_incline(protocol, run.incline_deg, run.impact, run.free)
+    if found.separation is None or found.speed is None:
+        return None, None
+    return (
+        Quantity(found.separation, found.separation_u or 0.0),
+        Quantity(found.speed, found.speed_u or 0.0),
+    )
+
+
+def _unlike(protocol: Protocol, one: str, other: str) -> bool:
+    """Whether two chains differ, or what the air takes of them."""
+    return protocol.chains[one].chain != protocol.chains[other].chain or air_of(
+        protocol, one
+    ) != air_of(protocol, other)
 
 
 def notes(protocol: Protocol) -> list[str]:
@@ -32,7 +123,7 @@ def notes(protocol: Protocol) -> list[str]:
 
 def _free_fall(protocol: Protocol) -> dict[str, Any]:
     """Predict the fall of a chain that strikes nothing."""
-    (rods,) = protocol.chains.values()
+    ((name, rods),) = protocol.chains.items()
     drop, gravity, start = (
         each.value for each in (protocol.drop, protocol.gravity, protocol.initial_speed)
     )
@@ -43,7 +134,7 @@ def _free_fall(protocol: Protocol) -> dict[str, Any]:
     else:
         from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
 
-        kappa = _kappas(protocol, rods)[0]
+        kappa = air_of(protocol, name)[0]
         speed, time = drag_leg(drop + rods.chain.length, start, gravity, kappa)
     return {
         "incline_deg": 0.0,
@@ -59,57 +150,11 @@ def _free_fall(protocol: Protocol) -> dict[str, Any]:
     }
 
 
-def _impacts(protocol: Protocol) -> list[dict[str, Any]]:
-    """Predict the fall of a chain that strikes a surface, incline by incline."""
-    from rig.model.predict import predict  # noqa: PLC0415 - only where something is struck
-
-    assert protocol.surface is not None
-    first, *others = protocol.chains.values()
-    kappas = _kappas(protocol, first)
-    other = others[0] if others else first
-    its_kappas = _kappas(protocol, other) if others else kappas
-    unlike = other.chain != first.chain or its_kappas != kappas
-    found = []
-    for incline in dict.fromkeys(protocol.plan.inclines):
-        one = predict(
-            first.chain,
-            protocol.surface,
-            incline,
-            protocol.drop,
-            protocol.gravity,
-            initial_speed=protocol.initial_speed,
-            kappas=kappas,
-            drag_u=0.0 if protocol.drag is None else protocol.drag.relative_u,
-        )
-        notes, separation = list(one.notes), one.separation
-        if unlike:
-            notes.append(f"chains are unlike: {first.name} strikes")
-            if separation is not None and one.time is not None:
-                separation += other.chain.length - first.chain.length
-                separation += _held_back(protocol, kappas, its_kappas, one.time)
-        found.append(
-            {
-                "incline_deg": incline,
-                "model": one.model,
-                "alpha": one.alpha,
-                "gamma": one.gamma,
-                "separation_m": separation,
-                "separation_u_m": one.separation_u,
-                "speed_m_s": one.speed,
-                "speed_u_m_s": one.speed_u,
-                "fall_time_s": one.time,
-                "free_fall_speed_m_s": one.free_fall_speed,
-                "in_domain": one.in_domain,
-                "notes": notes,
-            }
-        )
-    return found
-
-
-def _kappas(protocol: Protocol, rods: RodChain) -> list[float]:
-    """κ on the leg before each impact, 1/m; empty without air."""
+def air_of(protocol: Protocol, name: str) -> list[float]:
+    """κ of a chain on the leg before each impact, 1/m; empty without air."""
     if protocol.drag is None:
         return []
+    rods = protocol.chains[name]
     from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only where there is air
 
     drag = protocol.drag

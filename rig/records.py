@@ -21,6 +21,13 @@ class Edge(NamedTuple):
     blocked: bool
 
 
+class Job(NamedTuple):
+    """One attempt at one run."""
+
+    run: int
+    attempt: int
+
+
 class Ping(NamedTuple):
     """One clock sample: host time before and after, and the device's tick between (u32)."""
 

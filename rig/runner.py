@@ -2,23 +2,42 @@
 
 from __future__ import annotations
 
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
-from rig.analysis.drop import analyze_drop
-from rig.calibration import Calibrator
+from rig.campaign.events import (
+    Answered,
+    Arm,
+    Collect,
+    Fire,
+    Found,
+    GiveUp,
+    GoOn,
+    Judge,
+    Judged,
+    Log,
+    Stage,
+    Stop,
+    Tick,
+    Wait,
+    refused,
+)
+from rig.campaign.machine import Flow, step
+from rig.campaign.plan import RunLine, next_job, rest_s, void_counts, what_to_hang
 from rig.daemon.connecting import connect
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, InputError
-from rig.link.messages import Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
-from rig.protocol.plan import ATTEMPTS, runs
+from rig.protocol.plan import runs
+from rig.records import Job
 from rig.report.numbers import plus_minus
 from rig.results import results
+from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -27,20 +46,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.result import DropResult
+    from rig.campaign.events import Effect, Event
     from rig.daemon.connecting import Rig
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.scene import Protocol
     from rig.records import Drop
-
-_SETTLED = (RunState.ACCEPTED, RunState.MARGINAL, RunState.REJECTED)
-_CLOCK_U = 1e-4
-"""How well the device's clock must be known before a drop, relative: a resonator that is off by
-0.13 % spreads a chain's edges over the wrong rods."""
-_CLOCK_S = 2.0  # of clock samples are plenty for that
-_LOOKS = 5  # how often to try again what a device refuses when nobody is there to help
-_HELP = (Reason.GATE_BLOCKED, Reason.STOPPED)
-"""Refusals that somebody at the rig can end."""
-_DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
-"""Refusals to fire after which the drop can be prepared again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +136,7 @@ def run_protocol(
 
 
 class Campaign:
-    """The plan on its way.
+    """Drives a plan on its way: carries out what it wants, one effect after the other.
 
     Parameters
     ----------
@@ -150,110 +159,148 @@ class Campaign:
         self.operator = operator
         self.interrupts = interrupts
         self.plan = runs(protocol)
-        self._unfired = 0  # refusals to fire in a row
-        self._calibrator = Calibrator()
-        self._clock_known = False  # once well enough, always: one rate for all samples
+        self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=operator.ask is not None)
+        self._left = deque(self.plan)  # runs that are not done yet
+        self._unjudged: deque[Job] = deque()
+        self._effects: deque[Effect] = deque()
+        self._live = LiveAnalysis(self.session.path)
+        self._clock_u: float | None = None
+        self._drop: Drop | None = None  # collected last
+        self._result: DropResult | None = None  # of the drop judged last
+        self._failed: DeviceRefusedError | None = None
 
     def carry_out(self) -> None:
-        """Do every run that is not done yet, in order."""
+        """Do every run that is not done yet, in order.
+
+        Raises
+        ------
+        DeviceError
+            The device is in trouble, or refuses what nobody there can help.
+        """
         for run in self.plan:
             entry = self.session.latest_state(run.number)
             if entry is not None and entry.state is RunState.RECORDED:
-                self._judge(run, self.rig.collect(run.number, entry.attempt))
-        for run in self.plan:
-            while (attempt := self._next_attempt(run)) is not None:
-                self._drop(run, attempt)
+                self._unjudged.append(Job(run.number, entry.attempt))
+        while self.flow.stage is not Stage.DONE:
+            self._take(self._next())
+            self._carry_out()
 
-    def _next_attempt(self, run: Run) -> int | None:
-        """Number of the next attempt at a run; `None` when the run is done with."""
-        entries = self.session.states(run.number)
-        if not entries:
-            return 1
-        if entries[-1].state in _SETTLED:
-            return None
-        void = sum(entry.state is RunState.VOID for entry in entries)
-        return None if void >= ATTEMPTS else entries[-1].attempt + 1
+    def _next(self) -> Event:
+        """Say what the operator would: at each stage where the campaign waits for one."""
+        if self.flow.stage is Stage.COUNTDOWN:
+            return Tick(0.0)
+        if self._unjudged and self.flow.stage is not Stage.RESULT:
+            return Found(self._unjudged.popleft())
+        job = self._unjudged[0] if self._unjudged else self._next_job()
+        if self.flow.stage is not Stage.PREPARE or job is None:
+            return GoOn(job)
+        self._request(job)
+        return GoOn(job, self._rest_s())
 
-    def _drop(self, run: Run, attempt: int) -> None:
-        """Prepare, release, record and judge one drop."""
-        self._prepare(run, attempt)
-        token = self._arm(run, attempt)
-        # A chain that falls is recorded to the end: it took somebody minutes to hang.
+    def _next_job(self) -> Job | None:
+        """Name the next attempt; runs before it are done for good."""
+        while self._left:
+            run = self._left[0]
+            entries = self.session.states(run.number)
+            line = RunLine(run.number, run.incline_deg, run.impact, run.free)
+            if entries:
+                line = line._replace(attempt=entries[-1].attempt, state=entries[-1].state)
+            voids = {Job(*entry[:2]) for entry in entries if entry.state is RunState.VOID}
+            job = next_job([line], void_counts(voids, ()))
+            if job is not None:
+                return job
+            self._left.popleft()
+        return None
+
+    def _request(self, job: Job) -> None:
+        """Ask whoever is there to hang the chains, or to end what is in the way."""
+        trouble = self.flow.trouble.replace("\n", "; ")
+        unfired = trouble and job != self.flow.job  # an attempt that was armed counts
+        if unfired:
+            self.operator.say(f"not fired: {trouble}")
+        if self.operator.ask is None:
+            return
+        if trouble and not unfired:
+            self.operator.ask(f"not armed: {trouble}")
+            return
+        again = f", attempt {job.attempt}" if job.attempt > 1 else ""
+        what = what_to_hang(self._left[0])
+        self.operator.ask(f"run {job.run} of {len(self.plan)}{again}: {what}")
+
+    def _rest_s(self) -> float:
+        """How long the chains rest; a clock once known well enough stays so."""
+        if rest_s(0.0, self._clock_u) > 0.0:
+            clock = self._live.clock(self.session).device
+            self._clock_u = None if clock is None else clock.u
+        return rest_s(self.protocol.plan.settle, self._clock_u)
+
+    # ------------------------------------------------------------------ effects
+
+    def _take(self, event: Event) -> None:
+        self.flow, wanted = step(self.flow, event)
+        self._effects += wanted
+
+    def _carry_out(self) -> None:
+        """Carry out what is wanted, and what comes of that, until nothing is."""
+        while self._effects:
+            match self._effects[0]:
+                case Fire():
+                    self._fall()
+                case GiveUp():
+                    assert self._failed is not None
+                    raise self._failed
+                case effect:
+                    self._effects.popleft()
+                    self._do(effect)
+
+    def _fall(self) -> None:
+        """Let go, and stay until the drop is recorded: it took somebody minutes to hang."""
         with self.interrupts.held():
             try:
-                if not self._fire(token):
-                    return
-                drop = self.rig.collect(run.number, attempt)
+                while self._effects and isinstance(self._effects[0], Fire | Collect | Stop):
+                    self._do(self._effects.popleft())
             except KeyboardInterrupt:
-                self._interrupted("interrupted by the operator")
+                self._stop("interrupted by the operator")
                 raise
-        self._judge(run, drop)
 
-    def _prepare(self, run: Run, attempt: int) -> None:
-        """Have the chains hung and let them come to rest."""
-        again = f", attempt {attempt}" if attempt > 1 else ""
-        if self.operator.ask is not None:
-            self.operator.ask(f"run {run.number} of {len(self.plan)}{again}: {what_to_hang(run)}")
-        settle = self.protocol.plan.settle
-        if not self._clock_known:
-            clock = self._calibrator.look(self.session).device
-            self._clock_known = clock is not None and clock.u <= _CLOCK_U
-        if not self._clock_known:
-            settle = max(settle, _CLOCK_S)
-        self.rig.wait(settle)
-
-    def _arm(self, run: Run, attempt: int) -> int:
-        """Arm; let the release cool, and ask for free beams and a closed emergency stop."""
-        looks = 0
-        while True:
-            try:
-                return self.rig.arm(run.number, attempt)
-            except DeviceRefusedError as refusal:
-                looks += 1
-                self._put_right(refusal, last=looks >= _LOOKS)
-
-    def _put_right(self, refusal: DeviceRefusedError, *, last: bool) -> None:
-        """End what keeps the device from arming: wait, or ask whoever is there."""
-        cooling = refusal.reason is Reason.COOLING
-        if refusal.reason in _HELP and self.operator.ask is not None:
-            self.operator.ask(f"not armed: {refusal.message}; {refusal.hint}")
-        elif last or not (cooling or refusal.reason in _HELP):
-            raise refusal
-        self.rig.wait(refusal.detail / 1000 if cooling else 1.0)
-
-    def _fire(self, token: int) -> bool:
-        """Let go; `False` when the device would not and the drop can be prepared again."""
+    def _do(self, effect: Effect) -> None:
+        """Carry one effect out and tell the plan what came of it."""
+        token = None
         try:
-            self.rig.fire(token)
+            match effect:
+                case Stop(reason):
+                    self._stop(reason)
+                    return
+                case Wait(seconds):
+                    self.rig.wait(seconds)
+                case Arm(job):
+                    token = self.rig.arm(*job)
+                case Fire(armed):
+                    self.rig.fire(armed)
+                case Collect(job):
+                    self._drop = self.rig.collect(*job)
+                case Judge(job):
+                    self._judge(job)
+                    return
+                case Log(job, state, reasons):
+                    self.rig.log_state(*job, RunState(state), reasons)
+                    assert self._result is not None
+                    self.operator.say(narration(self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
-            self._interrupted(refusal.message)
-            self._unfired += 1
-            alone = self.operator.ask is None
-            if refusal.reason not in _DISTURBED or (alone and self._unfired >= _LOOKS):
-                raise
-            self.operator.say(f"not fired: {refusal.message}; {refusal.hint}")
-            return False
-        self._unfired = 0
-        return True
+            self._failed = refusal
+            self._take(refused(self.flow.ticket, refusal))
+        else:
+            self._take(Answered(self.flow.ticket, token))
 
-    def _interrupted(self, why: str) -> None:
+    def _judge(self, job: Job) -> None:
+        if self._drop is None or job != (self._drop.run, self._drop.attempt):
+            self._drop = self.rig.collect(*job)
+        result = self._result = self._live.judge(self.session, self._drop)
+        self._take(Judged(self.flow.ticket, result.verdict, result.reasons))
+
+    def _stop(self, why: str) -> None:
         with suppress(DeviceError):
             self.rig.stop(why)
-
-    def _judge(self, run: Run, drop: Drop) -> None:
-        """Analyse a recorded drop and log the verdict."""
-        scale = self._calibrator.look(self.session).scale(drop)
-        result = analyze_drop(self.protocol, run, drop, scale)
-        self.rig.log_state(run.number, drop.attempt, RunState(result.verdict), result.reasons)
-        self.operator.say(narration(result, len(self.plan)))
-
-
-def what_to_hang(run: Run) -> str:
-    """Tell the operator what goes where."""
-    if run.impact is None:
-        return f"hang {run.free} for free fall"
-    free = f" · free side: {run.free}" if run.free else ""
-    return f"incline {run.incline_deg:g}° · impact side: {run.impact}{free}"
 
 
 def narration(result: DropResult, planned: int) -> str:

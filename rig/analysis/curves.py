@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.student import coverage_factor
-from rig.model.fall import free_fall_speed
-from rig.model.predict import predict
+from rig.predictions import ends, predict_incline
 
 if TYPE_CHECKING:
     from rig.protocol.scene import Protocol
@@ -28,7 +27,7 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     surface = protocol.surface
     if surface is None:
         return {}
-    chain = next(iter(protocol.chains.values())).chain
+    struck, free = ends(protocol)
     inclines = protocol.plan.inclines
     low = max(0.0, min(inclines) - _BEYOND)
     high = min(_STEEPEST, max(inclines) + _BEYOND)
@@ -36,18 +35,15 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     if surface.pile is not None and low < surface.pile.below_deg <= high:
         edge = surface.pile.below_deg
         points |= {edge, float(np.nextafter(edge, 0.0))}
-    found = [
-        predict(chain, surface, incline, protocol.drop, protocol.gravity)
-        for incline in sorted(points)
-    ]
-    found = [one for one in found if one.separation is not None]
+    every = [predict_incline(protocol, incline, struck, free) for incline in sorted(points)]
+    found = [one for one in every if one.separation is not None]
     factor = coverage_factor(float("inf"))
     curves: dict[str, Any] = {
         "incline_deg": [one.incline_deg for one in found],
         "segments": ["pile" if "pile" in one.model else "surface" for one in found],
         "speed_m_s": [one.speed for one in found],
         "speed_U95_m_s": [factor * (one.speed_u or 0.0) for one in found],
-        "free_fall_speed_m_s": free_fall_speed(chain, protocol.drop.value, protocol.gravity.value),
+        "free_fall_speed_m_s": every[0].free_fall_speed,
     }
     if protocol.two_chains:
         curves["separation_m"] = [one.separation for one in found]

@@ -18,7 +18,7 @@ from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.fit import Fit
     from rig.analysis.learn import Lesson, Taught
@@ -126,15 +126,19 @@ def analyze(
                 "is it the right protocol? rig check PROTOCOL shows the plan",
             )
         result, fit = fit_drop(protocol, planned[drop.run], drop, scale(drop))
-        why = rejected.get((drop.run, drop.attempt))
-        if why is not None:
-            reasons = (*why, *result.reasons)
-            result = replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
-        results.append(result)
+        results.append(overruled(result, rejected.get((drop.run, drop.attempt))))
         fits.append(fit)
         if progress is not None:
             progress(number, len(drops))
     return gather(protocol, results, fits)
+
+
+def overruled(result: DropResult, causes: Sequence[str] | None) -> DropResult:
+    """Put the operator's causes to reject a drop, if there are any, above its limits."""
+    if causes is None:
+        return result
+    reasons = (*causes, *result.reasons)
+    return replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
 
 
 def gather(
@@ -149,8 +153,27 @@ def gather(
     results, fits
         Of each drop, as `rig.analysis.drop.fit_drop` gives them.
     """
-    found, lesson, adjusted = _taught(results, fits)
-    found.sort(key=lambda result: (result.run.number, result.attempt))
+    return sum_up(protocol, *_taught(results, fits))
+
+
+def sum_up(
+    protocol: Protocol,
+    results: Iterable[DropResult],
+    lesson: Lesson | None = None,
+    adjusted: Mapping[tuple[int, int], Fit | Taught] | None = None,
+) -> Analysis:
+    """Sum drops up as they are.
+
+    Parameters
+    ----------
+    protocol
+        The scene and its plan.
+    results
+        Of each drop.
+    lesson, adjusted
+        As in `Analysis`.
+    """
+    found = sorted(results, key=lambda result: (result.run.number, result.attempt))
     last = {result.run.number: result for result in found}
     latest = tuple(last.values())
     earlier = tuple(result for result in found if last[result.run.number] is not result)
@@ -158,7 +181,7 @@ def gather(
     spared = any(result.limits in GOOD for result in latest)
     whole = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
     paired = effects(protocol, latest)
-    return Analysis(latest, earlier, summary, lesson, adjusted, paired, whole)
+    return Analysis(latest, earlier, summary, lesson, adjusted or {}, paired, whole)
 
 
 def _taught(

@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
-from rig.model.predict import predict
+from rig.predictions import predicted_run
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -188,19 +188,3 @@ def _predicted(protocol: Protocol, run: Run, names: Sequence[str]) -> dict[str, 
             return {}
         found = {"separation_m": separation, "speed_m_s": speed}
     return {name: found[name] for name in names if name in found}
-
-
-def predicted_run(protocol: Protocol, run: Run) -> tuple[Quantity | None, Quantity | None]:
-    """Δz and V of one run by the model; `None` outside its domain of definition."""
-    assert protocol.surface is not None
-    assert run.impact is not None
-    chain = protocol.chains[run.impact].chain
-    found = predict(chain, protocol.surface, run.incline_deg, protocol.drop, protocol.gravity)
-    if found.separation is None or found.speed is None:
-        return None, None
-    # Top rods of unlike chains start at unlike heights.
-    longer = protocol.chains[run.free].chain.length - chain.length if run.free else 0.0
-    return (
-        Quantity(found.separation + longer, found.separation_u or 0.0),
-        Quantity(found.speed, found.speed_u or 0.0),
-    )

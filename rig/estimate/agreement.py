@@ -10,8 +10,9 @@ import numpy as np
 
 from rig.analysis.result import GOOD
 from rig.analysis.student import coverage_factor
-from rig.analysis.summary import MEASURANDS, by_case, mean, predicted_run
+from rig.analysis.summary import MEASURANDS, by_case, mean
 from rig.estimate.tail import chi2_tail
+from rig.predictions import predicted_run
 from rig.units import Quantity
 
 if TYPE_CHECKING:

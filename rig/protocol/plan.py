@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-ATTEMPTS = 3
-"""How often a void run is made before it stays void."""
 
 # Which chain is on the impact side, repeating. ABBA cancels a drift that is linear in time.
 _PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0, 1), "fixed": (0,)}

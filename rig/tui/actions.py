@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rig.tui.flow import BEFORE_RELEASE
-from rig.tui.turns import Stage
+from rig.campaign.events import Stage
+from rig.campaign.machine import BEFORE_RELEASE
 
 ANY = frozenset(Stage)
 _JUDGED = frozenset({Stage.RESULT})

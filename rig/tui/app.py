@@ -11,12 +11,12 @@ from textual.app import App, ComposeResult, SystemCommand
 from textual.css.query import NoMatches
 from textual.widgets import ContentSwitcher
 
+from rig.campaign.events import Refused, Stage, Tick
+from rig.campaign.machine import Flow, step
 from rig.tui import doing, effects, keyboard, pages, seen, themes
 from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, possible, shown_key
-from rig.tui.flow import Flow, step
 from rig.tui.follow import Follower
 from rig.tui.screens.protocol import ProtocolPage
-from rig.tui.turns import Refused, Stage, Tick
 from rig.tui.widgets.status import Status
 from rig.tui.widgets.stopbar import StopBar
 from rig.tui.wire import Wire
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
     from textual.screen import Screen
 
-    from rig.tui.findings import Findings
+    from rig.campaign.events import Event
+    from rig.results.view import SessionView
     from rig.tui.gates import Lamps
     from rig.tui.model import Model
     from rig.tui.options import Options
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.state import State
-    from rig.tui.turns import Event
 
 TICK_S = 0.1
 _SHARE = 0.17  # of a core, that this may take on a slow machine
@@ -165,7 +165,7 @@ class RigApp(App[None]):
         return self.follower.lamps
 
     @property
-    def findings(self) -> Findings | None:
+    def findings(self) -> SessionView | None:
         """The session file, as read last."""
         return self.follower.findings
 

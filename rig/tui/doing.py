@@ -6,13 +6,13 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rig.campaign.events import Again, GoOn, Note, Reject, Stage, Stopped, Try, refused
+from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.tui import seen, themes
 from rig.tui.actions import shown_key
-from rig.tui.plan import again
 from rig.tui.screens.ask import Ask, Confirm
 from rig.tui.screens.help import Help
-from rig.tui.turns import Again, GoOn, Note, Refused, Reject, Stage, Stopped, Try
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -115,7 +115,7 @@ async def _drops(app: RigApp) -> None:
 
 
 def _refused(app: RigApp, error: RigError) -> None:
-    app.event(Refused(app.flow.ticket, f"{error.message}\n{error.hint}"))
+    app.event(refused(app.flow.ticket, error))
 
 
 def _ask(app: RigApp, question: str, answer: type[Reject | Note]) -> None:

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.errors import RigError
-from rig.tui.turns import (
+from rig.campaign.events import (
     Answered,
     Arm,
     Collect,
     Drive,
     Fire,
+    GiveUp,
     Judge,
     Judged,
     Log,
-    Refused,
     Stop,
     Wait,
+    refused,
 )
+from rig.errors import RigError
 
 if TYPE_CHECKING:
+    from rig.campaign.events import Effect
     from rig.tui.app import RigApp
-    from rig.tui.turns import Effect
 
 
 async def carry_out(app: RigApp, effect: Effect, ticket: int) -> None:
@@ -31,8 +32,10 @@ async def carry_out(app: RigApp, effect: Effect, ticket: int) -> None:
     token = None
     try:
         match effect:
-            case Stop():
-                await wire.call("stop", reason="stopped by the operator")
+            case GiveUp():
+                return  # what is wrong is shown, and the operator goes on from there
+            case Stop(reason):
+                await wire.call("stop", reason=reason)
                 return
             case Wait(seconds):
                 await wire.call("wait", seconds=seconds)
@@ -55,6 +58,6 @@ async def carry_out(app: RigApp, effect: Effect, ticket: int) -> None:
                 app.event(Judged(ticket, result.verdict, tuple(result.reasons)))
                 return
     except RigError as error:
-        app.event(Refused(ticket, f"{error.message}\n{error.hint}"))
+        app.event(refused(ticket, error))
     else:
         app.event(Answered(ticket, token))

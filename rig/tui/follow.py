@@ -6,19 +6,20 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig.campaign.events import Closed, Found, Lost, Opened, Stage, Warned
+from rig.campaign.machine import BEFORE_RELEASE
+from rig.campaign.plan import unjudged
 from rig.errors import RigError
-from rig.tui.flow import BEFORE_RELEASE
+from rig.records import Job
 from rig.tui.gates import Lamps
-from rig.tui.plan import Job, unjudged
-from rig.tui.state import State
-from rig.tui.turns import Closed, Found, Lost, Opened, Stage, Warned
+from rig.tui.state import State, state_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator, Mapping
 
-    from rig.tui.book import Book
-    from rig.tui.findings import Findings
-    from rig.tui.turns import Event
+    from rig.campaign.events import Event
+    from rig.results.live import LiveAnalysis
+    from rig.results.view import SessionView
     from rig.tui.wire import Wire
 
 _CLOCK_S = 3.0
@@ -43,6 +44,8 @@ class Follower:
         The gates.
     findings
         The session file, as read last.
+    voids
+        Its void attempts.
     judged
         Drops that this screen gave a verdict.
     unreadable
@@ -54,13 +57,14 @@ class Follower:
     ) -> None:
         self.state = State()
         self.lamps = Lamps()
-        self.findings: Findings | None = None
+        self.findings: SessionView | None = None
+        self.voids: frozenset[Job] = frozenset()
         self.judged: set[Job] = set()
         self.unreadable = ""
         self._wire = wire
         self._begin = begin
         self._path: Path | None = None
-        self._book: Book | None = None
+        self._book: LiveAnalysis | None = None
         self._reading = self._learning = False
         self._wanted: object = None
         self._read: object = None
@@ -74,8 +78,11 @@ class Follower:
 
     def look_at(self, path: Path) -> None:
         """Look at a file that nobody records."""
-        self._path, self._book, self.findings = path, None, None
+        self._forget(path)
         self._begin(self._read_quietly())
+
+    def _forget(self, path: Path | None = None) -> None:
+        self._path, self._book, self.findings, self.voids = path, None, None, frozenset()
 
     def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
         """Take what the daemon says now.
@@ -102,7 +109,7 @@ class Follower:
             self._look_at_session(session, state, now)
             events.append(Opened())
         elif before.section("session") and not reopens:
-            self._path = self._book = self.findings = None
+            self._forget()
             events.append(Closed())
         if not wire.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
             events.append(
@@ -148,7 +155,7 @@ class Follower:
 
     # ------------------------------------------------------------------ the file
 
-    async def read(self) -> Findings:
+    async def read(self) -> SessionView:
         """Read the session file as it is now.
 
         Raises
@@ -174,12 +181,15 @@ class Follower:
             self._begin(self._learn(book, found))
         return found
 
-    def _take(self, found: Findings) -> None:
+    def _take(self, found: SessionView) -> None:
         self.findings, self.unreadable = found, ""
+        self.voids = frozenset(
+            Job(entry.run, entry.attempt) for entry in found.states if entry.state == "void"
+        )
         if self._wire is not None:
             self._wire.changed = True
         else:
-            self.state = found.state()
+            self.state = state_of(found)
             self.lamps = Lamps.of(found.channels)
 
     async def _read_quietly(self) -> None:
@@ -188,19 +198,19 @@ class Follower:
         except RigError as error:
             self.unreadable = f"{error.message}\n{error.hint}"
 
-    async def _learn(self, book: Book, found: Findings) -> None:
+    async def _learn(self, book: LiveAnalysis, found: SessionView) -> None:
         try:
-            await asyncio.to_thread(book.learn, found)
+            await asyncio.to_thread(book.fit_jointly, found)
         finally:
             self._learning = False
         if book is self._book:
             await self._read_quietly()
 
 
-def _opened(path: Path) -> Book:
-    from rig.tui.book import Book  # noqa: PLC0415 - the analysis is not needed to paint
+def _opened(path: Path) -> LiveAnalysis:
+    from rig.results.live import LiveAnalysis  # noqa: PLC0415 - the analysis is not needed to paint
 
-    return Book(path)
+    return LiveAnalysis(path)
 
 
 def _broken(stage: Stage, state: State) -> Iterator[Event]:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from textual.widgets import Input
 
-from rig.tui.flow import BEFORE_RELEASE
+from rig.campaign.events import Stopped
+from rig.campaign.machine import BEFORE_RELEASE
 from rig.tui.screens.ask import Ask, Confirm, Pick
 from rig.tui.screens.help import Help
-from rig.tui.turns import Stopped
 
 if TYPE_CHECKING:
     from rig.tui.app import RigApp

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.tui.turns import Stage
+from rig.campaign.events import Stage
 
 if TYPE_CHECKING:
+    from rig.campaign.machine import Flow
     from rig.protocol.scene import Protocol, Run
-    from rig.tui.findings import Findings
-    from rig.tui.flow import Flow
+    from rig.records import Job
+    from rig.results.view import SessionView
     from rig.tui.gates import Lamps
-    from rig.tui.plan import Job
     from rig.tui.state import State
 
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
@@ -32,6 +32,8 @@ class Model:
 
     Attributes
     ----------
+    voids
+        Attempts that are void.
     connected
         Whether the daemon is heard.
     driving
@@ -54,7 +56,8 @@ class Model:
     flow: Flow
     lamps: Lamps
     protocol: Protocol | None = None
-    findings: Findings | None = None
+    findings: SessionView | None = None
+    voids: frozenset[Job] = frozenset()
     connected: bool = False
     driving: bool = False
     job: Job | None = None

@@ -10,9 +10,8 @@ import numpy as np
 from rig.analysis.sides import trains_of
 from rig.analysis.trains import Edges
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
-from rig.errors import DomainError
 from rig.model.fall import kicks
-from rig.model.rods import rod_impacts
+from rig.predictions import air_of, predict_incline
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -193,14 +192,19 @@ def _motion(role: str, times: Array, heights: Array, model: Trajectory | None) -
 
 
 def _model(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
+    """Take the prediction's fall, moment by moment."""
     start, gravity = protocol.drop.value, protocol.gravity.value
-    if role == "free" or run.impact is None or protocol.surface is None:
-        return free_trajectory(0.0, start, gravity)
-    chain = protocol.chains[run.impact].chain
-    try:
-        impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
-    except DomainError:
+    name = run.impact if role == "impact" else run.free
+    assert name is not None
+    # One κ for all legs: where rods are alike, or nothing is struck.
+    kappas = air_of(protocol, name) or [0.0]
+    if role == "free" or protocol.surface is None:
+        return free_trajectory(0.0, start, gravity, kappas[0])
+    found = predict_incline(protocol, run.incline_deg, name)
+    if found.alpha is None or found.gamma is None or len(set(kappas)) > 1:
         return None
-    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    chain = protocol.chains[name].chain
+    gains = kicks(chain, [found.alpha] * chain.rods, found.gamma)
     places = np.array(chain.heights)
-    return struck_trajectory(0.0, start, gravity, np.array(gains), np.ones(places.size), places)
+    ratios = np.ones(places.size)
+    return struck_trajectory(0.0, start, gravity, np.array(gains), ratios, places, kappas[0])

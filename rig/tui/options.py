@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.tui.flow import COUNTDOWN_S
+from rig.campaign.machine import COUNTDOWN_S
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -20,5 +20,5 @@ def load(name: str) -> type[Page]:
 
 def load_rest() -> None:
     """Load what the first session will need."""
-    for module in ("rig.runner", "rig.tui.book"):
+    for module in ("rig.runner", "rig.results.live"):
         import_module(module)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from rig.campaign.events import refused
 from rig.errors import RigError
+from rig.results.live import LiveAnalysis
 from rig.tui.actions import shown_key
-from rig.tui.book import Book
 from rig.tui.replay import Player
 from rig.tui.screens.ask import Pick
 from rig.tui.shelf import shelf
-from rig.tui.turns import Refused
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.words import plain
 
@@ -70,9 +70,9 @@ async def _open(app: RigApp, volume: Volume) -> None:
         history.other = None
     else:
         try:
-            history.other = await asyncio.to_thread(Book(volume.path).read)
+            history.other = await asyncio.to_thread(LiveAnalysis(volume.path).read)
         except RigError as error:
-            app.event(Refused(app.flow.ticket, f"{error.message}\n{error.hint}"))
+            app.event(refused(app.flow.ticket, error))
             return
     history.player = Player(speed=history.player.speed)
 

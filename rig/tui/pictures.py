@@ -7,23 +7,23 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.campaign.events import Stage
+from rig.campaign.machine import Flow
+from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
-from rig.tui.book import Book
-from rig.tui.flow import Flow
 from rig.tui.gates import FLICKER_S
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
-from rig.tui.state import State
+from rig.tui.state import State, state_of
 from rig.tui.still import QUIET, Still
-from rig.tui.turns import Stage
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from rig.tui.findings import Findings
-    from rig.tui.plan import Job
+    from rig.records import Job
+    from rig.results.view import SessionView
 
 SIZE = (120, 36)
 _LIVE_SHARE = 0.9
@@ -55,7 +55,7 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
     list of Path
         The files.
     """
-    findings = Book(session).read()
+    findings = LiveAnalysis(session).read()
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for scene in scenes(findings):
@@ -65,10 +65,10 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
     return written
 
 
-def scenes(findings: Findings) -> list[Scene]:
+def scenes(findings: SessionView) -> list[Scene]:
     """Choose the moments."""
     job = findings.jobs[-1]
-    whole = findings.state()
+    whole = state_of(findings)
     session = whole.sections["session"]
     state = replace(whole, sections={**QUIET, "session": session})
     before = replace(
@@ -92,7 +92,7 @@ def scenes(findings: Findings) -> list[Scene]:
     ]
 
 
-def _falling(state: State, findings: Findings, job: Job) -> State:
+def _falling(state: State, findings: SessionView, job: Job) -> State:
     """Stop the clock in the middle of a drop."""
     drop = findings.drops[job]
     until = _LIVE_SHARE * drop.edges[-1].tick

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.records import Job
 from rig.report.numbers import expanded, value_of
-from rig.tui.findings import good
+from rig.results.view import good
 from rig.tui.motion import motions, separation
-from rig.tui.plan import Job
 from rig.tui.widgets.figure import Picture, Series
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rig.protocol.scene import Protocol, Run
-    from rig.tui.findings import Findings
+    from rig.results.view import SessionView
     from rig.tui.motion import Motion, Table
 
 _MARKS = {"impact": ("•", "primary"), "free": ("+", "secondary")}
@@ -67,7 +67,7 @@ def _expected_end(found: Sequence[Motion]) -> float:
     return max(ends, default=0.0)
 
 
-def incline_pictures(findings: Findings, hidden: int | None) -> list[Picture]:
+def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]:
     """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing.
 
     Parameters
@@ -106,7 +106,7 @@ def incline_pictures(findings: Findings, hidden: int | None) -> list[Picture]:
     return found
 
 
-def control_pictures(findings: Findings, hidden: int | None) -> list[Picture]:
+def control_pictures(findings: SessionView, hidden: int | None) -> list[Picture]:
     """Draw the control charts: of skew with its limits, and of gravity beside the expected one.
 
     Parameters
@@ -140,7 +140,7 @@ def _measured(told: Mapping[str, float] | None, scale: float = 1.0) -> tuple[flo
     return None if value is None else (value * scale, (expanded(told) or 0.0) * scale)
 
 
-def _gravity(findings: Findings, run: Mapping[str, Any]) -> tuple[float, float] | None:
+def _gravity(findings: SessionView, run: Mapping[str, Any]) -> tuple[float, float] | None:
     own = _measured(run.get("gravity_m_s2"))
     seen = findings.gravity.get(Job(run["run"], run["attempt"]))
     return own or (None if seen is None else (seen.value, seen.expanded))
@@ -148,7 +148,7 @@ def _gravity(findings: Findings, run: Mapping[str, Any]) -> tuple[float, float] 
 
 def _chart(
     title: str,
-    findings: Findings,
+    findings: SessionView,
     lines: Sequence[tuple[float, str, str]],
     points: Sequence[tuple[Mapping[str, Any], tuple[float, float] | None]],
 ) -> Picture:

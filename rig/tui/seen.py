@@ -5,17 +5,16 @@ from __future__ import annotations
 from time import monotonic
 from typing import TYPE_CHECKING
 
+from rig.campaign.events import Stage
+from rig.campaign.plan import again, rest_s, void_counts
+from rig.campaign.plan import next_job as next_of
+from rig.records import Job
 from rig.tui.model import Model
-from rig.tui.plan import Job, again, void_counts
-from rig.tui.plan import next_job as next_of
-from rig.tui.turns import Stage
 
 if TYPE_CHECKING:
+    from rig.campaign.plan import RunLine
     from rig.tui.app import RigApp
-    from rig.tui.state import RunLine
 
-_CLOCK_S = 2.0  # of clock samples before the first drop, as the runner takes them
-_CLOCK_U = 1e-4
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 
 
@@ -29,6 +28,7 @@ def model(app: RigApp) -> Model:
         lamps=follower.lamps,
         protocol=findings.protocol if findings else None,
         findings=findings,
+        voids=follower.voids,
         connected=wire is None or wire.up,
         driving=app.driving,
         job=job(app),
@@ -59,8 +59,7 @@ def next_job(app: RigApp) -> Job | None:
     lines, flow = runs(app), app.flow
     if flow.stage is Stage.PREPARE and flow.job is not None:
         return again(lines, flow.job.run)
-    known = app.findings.voids if app.findings else frozenset()
-    return next_of(lines, void_counts(known, lines))
+    return next_of(lines, void_counts(app.follower.voids, lines))
 
 
 def job(app: RigApp) -> Job | None:
@@ -82,5 +81,4 @@ def settle_s(app: RigApp) -> float:
     if app.findings is None:
         return 0.0
     clock = app.findings.clock.device
-    settle = app.findings.protocol.plan.settle
-    return settle if clock is not None and clock.u <= _CLOCK_U else max(settle, _CLOCK_S)
+    return rest_s(app.findings.protocol.plan.settle, clock.u if clock else None)

@@ -7,24 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
+
+from rig.campaign.plan import RunLine
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from rig.results.view import SessionView
+
 EMPTY: Mapping[str, Any] = MappingProxyType({})
-
-
-class RunLine(NamedTuple):
-    """Where one planned run stands."""
-
-    run: int
-    incline_deg: float
-    impact: str | None
-    free: str | None
-    attempt: int = 0
-    state: str = "planned"
-    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,3 +110,19 @@ def _line(run: Mapping[str, Any]) -> RunLine:
         run["state"],
         tuple(run["reasons"] or ()),
     )
+
+
+def state_of(view: SessionView) -> State:
+    """Say what a daemon would of a file that nobody is writing."""
+    last = {entry.run: entry for entry in view.states}
+    runs = []
+    for run in view.plan.values():
+        entry = last.get(run.number)
+        line = RunLine(run.number, run.incline_deg, run.impact, run.free)
+        if entry is not None:
+            line = line._replace(
+                attempt=entry.attempt, state=str(entry.state), reasons=entry.reasons
+            )
+        runs.append(line)
+    session = {"path": str(view.path), "title": view.protocol.title, "simulated": view.simulated}
+    return State(0, {"session": session}, tuple(runs))

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig.campaign.machine import Stage
 from rig.tui.actions import ACTIONS
 from rig.tui.app import RigApp
-from rig.tui.flow import Stage
 from rig.tui.options import Options
 from tests.cli.lab import ROOT
 from tests.tui.screen import text_of

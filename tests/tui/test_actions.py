@@ -6,9 +6,9 @@ from collections import Counter
 
 import pytest
 
+from rig.campaign.machine import Stage
 from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME, possible, shown_key
-from rig.tui.flow import Stage
 from rig.tui.keys import combined, read_keys
 from rig.tui.words import LONGEST, duration, plain
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from textual.widgets import Input
 
+from rig.campaign.events import Stage
 from rig.session.store import Session
 from rig.tui.screens.ask import Ask, Confirm, Pick
 from rig.tui.screens.help import Help
-from rig.tui.turns import Stage
 from tests.tui.lab import run
 
 

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from rig.tui.flow import Stage
+from rig.campaign.machine import Stage
 from tests.tui.lab import run
 from tests.tui.screen import text_of
 

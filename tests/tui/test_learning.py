@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from rig.results import detailed
+from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
-from rig.tui.book import Book
 from rig.tui.options import Options
 from rig.tui.plots import control_pictures
 from rig.tui.shelf import shelf
@@ -33,20 +33,20 @@ def recorded(tmp_path_factory) -> Path:
 
 
 def test_what_is_learned_is_what_rig_analyze_says(recorded):
-    book = Book(recorded)
+    book = LiveAnalysis(recorded)
     alone = book.read()
-    assert (alone.learned, alone.lagging) == (0, True)
-    book.learn(alone)
+    assert (alone.fitted, alone.lagging) == (0, True)
+    book.fit_jointly(alone)
     learned = book.read()
     with Session.open(recorded, readonly=True) as session:
         expected = detailed(session)[0]
-    assert (learned.learned, learned.lagging) == (len(expected.lesson.drops), False)
+    assert (learned.fitted, learned.lagging) == (len(expected.lesson.drops), False)
     assert learned.analysis == expected.json()
     assert learned.analysis["summary"] != alone.analysis["summary"]
 
 
 def test_both_control_charts_are_there_and_hide_a_blind_run(recorded):
-    found = Book(recorded).read()
+    found = LiveAnalysis(recorded).read()
     for hidden, runs in ((None, [1.0, 2.0, 3.0, 4.0]), (2, [1.0, 3.0, 4.0])):
         skew, gravity = control_pictures(found, hidden)
         assert "skew" in skew.title

@@ -6,8 +6,8 @@ import asyncio
 
 import pytest
 
+from rig.campaign.events import Stage
 from rig.session.store import Session
-from rig.tui.turns import Stage
 from tests.tui.lab import run
 
 PULLED = ("✗ the port is lost", "it is found again by itself")

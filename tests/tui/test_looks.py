@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from rig.campaign.machine import Flow, Stage
+from rig.records import Job
+from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
-from rig.tui.book import Book
-from rig.tui.flow import Flow, Stage
 from rig.tui.options import Options
-from rig.tui.plan import Job
+from rig.tui.state import state_of
 from rig.tui.still import QUIET, Still
 from rig.tui.themes import NAMES
 from tests.cli.lab import short
@@ -79,7 +80,7 @@ def test_all_text_can_be_read_in_every_theme(moment, theme, tmp_path):
 
 async def _screen(moment, size, path, theme=None):
     flow, more = MOMENTS[moment]
-    whole = Book(path).read().state()
+    whole = state_of(LiveAnalysis(path).read())
     state = replace(whole, sections={**QUIET, **more, "session": whole.sections["session"]})
     app = RigApp(Options(session=path), KEYS, Still(state))
     app.flow = flow

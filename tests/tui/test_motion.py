@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.analysis.summary import predicted_run
+from rig.predictions import predicted_run
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.records import Drop, Edge

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from rig.campaign.events import Stage
 from rig.tui.actions import OFFLINE
 from rig.tui.screens.ask import Ask, Confirm, Pick
-from rig.tui.turns import Stage
 from rig.tui.widgets.text import Words
 from tests.tui.lab import run
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from rig.campaign.machine import Stage
+from rig.records import Job
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.tui.flow import Stage
-from rig.tui.plan import Job
 from tests.cli.lab import assert_whole, log_of, short
 from tests.tui.lab import run
 from tests.tui.screen import text_of

@@ -7,12 +7,11 @@ import copy
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.campaign.machine import Flow, Stage
 from rig.daemon.mirror import Mirror
-from rig.tui.flow import Flow, Stage
 from rig.tui.gates import Lamps
 from rig.tui.model import Model, alarm
-from rig.tui.plan import Job, again, next_job, unjudged, void_counts
-from rig.tui.state import RunLine, State, typed
+from rig.tui.state import State, typed
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
        "reasons": []}  # fmt: skip
@@ -54,21 +53,6 @@ def test_what_the_daemon_does_not_know_is_not_known():
     assert state.blocked is None
     assert (state.runs, state.edges, state.holder) == ((), (), None)
     assert (State().known, state.known) == (False, True)
-
-
-def lines(*states):
-    return [RunLine(n, 0.0, "A", "B", 1, state) for n, state in enumerate(states, start=1)]
-
-
-def test_the_next_run_is_the_runners():
-    runs = lines("accepted", "marginal", "rejected", "void", "planned")
-    assert next_job(runs, {4: 1}) == Job(4, 2)
-    assert next_job(runs, {4: 3}) == Job(5, 2)
-    assert next_job(lines("accepted"), {}) is None
-    assert next_job(lines("interrupted", "planned"), {}) == Job(1, 2)
-    assert again(runs, 1) == Job(1, 2)
-    assert unjudged(lines("accepted", "recorded")) == Job(2, 1)
-    assert void_counts({Job(1, 1), Job(1, 2)}, lines("void")) == {1: 2}
 
 
 def test_lamps_count_name_and_judge_steadiness():

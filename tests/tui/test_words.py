@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from rig.tui.flow import Flow, Stage
+from rig.campaign.machine import Flow, Stage
+from rig.records import Job
 from rig.tui.gates import Lamps
 from rig.tui.model import Model
-from rig.tui.plan import Job
 from rig.tui.state import typed
 from rig.tui.widgets.banner import verdict_words
 from rig.tui.widgets.status import headline

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from rig.campaign.events import Stage
 from rig.report.numbers import fixed
 from rig.tui.screens.page import Page
-from rig.tui.turns import Stage
 from rig.tui.widgets.lamps import LampBoard, named
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain

@@ -20,9 +20,9 @@ from rig.tui.words import plain
 if TYPE_CHECKING:
     from textual.app import ComposeResult
 
-    from rig.tui.findings import Findings
+    from rig.records import Job
+    from rig.results.view import SessionView
     from rig.tui.model import Model
-    from rig.tui.plan import Job
 
 
 class HistoryPage(Page):
@@ -42,9 +42,9 @@ class HistoryPage(Page):
     def __init__(self) -> None:
         super().__init__()
         self.player = Player()
-        self.other: Findings | None = None
+        self.other: SessionView | None = None
         """Of another session than the one in hand."""
-        self._findings: Findings | None = None
+        self._findings: SessionView | None = None
 
     def compose(self) -> ComposeResult:
         yield Words(id="which")
@@ -59,7 +59,7 @@ class HistoryPage(Page):
     # ------------------------------------------------------------------ the tape
 
     @property
-    def findings(self) -> Findings | None:
+    def findings(self) -> SessionView | None:
         """What is played; `None` without a drop."""
         return self._findings if self._findings and self._findings.jobs else None
 
@@ -144,7 +144,7 @@ class HistoryPage(Page):
             self.query_one(name, Figure).show(None)
 
 
-def _which(findings: Findings, job: Job, player: Player) -> Content:
+def _which(findings: SessionView, job: Job, player: Player) -> Content:
     run, result = findings.plan[job.run], findings.results[job]
     symbol, colour = LOOKS.get(result.verdict, ("?", "$foreground"))
     hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"

@@ -8,13 +8,13 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.style import Style
 
+from rig.campaign.events import Stage
 from rig.errors import InputError
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.measurable import check_measurable
 from rig.tui.screens.page import Page
-from rig.tui.turns import Stage
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
 

@@ -9,7 +9,7 @@ from textual.containers import Horizontal
 from textual.content import Content
 
 from rig.analysis.student import coverage_factor
-from rig.analysis.summary import predicted_run
+from rig.predictions import predicted_run
 from rig.report.columns import AUDIT
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import chain_pictures
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
 
     from rig.protocol.scene import Protocol, Run
-    from rig.tui.findings import Findings
+    from rig.records import Job
+    from rig.results.view import SessionView
     from rig.tui.model import Model
-    from rig.tui.plan import Job
     from rig.tui.widgets.figure import Picture
     from rig.units import Quantity
 
@@ -76,14 +76,14 @@ class ResultPage(Page):
             dz.show(second, key)
 
 
-def drop_pictures(findings: Findings, job: Job) -> tuple[Picture | None, Picture | None]:
+def drop_pictures(findings: SessionView, job: Job) -> tuple[Picture | None, Picture | None]:
     """Draw a recorded drop, with the rods as the analysis found them."""
     matches = findings.results[job].matches or None
     run, edges = findings.plan[job.run], findings.drops[job].edges
     return chain_pictures(findings.protocol, run, edges, findings.scales[job].hz, matches)
 
 
-def number_table(findings: Findings, job: Job, *, wide: bool = True) -> Content:
+def number_table(findings: SessionView, job: Job, *, wide: bool = True) -> Content:
     """Write the numbers with U95; where there is room, the model's and the normalized error too."""
     record = findings.record(job)
     expected = expectations(findings.protocol, findings.plan[job.run])

@@ -9,10 +9,10 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.widgets import Digits
 
+from rig.campaign.events import Stage
 from rig.tui.motion import as_table
 from rig.tui.plots import chain_pictures
 from rig.tui.screens.page import Page
-from rig.tui.turns import Stage
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.lamps import LampBoard, named
 from rig.tui.widgets.text import Words
@@ -21,8 +21,8 @@ from rig.tui.words import duration, plain
 if TYPE_CHECKING:
     from textual.app import ComposeResult
 
+    from rig.records import Job
     from rig.tui.model import Model
-    from rig.tui.plan import Job
 
 _FALLING = (Stage.LIVE, Stage.JUDGING)
 _WAITING = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)

@@ -10,8 +10,8 @@ from textual.containers import Grid, VerticalScroll
 from textual.content import Content
 
 from rig.analysis.learn import FEWEST
+from rig.campaign.plan import done, void_counts
 from rig.report.numbers import fixed, plus_minus
-from rig.tui.plan import done, void_counts
 from rig.tui.plots import control_pictures, incline_pictures
 from rig.tui.screens.page import Page
 from rig.tui.widgets.banner import LOOKS
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
+    from rig.campaign.plan import RunLine
     from rig.tui.model import Model
-    from rig.tui.state import RunLine
 
 
 _FIGURES = ("separation", "speed", "control", "second")
@@ -102,7 +102,7 @@ class SessionPage(Page):
 
 def _progress(model: Model) -> Content:
     runs = model.state.runs
-    voids = void_counts(model.findings.voids if model.findings else (), runs)
+    voids = void_counts(model.voids, runs)
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
     if not runs:
         return Content("No session is open.")
@@ -145,8 +145,8 @@ def _taught(model: Model) -> tuple[str, str]:
     if findings is None or model.blindfold or not findings.analysis["summary"]:
         return "", ""
     more = " · learning from the newest …" if findings.lagging else ""
-    if findings.learned:
-        return f"\nafter learning from {findings.learned} runs{more}", "$foreground 70%"
+    if findings.fitted:
+        return f"\nafter learning from {findings.fitted} runs{more}", "$foreground 70%"
     few = f"; they teach each other from {FEWEST} good ones on" if not more else ""
     return f"\neach drop by itself{few}{more}", "$foreground 70%"
 

@@ -8,9 +8,9 @@ from textual.containers import Vertical
 from textual.content import Content
 from textual.style import Style
 
+from rig.campaign.events import Stage
+from rig.campaign.machine import BEFORE_RELEASE
 from rig.tui.actions import ACTIONS, OFFLINE, possible, shown_key
-from rig.tui.flow import BEFORE_RELEASE
-from rig.tui.turns import Stage
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:

@@ -1,16 +1,20 @@
-"""Stages of a session, what may happen in them, and what may be wanted then."""
+"""Stages of a campaign, the events that may happen in them, and the effects they may want."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from rig.link.refusals import DeviceRefusedError
+
 if TYPE_CHECKING:
-    from rig.tui.plan import Job
+    from rig.errors import RigError
+    from rig.link.messages import Reason
+    from rig.records import Job
 
 
 class Stage(StrEnum):
-    """Where the operator is."""
+    """Where the campaign is."""
 
     PROTOCOL = "protocol"
     DEVICE = "device"
@@ -64,10 +68,28 @@ class Judged(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """An effect failed; `trouble` says why and what to do."""
+    """An effect failed; see `refused`.
+
+    Attributes
+    ----------
+    trouble
+        Why, and on a second line what to do.
+    reason, detail
+        The device's own, where it is the device that refused.
+    """
 
     ticket: int
     trouble: str
+    reason: Reason | None = None
+    detail: int = 0
+
+
+def refused(ticket: int, error: RigError) -> Refused:
+    """Make the event of an error."""
+    trouble = f"{error.message}\n{error.hint}"
+    if isinstance(error, DeviceRefusedError):
+        return Refused(ticket, trouble, error.reason, error.detail)
+    return Refused(ticket, trouble)
 
 
 class Tick(NamedTuple):
@@ -170,5 +192,11 @@ class Log(NamedTuple):
 class Stop(NamedTuple):
     """Everything off."""
 
+    reason: str = "stopped by the operator"
 
-Effect: TypeAlias = Wait | Arm | Fire | Drive | Collect | Judge | Log | Stop
+
+class GiveUp(NamedTuple):
+    """Go no further by yourself: only who drives this can say what is to be done."""
+
+
+Effect: TypeAlias = Wait | Arm | Fire | Drive | Collect | Judge | Log | Stop | GiveUp

@@ -1,4 +1,4 @@
-"""Everything that is derived from a session file, and can be derived again at any time."""
+"""The whole analysis of a session, as `rig analyze` prints it."""
 
 from __future__ import annotations
 
@@ -7,24 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
-from rig.calibration import Calibration, calibration
+from rig.calibration import calibration
 from rig.protocol import reader
 from rig.session.schema import RunState
-
-__all__ = [
-    "Calibration",
-    "calibration",
-    "detailed",
-    "protocol_of",
-    "rejected",
-    "results",
-    "tick_rates",
-    "with_analysis",
-]
 
 if TYPE_CHECKING:
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
+    from rig.calibration import Calibration
     from rig.protocol.scene import Protocol
     from rig.records import Drop
     from rig.session.reading import Reader

@@ -1,6 +1,6 @@
-"""The operator's way through a session as a pure machine: event in, new stage and effects out.
+"""A plan on its way as a pure machine: event in, new stage and effects out.
 
-Nothing here knows of screens, sockets or clocks. Whoever runs it carries the effects out and
+Nothing here knows of screens, sockets or clocks. Whoever drives it carries the effects out and
 returns what came of them, with the ticket of the effect: an answer to what was stopped meanwhile
 has an old ticket and changes nothing.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
-from rig.tui.turns import (
+from rig.campaign.events import (
     Again,
     Answered,
     Arm,
@@ -19,6 +19,7 @@ from rig.tui.turns import (
     Drive,
     Fire,
     Found,
+    GiveUp,
     GoOn,
     Judge,
     Judged,
@@ -36,27 +37,34 @@ from rig.tui.turns import (
     Wait,
     Warned,
 )
+from rig.link.messages import Reason
 
 if TYPE_CHECKING:
-    from rig.tui.plan import Job
-    from rig.tui.turns import Effect, Event
+    from rig.campaign.events import Effect, Event
+    from rig.records import Job
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""
-
+LOOKS = 5
+"""How often what a device refuses is tried when nobody is there to help."""
+LOOK_S = 1.0
 
 BEFORE_RELEASE = (
     Stage.TESTING, Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING
 )  # fmt: skip
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
+_PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
+"""Refusals to arm that end by themselves, or that somebody at the rig can end."""
+_DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
+"""Refusals to fire after which the drop can be prepared again."""
 
-Step: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
+Outcome: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """Where the operator is.
+    """Where the campaign is.
 
     Attributes
     ----------
@@ -80,6 +88,11 @@ class Flow:
         What went wrong last; empty when it is over.
     home
         Where a stage leads that ends without a drop.
+    not_armed, not_fired
+        Refusals in a row.
+    attended
+        Whether somebody is there, who then begins every arming. Else what a device refuses is
+        tried again, at most `LOOKS` times.
     """
 
     stage: Stage = Stage.PROTOCOL
@@ -95,6 +108,9 @@ class Flow:
     reasons: tuple[str, ...] = ()
     trouble: str = ""
     home: Stage = Stage.PREPARE
+    not_armed: int = 0
+    not_fired: int = 0
+    attended: bool = True
 
     def to(self, stage: Stage, trouble: str = "") -> Flow:
         """Go to another stage; answers to earlier effects count no more."""
@@ -103,7 +119,7 @@ class Flow:
         )
 
 
-def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
+def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an event
     """Take one event."""
     match event:
         case Stopped():
@@ -114,8 +130,8 @@ def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
             return replace(flow, trouble=flow.trouble or trouble), ()
         case Answered(ticket, token):
             return _answered(flow, ticket, token)
-        case Refused(ticket, trouble):
-            return _refused(flow, ticket, trouble)
+        case Refused():
+            return _refused(flow, event)
         case Tick(seconds):
             return _tick(flow, seconds)
         case Judged():
@@ -140,7 +156,7 @@ def step(flow: Flow, event: Event) -> Step:  # noqa: PLR0912 - one line an event
     return flow, ()
 
 
-def _stopped(flow: Flow) -> Step:
+def _stopped(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
         said = "stopped: the release is off"
         if flow.stage is not Stage.TESTING:
@@ -149,14 +165,14 @@ def _stopped(flow: Flow) -> Step:
     return flow, (Stop(),)
 
 
-def _lost(flow: Flow, trouble: str) -> Step:
+def _lost(flow: Flow, trouble: str) -> Outcome:
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
         # A chain that fell is recorded by the daemon, and found when it is back.
         return flow.to(flow.home, trouble), ()
     return flow, ()
 
 
-def _answered(flow: Flow, ticket: int, token: int | None) -> Step:
+def _answered(flow: Flow, ticket: int, token: int | None) -> Outcome:
     if ticket != flow.ticket:
         # What was stopped while the device was arming must not stay armed.
         return flow, () if token is None else (Stop(),)
@@ -168,27 +184,49 @@ def _answered(flow: Flow, ticket: int, token: int | None) -> Step:
     if flow.stage is Stage.SETTLING:
         return flow.to(Stage.ARMING), (Arm(job),)
     if flow.stage is Stage.ARMING:
-        armed = flow.to(Stage.COUNTDOWN)
+        armed = replace(flow.to(Stage.COUNTDOWN), not_armed=0)
         return replace(armed, token=token or 0, left_s=flow.countdown_s), ()
     if flow.stage is Stage.FIRING:
-        return flow.to(Stage.LIVE), (Collect(job),)
+        return replace(flow.to(Stage.LIVE), not_fired=0), (Collect(job),)
     if flow.stage is Stage.LIVE:
         return flow.to(Stage.JUDGING), (Judge(job),)
     return replace(flow, logged=True), ()
 
 
-def _refused(flow: Flow, ticket: int, trouble: str) -> Step:
-    if ticket != flow.ticket:
+def _refused(flow: Flow, event: Refused) -> Outcome:
+    if event.ticket != flow.ticket:
         return flow, ()
+    if flow.stage is Stage.ARMING:
+        return _not_armed(flow, event)
     if flow.stage is Stage.FIRING:
-        # Whether it was let go is not known for sure when the answer is an error.
-        return flow.to(Stage.PREPARE, trouble), (Stop(),)
+        return _not_fired(flow, event)
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
-        return flow.to(flow.home, trouble), ()
-    return replace(flow, trouble=trouble, logged=True), ()
+        return flow.to(flow.home, event.trouble), (GiveUp(),)
+    unlogged = () if flow.logged else (GiveUp(),)
+    return replace(flow, trouble=event.trouble, logged=True), unlogged
 
 
-def _tick(flow: Flow, seconds: float) -> Step:
+def _not_armed(flow: Flow, event: Refused) -> Outcome:
+    refusals = flow.not_armed + 1
+    if event.reason not in _PASSING or (not flow.attended and refusals >= LOOKS):
+        return flow.to(flow.home, event.trouble), (GiveUp(),)
+    if flow.attended:  # who has been asked, and arms again when all is well
+        return flow.to(flow.home, event.trouble), ()
+    pause = event.detail / 1000 if event.reason is Reason.COOLING else LOOK_S
+    return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
+
+
+def _not_fired(flow: Flow, event: Refused) -> Outcome:
+    refusals = flow.not_fired + 1
+    flow = replace(flow.to(Stage.PREPARE, event.trouble), not_fired=refusals)
+    # Whether it was let go is not known for sure when the answer is an error.
+    stop = Stop(event.trouble.partition("\n")[0])
+    if event.reason not in _DISTURBED or (not flow.attended and refusals >= LOOKS):
+        return flow, (stop, GiveUp())
+    return flow, (stop,)
+
+
+def _tick(flow: Flow, seconds: float) -> Outcome:
     if flow.stage is not Stage.COUNTDOWN:
         return flow, ()
     left = flow.left_s - seconds
@@ -197,7 +235,7 @@ def _tick(flow: Flow, seconds: float) -> Step:
     return replace(flow.to(Stage.FIRING), left_s=0.0), (Fire(flow.token),)
 
 
-def _judged(flow: Flow, event: Judged) -> Step:
+def _judged(flow: Flow, event: Judged) -> Outcome:
     if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
         return flow, ()
     assert flow.job is not None
@@ -206,9 +244,9 @@ def _judged(flow: Flow, event: Judged) -> Step:
     return replace(flow.to(Stage.RESULT), logged=False), (log,)
 
 
-def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Step:
+def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
-        return replace(flow, job=job).to(Stage.SETTLING), (Wait(settle_s),)
+        return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (Wait(settle_s),)
     if flow.stage is Stage.RESULT and not flow.shown:
         return replace(flow, shown=True), ()  # blind, and nothing against it
     if flow.stage is Stage.RESULT and not flow.logged:
@@ -220,7 +258,7 @@ def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Step:
     return flow, ()
 
 
-def _relogged(flow: Flow, state: str, reasons: tuple[str, ...], *, shown: bool) -> Step:
+def _relogged(flow: Flow, state: str, reasons: tuple[str, ...], *, shown: bool) -> Outcome:
     """Log the drop once more."""
     job = flow.job
     assert job is not None

@@ -1,4 +1,4 @@
-"""What the session file says, as the screens need it."""
+"""A session file as it stands, with everything that follows from it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.tui.state import RunLine, State
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,15 +13,14 @@ if TYPE_CHECKING:
 
     from rig.analysis.drop import TimeScale
     from rig.analysis.result import DropResult, Measured
+    from rig.calibration import Calibration
     from rig.protocol.scene import Protocol, Run
-    from rig.records import Drop
-    from rig.results import Calibration
+    from rig.records import Drop, Job
     from rig.session.reading import StateEntry
-    from rig.tui.plan import Job
 
 
 @dataclass(frozen=True, slots=True)
-class Findings:
+class SessionView:
     """A session as it stands on the disk.
 
     Attributes
@@ -34,16 +32,14 @@ class Findings:
     gravity
         What each good drop's free chain says of gravity, m/s².
     analysis
-        What ``rig analyze --json`` prints: of the drops that `learned` is about, or, before
-        anything was learned, of all of them by themselves.
-    learned
-        How many drops taught each other in `analysis`; 0 for none.
+        What ``rig analyze --json`` prints: of the drops that `fitted` counts, or, before there is
+        a joint fit, of all of them by themselves.
+    fitted
+        How many drops were fitted jointly in `analysis`; 0 for none.
     lagging
-        Whether the drops could teach more than is in `analysis`.
+        Whether a joint fit would say more than is in `analysis`.
     curves
         The model against inclination, as `rig.analysis.curves.model_curves` gives it.
-    voids
-        Attempts that were void.
     pace_s
         Usual time from drop to drop; `None` before the third.
     """
@@ -59,11 +55,10 @@ class Findings:
     scales: Mapping[Job, TimeScale]
     gravity: Mapping[Job, Measured]
     analysis: Mapping[str, Any]
-    learned: int
+    fitted: int
     lagging: bool
     curves: Mapping[str, Any]
     clock: Calibration
-    voids: frozenset[Job]
     states: tuple[StateEntry, ...]
     pace_s: float | None
 
@@ -77,21 +72,6 @@ class Findings:
         """Channels of the scene's gates."""
         gates = self.protocol.gates
         return () if gates is None else tuple(gate.channel for gate in gates.gates)
-
-    def state(self) -> State:
-        """What a daemon would say of this file that nobody is writing."""
-        last = {entry.run: entry for entry in self.states}
-        runs = []
-        for run in self.plan.values():
-            entry = last.get(run.number)
-            line = RunLine(run.number, run.incline_deg, run.impact, run.free)
-            if entry is not None:
-                line = line._replace(
-                    attempt=entry.attempt, state=str(entry.state), reasons=entry.reasons
-                )
-            runs.append(line)
-        session = {"path": str(self.path), "title": self.protocol.title}
-        return State(0, {"session": session | {"simulated": self.simulated}}, tuple(runs))
 
     def record(self, job: Job) -> Mapping[str, Any]:
         """One attempt's result as `rig analyze --json` prints it; empty when not analysed."""

@@ -1,9 +1,12 @@
-"""One session file, read again and again beside its writer, and analysed where it is new."""
+"""The live analysis: one session file, read again and again beside its writer.
+
+Whoever judges a drop asks here, with a screen or without one.
+"""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from statistics import median
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,15 +16,14 @@ from rig.analysis.drop import fit_drop
 from rig.analysis.gravity import free_gravity
 from rig.analysis.learn import FEWEST
 from rig.analysis.result import GOOD
-from rig.analysis.session import Analysis, gather
-from rig.analysis.summary import summarize
+from rig.analysis.session import gather, overruled, sum_up
 from rig.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
-from rig.results import protocol_of, rejected
+from rig.records import Job
+from rig.results.view import SessionView
+from rig.results.whole import protocol_of, rejected
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.tui.findings import Findings
-from rig.tui.plan import Job
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -30,9 +32,10 @@ if TYPE_CHECKING:
     from rig.analysis.drop import TimeScale
     from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult, Measured
+    from rig.calibration import Calibration
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
-    from rig.session.reading import StateEntry
+    from rig.session.reading import Reader, StateEntry
 
 _SAME_SCALE = 5e-6
 """Relative change of the tick rate below which a drop is not analysed again: 50 nm in 10 mm."""
@@ -47,8 +50,8 @@ class _Analysed(NamedTuple):
     gravity: Measured | None
 
 
-class _Lesson(NamedTuple):
-    """What drops said after `size` of them taught each other; `of` is who was there, and how."""
+class _JointFit(NamedTuple):
+    """What drops say fitted together, `size` of them; `of` is who was there, and how."""
 
     of: object
     size: int
@@ -56,7 +59,7 @@ class _Lesson(NamedTuple):
 
 
 @dataclass(slots=True)
-class Book:
+class LiveAnalysis:
     """Reads one session again and again, and analyses what is new.
 
     Parameters
@@ -72,12 +75,30 @@ class Book:
     _log: Sequence[StateEntry] | None = None
     _drops: dict[Job, Drop] = field(default_factory=dict)
     _curves: dict[str, Any] | None = None
-    _lesson: _Lesson | None = None
+    _joint_fit: _JointFit | None = None
     _calibrator: Calibrator = field(default_factory=Calibrator)
+    _scene: tuple[Protocol, dict[int, Run]] | None = None
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
 
-    def read(self) -> Findings:
+    def clock(self, session: Reader) -> Calibration:
+        """Calibrate the session's clock from everything it recorded until now."""
+        return self._calibrator.look(session)
+
+    def judge(self, session: Reader, drop: Drop) -> DropResult:
+        """Find out what one drop says by itself, as `read` does, and keep nothing of it.
+
+        Parameters
+        ----------
+        session
+            Open.
+        drop
+            Recorded in it.
+        """
+        protocol, plan = self._planned(session)
+        return fit_drop(protocol, plan[drop.run], drop, self.clock(session).scale(drop))[0]
+
+    def read(self) -> SessionView:
         """Read the file as it is now; safe in any thread, one at a time.
 
         Raises
@@ -86,9 +107,8 @@ class Book:
             The file cannot be read.
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
-            protocol = protocol_of(session)
-            plan = {run.number: run for run in planned_runs(protocol)}
-            clock, states = self._calibrator.look(session), tuple(session.states())
+            protocol, plan = self._planned(session)
+            clock, states = self.clock(session), tuple(session.states())
             if states != self._log:  # records are never altered, only added, and that is logged
                 self._drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
                 self._log = states
@@ -97,13 +117,13 @@ class Book:
             causes = rejected(session)
             for job, drop in drops.items():
                 self._analyse(protocol, plan[job.run], job, drop, scales[job])
-            results = {job: _rejected(self._known[job].result, causes.get(job)) for job in drops}
+            results = {job: overruled(self._known[job].result, causes.get(job)) for job in drops}
             if self._curves is None:
                 self._curves = model_curves(protocol)
             self._readings += 1
             enough = sum(result.verdict in GOOD for result in results.values()) >= FEWEST
-            lesson = self._lesson if enough else None
-            return Findings(
+            joint = self._joint_fit if enough else None
+            return SessionView(
                 path=self.path,
                 reading=self._readings,
                 protocol=protocol,
@@ -114,34 +134,42 @@ class Book:
                 results=results,
                 scales=scales,
                 gravity={job: g for job in drops if (g := self._known[job].gravity) is not None},
-                analysis=lesson.analysis if lesson else _summed(protocol, results),
-                learned=lesson.size if lesson else 0,
-                lagging=enough and (lesson is None or lesson.of != self._classmates(results)),
+                analysis=joint.analysis if joint else sum_up(protocol, results.values()).json(),
+                fitted=joint.size if joint else 0,
+                lagging=enough and (joint is None or joint.of != self._members(results)),
                 curves=self._curves,
                 clock=clock,
-                voids=frozenset(Job(e.run, e.attempt) for e in states if e.state is RunState.VOID),
                 states=states,
                 pace_s=_pace(states),
             )
 
-    def learn(self, findings: Findings) -> None:
-        """Let all drops teach each other, as ``rig analyze`` does; the next reading has it.
+    def fit_jointly(self, view: SessionView) -> None:
+        """Fit all drops together, as ``rig analyze`` does; the next reading has it.
 
         Takes its time; safe in any thread beside `read`.
 
         Parameters
         ----------
-        findings
+        view
             From `read`.
         """
-        of = self._classmates(findings.results)
-        fits = [self._known[job].fit for job in findings.results]
-        found = gather(findings.protocol, list(findings.results.values()), fits)
+        of = self._members(view.results)
+        fits = [self._known[job].fit for job in view.results]
+        found = gather(view.protocol, list(view.results.values()), fits)
         size = sum(result.learned for result in (*found.runs, *found.superseded))
-        self._lesson = _Lesson(of, size, found.json())
+        self._joint_fit = _JointFit(of, size, found.json())
 
-    def _classmates(self, results: Mapping[Job, DropResult]) -> object:
+    def _members(self, results: Mapping[Job, DropResult]) -> object:
         return {job: (result.verdict, self._known[job].hz) for job, result in results.items()}
+
+    def _planned(self, session: Reader) -> tuple[Protocol, dict[int, Run]]:
+        if self._scene is not None:
+            return self._scene
+        protocol = protocol_of(session)
+        found = protocol, {run.number: run for run in planned_runs(protocol)}
+        if session.identities():  # which gates a timer has is known from then on
+            self._scene = found
+        return found
 
     def _analyse(
         self, protocol: Protocol, run: Run, job: Job, drop: Drop, scale: TimeScale
@@ -153,20 +181,6 @@ class Book:
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)
         self.done = len(self._known)
-
-
-def _rejected(result: DropResult, causes: Sequence[str] | None) -> DropResult:
-    if causes is None:
-        return result
-    return replace(result, verdict="rejected", reasons=(*causes, *result.reasons))
-
-
-def _summed(protocol: Protocol, results: Mapping[Job, DropResult]) -> dict[str, Any]:
-    ordered = [results[job] for job in sorted(results)]
-    last = {result.run.number: result for result in ordered}
-    latest = tuple(last.values())
-    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
-    return Analysis(latest, earlier, tuple(summarize(protocol, latest))).json()
 
 
 def _pace(states: Sequence[StateEntry]) -> float | None:

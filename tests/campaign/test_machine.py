@@ -1,4 +1,4 @@
-"""The operator's flow: whatever happens in whatever order, nothing falls that should not."""
+"""A plan on its way: whatever happens in whatever order, nothing falls that should not."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.tui.flow import (
-    BEFORE_RELEASE,
+from rig.campaign.events import (
     Again,
     Answered,
     Arm,
     Closed,
     Collect,
     Fire,
-    Flow,
     Found,
+    GiveUp,
     GoOn,
     Judge,
     Judged,
@@ -32,9 +31,10 @@ from rig.tui.flow import (
     Stopped,
     Tick,
     Wait,
-    step,
 )
-from rig.tui.plan import Job
+from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, step
+from rig.link.messages import Reason
+from rig.records import Job
 
 JOB = Job(1, 1)
 NEXT = Job(2, 1)
@@ -141,15 +141,16 @@ events = st.one_of(
     st.just(Opened()), st.just(Closed()), st.just(Stopped()), st.builds(GoOn, st.none() | jobs),
     st.builds(Answered, tickets, st.none() | st.integers(0, 5)),
     st.builds(Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
-    st.builds(Refused, tickets, st.just("no")), st.builds(Tick, st.floats(0.0, 2.0)),
+    st.builds(Refused, tickets, st.just("no"), st.sampled_from(Reason)),
+    st.builds(Tick, st.floats(0.0, 2.0)),
     st.just(Lost("gone")), st.builds(Found, jobs), st.builds(Reject, st.just("x")),
     st.builds(Note, st.just("y")), st.builds(Again, jobs),
 )  # fmt: skip
 
 
-@given(st.lists(events, max_size=60), st.booleans())
-def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening, blind):
-    flow = Flow(blind=blind)
+@given(st.lists(events, max_size=60), st.booleans(), st.booleans())
+def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening, blind, attended):
+    flow = Flow(blind=blind, attended=attended)
     armed, waited = None, 0.0
     for event in happening:
         before = flow
@@ -161,6 +162,8 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
         if before.stage is Stage.COUNTDOWN and isinstance(event, Tick):
             waited += event.seconds
         for effect in effects:
+            if isinstance(effect, Arm) and attended:
+                assert isinstance(event, Answered), "nothing is armed by itself"
             if isinstance(effect, Fire):
                 assert effect.token == armed
                 assert waited >= flow.countdown_s - 1e-9
@@ -186,3 +189,48 @@ def test_the_countdown_is_as_long_as_it_was_set():
     flow, effects = through(flow, Answered(0, 7), Tick(0.4))
     assert effects == []
     assert step(flow, Tick(0.11))[1] == (Fire(7),)
+
+
+PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
+
+
+def arming(**more):
+    return through(Flow(stage=Stage.PREPARE, **more), GoOn(JOB, 5.0), DONE)[0]
+
+
+@pytest.mark.parametrize("reason", [None, *Reason])
+def test_whoever_is_there_begins_every_arming(reason):
+    flow, effects = through(arming(), Refused(-1, "no\ndo this", reason, 100))
+    assert (flow.stage, flow.trouble, flow.job) == (Stage.PREPARE, "no\ndo this", JOB)
+    assert effects == ([] if reason in PASSING else [GiveUp()])
+    assert through(flow, DONE, Tick(9.0), Opened()) == (flow, [])
+
+
+@pytest.mark.parametrize("reason", PASSING)
+def test_alone_what_passes_is_waited_for_a_few_times(reason):
+    flow = arming(attended=False)
+    pause = 0.7 if reason is Reason.COOLING else LOOK_S
+    for _ in range(LOOKS - 1):
+        flow, effects = through(flow, Refused(-1, "no", reason, 700), DONE)
+        assert effects == [Wait(pause), Arm(JOB)]
+    flow, effects = through(flow, Refused(-1, "no", reason, 700))
+    assert (flow.stage, effects) == (Stage.PREPARE, [GiveUp()])
+
+
+@pytest.mark.parametrize("attended", [True, False])
+@pytest.mark.parametrize("reason", [None, *Reason])
+def test_what_is_not_let_go_is_switched_off_first(reason, attended):
+    flow = Flow(stage=Stage.PREPARE, attended=attended)
+    for number in range(1, LOOKS + 1):
+        flow, effects = through(
+            flow,
+            GoOn(JOB),
+            DONE,
+            Answered(-1, 7),
+            Tick(9.0),
+            Refused(-1, "a gate moved\nhint", reason),
+        )
+        assert (flow.stage, effects[3]) == (Stage.PREPARE, Stop("a gate moved"))
+        again = {Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED}
+        over = reason not in again or (number == LOOKS and not attended)
+        assert effects[4:] == ([GiveUp()] if over else [])

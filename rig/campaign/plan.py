@@ -1,0 +1,93 @@
+"""Which attempt comes next, and what it takes: the rules of a plan on its way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.records import Job
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rig.protocol.scene import Run
+
+ATTEMPTS = 3
+"""How often a void run is made before it stays void."""
+SETTLED = ("accepted", "marginal", "rejected")
+CLOCK_U = 1e-4
+"""How well the device's clock must be known before a drop, relative: a resonator that is off by
+0.13 % spreads a chain's edges over the wrong rods."""
+CLOCK_S = 2.0  # of clock samples are plenty for that
+
+
+class RunLine(NamedTuple):
+    """Where one planned run stands."""
+
+    run: int
+    incline_deg: float
+    impact: str | None
+    free: str | None
+    attempt: int = 0
+    state: str = "planned"
+    reasons: tuple[str, ...] = ()
+
+
+def next_job(runs: Iterable[RunLine], voids: Mapping[int, int]) -> Job | None:
+    """Name the next attempt of the plan; `None` when it is done.
+
+    Parameters
+    ----------
+    runs
+        The plan, in order.
+    voids
+        How many attempts at each run were void, as from `void_counts`.
+    """
+    return next((_again(line) for line in runs if not done(line, voids.get(line.run, 0))), None)
+
+
+def done(line: RunLine, voids: int) -> bool:
+    """Whether a run is done with: settled, or void too often."""
+    return line.state in SETTLED or voids >= ATTEMPTS
+
+
+def again(runs: Sequence[RunLine], run: int) -> Job | None:
+    """Name another attempt at a run, whatever became of it; `None` when it is not planned."""
+    return next((_again(line) for line in runs if line.run == run), None)
+
+
+def unjudged(runs: Iterable[RunLine]) -> Job | None:
+    """Name a drop that was recorded and never judged."""
+    return next((Job(line.run, line.attempt) for line in runs if line.state == "recorded"), None)
+
+
+def _again(line: RunLine) -> Job:
+    return Job(line.run, line.attempt + 1)
+
+
+def void_counts(known: Iterable[Job], runs: Iterable[RunLine]) -> Mapping[int, int]:
+    """Count void attempts at each run: those in the file, and those heard of since it was read."""
+    heard = {Job(line.run, line.attempt) for line in runs if line.state == "void"}
+    return Counter(job.run for job in {*known, *heard})
+
+
+def rest_s(settle_s: float, clock_u: float | None) -> float:
+    """Say how long chains rest before a drop: longer while the device's clock is not known.
+
+    Parameters
+    ----------
+    settle_s
+        What the protocol wants.
+    clock_u
+        Relative standard uncertainty of the clock's rate; `None` before it was compared.
+    """
+    known = clock_u is not None and clock_u <= CLOCK_U
+    return settle_s if known else max(settle_s, CLOCK_S)
+
+
+def what_to_hang(run: Run) -> str:
+    """Tell the operator what goes where."""
+    if run.impact is None:
+        return f"hang {run.free} for free fall"
+    free = f" · free side: {run.free}" if run.free else ""
+    return f"incline {run.incline_deg:g}° · impact side: {run.impact}{free}"

@@ -1,0 +1,22 @@
+"""Everything that is derived from a session file, and can be derived again at any time."""
+
+from rig.calibration import Calibration, calibration
+from rig.results.whole import (
+    detailed,
+    protocol_of,
+    rejected,
+    results,
+    tick_rates,
+    with_analysis,
+)
+
+__all__ = [
+    "Calibration",
+    "calibration",
+    "detailed",
+    "protocol_of",
+    "rejected",
+    "results",
+    "tick_rates",
+    "with_analysis",
+]

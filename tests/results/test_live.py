@@ -1,0 +1,74 @@
+"""The live analysis says what the whole one does, drop by drop and all together."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from rig.analysis.learn import FEWEST
+from rig.records import Job
+from rig.results import detailed
+from rig.results.live import LiveAnalysis
+from rig.session.schema import RunState
+from rig.session.store import Session
+from tests.cli.lab import rig, short
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory):
+    """Six drops, the first four of them a block of A, B, B, A."""
+    folder = tmp_path_factory.mktemp("blocks")
+    protocol, session = folder / "abba.yaml", folder / "abba.session"
+    protocol.write_text(short("[40 deg]", 6).replace("settle", "order: ABBA, settle"), "utf-8")
+    done = rig("run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes")
+    assert done.returncode == 0, done.stderr
+    return session
+
+
+@pytest.fixture
+def session(blocks, tmp_path):
+    return shutil.copy(blocks, tmp_path / "copy.session")
+
+
+def reject(path, *runs):
+    with Session.open(path) as session:
+        for run in runs:
+            session.add_state(run, 1, RunState.REJECTED, 0, ("a draught",))
+        session.commit()
+
+
+def whole(path):
+    with Session.open(path, readonly=True) as session:
+        return detailed(session)[0]
+
+
+@pytest.mark.parametrize("rejected", [(), (6,), (2, 3, 4)])
+def test_all_drops_together_say_what_rig_analyze_says(session, rejected):
+    """Of one good drop alone nothing is fitted jointly; that is summed up likewise."""
+    reject(session, *rejected)
+    live = LiveAnalysis(session)
+    view = live.read()
+    assert view.lagging == (6 - len(rejected) >= FEWEST)
+    if view.lagging:
+        live.fit_jointly(view)
+        view = live.read()
+    assert view.analysis == whole(session).json()
+    assert ("summary_with_rejected" in view.analysis) == bool(rejected)
+
+
+def test_a_rejected_drop_keeps_the_verdict_of_its_limits(session):
+    reject(session, 6)
+    view = LiveAnalysis(session).read()
+    result = view.results[Job(6, 1)]
+    assert (result.verdict, result.limits) == ("rejected", "accepted")
+    assert view.fitted == 0
+    assert view.analysis.keys() >= {"summary_with_rejected", "effects"}
+
+
+def test_a_drop_is_judged_as_it_is_read(session):
+    live = LiveAnalysis(session)
+    view = live.read()
+    with Session.open(session, readonly=True) as opened:
+        for job, drop in view.drops.items():
+            assert live.judge(opened, drop).json() == view.record(job)

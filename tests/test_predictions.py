@@ -1,0 +1,56 @@
+"""There is one predictor: tables, curves and the terminal say the same, with and without air."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rig.analysis.curves import model_curves
+from rig.predictions import predicted_run, predictions
+from rig.protocol import reader
+from rig.protocol.plan import runs
+from rig.tui.motion import motions, separation
+from tests.cli.lab import PROTOCOLS, short
+
+AIR = "drag: {terminal_speed: 12 m/s ± 1 m/s}\n"
+UNLIKE = (
+    short().replace("B: {like: A}", "B: {like: A, length: 1200 mm}").replace("1078 mm", "1071 mm")
+)
+SCENES = {
+    "uniform": short(),
+    "in air": short() + AIR,
+    "unlike": UNLIKE,
+    "unlike, in air": UNLIKE + AIR,
+    "single": (PROTOCOLS / "single-chain.yaml").read_text("utf-8"),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_all_who_predict_say_the_same(name):
+    scene = reader.parse(SCENES[name])
+    curves = model_curves(scene)
+    for line in predictions(scene):
+        run = next(one for one in runs(scene) if one.incline_deg == line["incline_deg"])
+        assert run.impact == "A"
+        separation_m, speed = predicted_run(scene, run)
+        assert (separation_m.value, separation_m.u) == (
+            line["separation_m"], line["separation_u_m"]
+        )  # fmt: skip
+        assert (speed.value, speed.u) == (line["speed_m_s"], line["speed_u_m_s"])
+        at = curves["incline_deg"].index(line["incline_deg"])
+        assert curves["speed_m_s"][at] == line["speed_m_s"]
+        assert curves["free_fall_speed_m_s"] == line["free_fall_speed_m_s"]
+        both = motions(scene, run, [], 1e6)
+        assert both[0].model.time[-1] == pytest.approx(line["fall_time_s"], rel=1e-12)
+        assert both[0].model.arrival == pytest.approx(line["speed_m_s"], rel=1e-12)
+        if scene.two_chains:
+            assert curves["separation_m"][at] == line["separation_m"]
+            _, _, _, gaps = separation(both, 9.0)
+            longer = np.subtract(*(scene.chains[one].chain.length for one in "BA"))
+            assert gaps[-1] + longer == pytest.approx(line["separation_m"], rel=1e-9)
+
+
+def test_air_holds_back():
+    with_air, without = (predictions(reader.parse(text))[0] for text in (short() + AIR, short()))
+    assert with_air["speed_m_s"] < without["speed_m_s"]
+    assert with_air["fall_time_s"] > without["fall_time_s"]
