@@ -18,45 +18,43 @@ if TYPE_CHECKING:
 
 
 def predictions(protocol: Protocol) -> list[dict[str, Any]]:
-    """Predict each incline of the plan; where chains are unlike, the first one strikes.
+    """Predict each incline of the plan and, where chains are unlike, each that strikes.
 
     Returns
     -------
     list of dict
-        As ``rig predict --json`` prints them, one an incline; one alone where nothing is struck.
+        As ``rig predict --json`` prints them, one an incline, with ``impact_chain`` where chains
+        are unlike; one alone where nothing is struck.
     """
     if protocol.surface is None:
         return [_free_fall(protocol)]
-    struck, free = ends(protocol)
     found = []
     for incline in dict.fromkeys(protocol.plan.inclines):
-        one = predict_incline(protocol, incline, struck, free)
-        notes = list(one.notes)
-        if free is not None and _unlike(protocol, struck, free):
-            notes.append(f"chains are unlike: {struck} strikes")
-        found.append(
-            {
-                "incline_deg": incline,
-                "model": one.model,
-                "alpha": one.alpha,
-                "gamma": one.gamma,
-                "separation_m": one.separation,
-                "separation_u_m": one.separation_u,
-                "speed_m_s": one.speed,
-                "speed_u_m_s": one.speed_u,
-                "fall_time_s": one.time,
-                "free_fall_speed_m_s": one.free_fall_speed,
-                "in_domain": one.in_domain,
-                "notes": notes,
-            }
-        )
+        for struck in protocol.strikers:
+            one = predict_incline(protocol, incline, struck, beside(protocol, struck))
+            found.append(
+                {
+                    "incline_deg": incline,
+                    **({"impact_chain": struck} if protocol.unlike_chains else {}),
+                    "model": one.model,
+                    "alpha": one.alpha,
+                    "gamma": one.gamma,
+                    "separation_m": one.separation,
+                    "separation_u_m": one.separation_u,
+                    "speed_m_s": one.speed,
+                    "speed_u_m_s": one.speed_u,
+                    "fall_time_s": one.time,
+                    "free_fall_speed_m_s": one.free_fall_speed,
+                    "in_domain": one.in_domain,
+                    "notes": list(one.notes),
+                }
+            )
     return found
 
 
-def ends(protocol: Protocol) -> tuple[str, str | None]:
-    """Name the chain that strikes and the one that falls beside it, where no run says."""
-    first, *others = protocol.chains
-    return first, others[0] if others else None
+def beside(protocol: Protocol, struck: str) -> str | None:
+    """Name the chain that falls freely beside the one that strikes."""
+    return next((name for name in protocol.chains if name != struck), None)
 
 
 def predict_incline(
@@ -103,13 +101,6 @@ def predicted_run(protocol: Protocol, run: Run) -> tuple[Quantity | None, Quanti
         Quantity(found.separation, found.separation_u or 0.0),
         Quantity(found.speed, found.speed_u or 0.0),
     )
-
-
-def _unlike(protocol: Protocol, one: str, other: str) -> bool:
-    """Whether two chains differ, or what the air takes of them."""
-    return protocol.chains[one].chain != protocol.chains[other].chain or air_of(
-        protocol, one
-    ) != air_of(protocol, other)
 
 
 def notes(protocol: Protocol) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.student import coverage_factor
-from rig.predictions import ends, predict_incline
+from rig.predictions import beside, predict_incline
 
 if TYPE_CHECKING:
     from rig.protocol.scene import Protocol
@@ -27,7 +27,6 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     surface = protocol.surface
     if surface is None:
         return {}
-    struck, free = ends(protocol)
     inclines = protocol.plan.inclines
     low = max(0.0, min(inclines) - _BEYOND)
     high = min(_STEEPEST, max(inclines) + _BEYOND)
@@ -35,15 +34,25 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     if surface.pile is not None and low < surface.pile.below_deg <= high:
         edge = surface.pile.below_deg
         points |= {edge, float(np.nextafter(edge, 0.0))}
-    every = [predict_incline(protocol, incline, struck, free) for incline in sorted(points)]
-    found = [one for one in every if one.separation is not None]
+    every = [
+        (struck, predict_incline(protocol, incline, struck, beside(protocol, struck)))
+        for struck in protocol.strikers
+        for incline in sorted(points)
+    ]
+    found = [one for _, one in every if one.separation is not None]
+    segments = [
+        ("pile" if "pile" in one.model else "surface")
+        + (f", chain {struck}" if protocol.unlike_chains else "")
+        for struck, one in every
+        if one.separation is not None
+    ]
     factor = coverage_factor(float("inf"))
     curves: dict[str, Any] = {
         "incline_deg": [one.incline_deg for one in found],
-        "segments": ["pile" if "pile" in one.model else "surface" for one in found],
+        "segments": segments,
         "speed_m_s": [one.speed for one in found],
         "speed_U95_m_s": [factor * (one.speed_u or 0.0) for one in found],
-        "free_fall_speed_m_s": every[0].free_fall_speed,
+        "free_fall_speed_m_s": every[0][1].free_fall_speed,
     }
     if protocol.two_chains:
         curves["separation_m"] = [one.separation for one in found]

@@ -109,7 +109,8 @@ class Evidence:
             stated = (getattr(STATED, kind) / getattr(old, kind)) ** 2
             self.degrees[kind] = STATED_WEIGHT + self._determined[kind]
             share = (STATED_WEIGHT * stated + found) / self.degrees[kind]
-            new[kind] = getattr(old, kind) * share**0.5
+            least = LEAST_SHARE * getattr(STATED, kind)
+            new[kind] = max(getattr(old, kind) * share**0.5, least)
         if self._impulses:
             sizes, squares, counts = np.array(self._impulses).T
             self._pair("impulse", "impulse_floor", (squares, counts, sizes), new)
@@ -120,8 +121,7 @@ class Evidence:
         sums, _ = np.histogram(speeds, edges, weights=squares)
         middles = 0.5 * (edges[1:] + edges[:-1])
         self._pair("jitter", "floor", (sums, free * counts, middles), new)
-        least = {name: LEAST_SHARE * getattr(STATED, name) for name in new}
-        self.components = replace(old, **{name: max(new[name], least[name]) for name in new})
+        self.components = replace(old, **new)
         return self
 
     def _pair(
@@ -134,23 +134,28 @@ class Evidence:
             new[name], new[floor] = getattr(STATED, name), getattr(STATED, floor)
             return
         begin = getattr(self.components, name), getattr(self.components, floor)
-        new[name], new[floor] = _two(squares, counts, sizes, begin)
+        least = LEAST_SHARE * getattr(STATED, name), LEAST_SHARE * getattr(STATED, floor)
+        new[name], new[floor] = _two(squares, counts, sizes, begin, least)
         self.degrees[name] = self.degrees[floor] = degrees
 
 
 def _two(
-    squares: Array, counts: Array, sizes: Array, begin: tuple[float, float]
+    squares: Array,
+    counts: Array,
+    sizes: Array,
+    begin: tuple[float, float],
+    least: tuple[float, float],
 ) -> tuple[float, float]:
     """Fit variances sizes·a² + b² to sums of squares with so many degrees of freedom.
 
-    The maximum of the χ² likelihood, by multiplicative steps.
+    The maximum of the χ² likelihood above the least a and b, by multiplicative steps.
     """
     a, b = begin[0] ** 2, begin[1] ** 2
     for _ in range(_INNER):
         total = a * sizes + b
-        a *= _explained(squares, counts, total, sizes)
+        a = max(a * _explained(squares, counts, total, sizes), least[0] ** 2)
         total = a * sizes + b
-        b *= _explained(squares, counts, total, np.ones_like(sizes))
+        b = max(b * _explained(squares, counts, total, np.ones_like(sizes)), least[1] ** 2)
     return a**0.5, b**0.5
 
 

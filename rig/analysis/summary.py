@@ -12,13 +12,13 @@ import numpy as np
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
 from rig.predictions import predicted_run
-from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rig.analysis.result import DropResult
     from rig.protocol.scene import Protocol, Run
+    from rig.units import Quantity
 
 T = TypeVar("T")
 

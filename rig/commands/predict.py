@@ -41,6 +41,7 @@ def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
         return _laid_out(columns, found)
     columns = {
         "incline (°)": ("incline_deg", 1.0, "g"),
+        "strikes": ("impact_chain", 1, ""),
         "α": ("alpha", 1.0, ".4f"),
         "Δz (cm)": ("separation_m", 100.0, ".3f"),
         "u (cm)": ("separation_u_m", 100.0, ".3f"),
@@ -54,6 +55,10 @@ def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
     return _laid_out(columns, found)
 
 
+def _cell(value: float | str, scale: float, style: str) -> str:
+    return value if isinstance(value, str) else format(value * scale, style)
+
+
 def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[str, Any]]) -> str:
     shown = {
         heading: what
@@ -63,7 +68,7 @@ def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[st
     rows = [[*shown, "model"]]
     for line in found:
         cells = [
-            "–" if line.get(key) is None else format(line[key] * scale, style)
+            "–" if line.get(key) is None else _cell(line[key], scale, style)
             for key, scale, style in shown.values()
         ]
         rows.append([*cells, line["model"]])
@@ -72,5 +77,10 @@ def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[st
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-    notes = [f"{line['incline_deg']:g}°: {note}" for line in found for note in line["notes"]]
+    notes = [
+        f"{line['incline_deg']:g}°{' ' + line['impact_chain'] if 'impact_chain' in line else ''}: "
+        f"{note}"
+        for line in found
+        for note in line["notes"]
+    ]
     return "\n".join([*lines, *notes])

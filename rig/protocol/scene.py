@@ -202,8 +202,16 @@ class Protocol:
         first, second = self.chains.values()
         return first.chain != second.chain or (
             self.drag is not None
-            and (first.diameters, first.tilt_deg) != (second.diameters, second.tilt_deg)
+            and self.drag.coefficient is not None
+            and (first.diameters, first.rod_length, first.tilt_deg)
+            != (second.diameters, second.rod_length, second.tilt_deg)
         )
+
+    @property
+    def strikers(self) -> tuple[str, ...]:
+        """The chains whose strike makes a result of its own; like chains are one, the first."""
+        names = tuple(self.chains)
+        return names if self.unlike_chains and self.plan.order != "fixed" else names[:1]
 
     def striker(self, run: Run) -> str | None:
         """Name of the chain that strikes, where that makes a result of its own.

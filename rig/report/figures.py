@@ -59,8 +59,8 @@ def incline_figure(
     curves
         The model: lists of one length ``incline_deg``, ``separation_m``, ``speed_m_s`` and
         ``segments``, the last naming the part each point is on (``surface``, ``pile`` or any
-        other words). ``separation_U95_m`` and ``speed_U95_m_s`` add bands, a single number
-        ``free_fall_speed_m_s`` adds that line.
+        other words; of unlike chains ``surface, chain A``). ``separation_U95_m`` and
+        ``speed_U95_m_s`` add bands, a single number ``free_fall_speed_m_s`` adds that line.
     simulated
         Whether to stamp the figure.
     bars
@@ -200,11 +200,16 @@ def _incline_panel(
     bars: Bars,
 ) -> None:
     stem, unit = ("speed", "_m_s") if key == "speed_m_s" else ("separation", "_m")
+    first = None
     for name, part in _segments(curves):
-        style, label = _SEGMENTS.get(name, (":", f"model, {name}"))
+        where, _, chain = name.partition(", ")  # unlike chains have curves of their own
+        style, label = _SEGMENTS.get(where, (":", f"model, {where}"))
+        label = f"{label}, {chain}" if chain else label
+        first = chain if first is None else first
+        color = MODEL if chain == first else SECOND
         inclines = [curves["incline_deg"][index] for index in part]
         values = [_scaled(curves[key][index], scale) for index in part]
-        axes.plot(inclines, values, linestyle=style, color=MODEL, label=label, zorder=3)
+        axes.plot(inclines, values, linestyle=style, color=color, label=label, zorder=3)
         band = curves.get(f"{stem}_U95{unit}")
         if band is not None:
             widths = [_scaled(band[index], scale) for index in part]

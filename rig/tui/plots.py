@@ -11,7 +11,7 @@ from rig.tui.motion import motions, separation
 from rig.tui.widgets.figure import Picture, Series
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rig.protocol.scene import Protocol, Run
     from rig.results.view import SessionView
@@ -93,8 +93,7 @@ def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]
             Picture(
                 title,
                 (
-                    Series("line", findings.curves["incline_deg"], _scaled(curve, scale), "accent",
-                           label="model"),
+                    *_model_lines(findings.curves, name, scale),
                     Series("dots", [x for x, _ in dots], _scaled([y for _, y in dots], scale),
                            "secondary", "·", "runs"),
                     Series("bars", [x for x, *_ in means], _scaled([y for _, y, _ in means], scale),
@@ -104,6 +103,20 @@ def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]
             )
         )  # fmt: skip
     return found
+
+
+def _model_lines(curves: Mapping[str, Any], name: str, scale: float) -> Iterator[Series]:
+    """One line, or one for each of two unlike chains."""
+    chains = [segment.partition(", ")[2] for segment in curves["segments"]]
+    for chain in dict.fromkeys(chains):
+        at = [n for n, one in enumerate(chains) if one == chain]
+        yield Series(
+            "line",
+            [curves["incline_deg"][n] for n in at],
+            _scaled([curves[name][n] for n in at], scale),
+            "accent",
+            label=f"model, {chain}" if chain else "model",
+        )
 
 
 def control_pictures(findings: SessionView, hidden: int | None) -> list[Picture]:

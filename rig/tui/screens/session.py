@@ -121,13 +121,19 @@ def _progress(model: Model) -> Content:
 
 
 def _plan(model: Model) -> Content:
-    """One line an incline: a symbol a run, and the means so far."""
+    """One line an incline and, of unlike chains, striker: a symbol a run, and the means so far."""
+    unlike = model.protocol is not None and model.protocol.unlike_chains
+
+    def case(line: RunLine) -> tuple[float, str]:
+        return line.incline_deg, (line.impact or "") if unlike else ""
+
     summary = {}
     if model.findings is not None and not model.blindfold:
-        summary = {line["incline_deg"]: line for line in model.findings.analysis["summary"]}
-    ordered = sorted(model.state.runs, key=lambda line: line.incline_deg)
-    groups = [list(group) for _, group in groupby(ordered, key=lambda line: line.incline_deg)]
-    means = [_means(summary.get(group[0].incline_deg, {})) for group in groups]
+        lines_ = model.findings.analysis["summary"]
+        summary = {(one["incline_deg"], one.get("impact_chain", "")): one for one in lines_}
+    ordered = sorted(model.state.runs, key=case)
+    groups = [list(group) for _, group in groupby(ordered, key=case)]
+    means = [_means(summary.get(case(group[0]), {})) for group in groups]
     most = max(map(len, groups), default=0)
     widths = [max(map(len, column)) for column in zip_longest(*means, fillvalue="")]
     lines = []
@@ -135,6 +141,7 @@ def _plan(model: Model) -> Content:
         padded = [part.ljust(width) for part, width in zip(parts, widths, strict=False)]
         marks = [*_marks(group, model), (" " * (most - len(group) + 2), "")]
         head = f"{group[0].incline_deg:5g}° " if group[0].impact is not None else "drops  "
+        head += f"{plain(group[0].impact, 12)} " if unlike and group[0].impact else ""
         lines.append(Content.assemble((head, "bold"), *marks, "  ".join(padded).rstrip()))
     return Content("\n").join(lines)
 
