@@ -91,16 +91,19 @@ def predict_incline(
     return replace(found, separation=found.separation + longer + held)
 
 
-def predicted_run(protocol: Protocol, run: Run) -> tuple[Quantity | None, Quantity | None]:
-    """Δz and V of one run by the model; `None` outside its domain of definition."""
-    assert run.impact is not None
-    found = predict_incline(protocol, run.incline_deg, run.impact, run.free)
-    if found.separation is None or found.speed is None:
-        return None, None
-    return (
-        Quantity(found.separation, found.separation_u or 0.0),
-        Quantity(found.speed, found.speed_u or 0.0),
-    )
+def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
+    """What the model says of one run, by JSON name; nothing where it has no answer."""
+    if run.impact is None:
+        return {"gravity_m_s2": protocol.gravity}
+    one = predict_incline(protocol, run.incline_deg, run.impact, run.free)
+    found = {
+        "separation_m": (one.separation if run.free is not None else None, one.separation_u),
+        "speed_m_s": (one.speed, one.speed_u),
+        "fall_time_s": (one.time, one.time_u),
+    }
+    return {
+        name: Quantity(value, u or 0.0) for name, (value, u) in found.items() if value is not None
+    }
 
 
 def notes(protocol: Protocol) -> list[str]:

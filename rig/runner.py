@@ -31,6 +31,7 @@ from rig.daemon.connecting import connect
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, InputError
 from rig.link.refusals import DeviceRefusedError
+from rig.measurands import told
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
@@ -309,13 +310,10 @@ def narration(result: DropResult, planned: int) -> str:
     parts = [f"run {run.number:>{len(str(planned))}}/{planned}"]
     if run.impact is not None:
         parts.append(f"{run.incline_deg:g}° impact {run.impact}")
-    if "separation_m" in found:
-        parts.append(f"Δz {plus_minus(found['separation_m'], 100.0)} cm")
-    if "speed_m_s" in found:
-        parts.append(f"V {plus_minus(found['speed_m_s'])} m/s")
-    if "release_skew_s" in found:
-        parts.append(f"skew {plus_minus(found['release_skew_s'], 1000.0)} ms")
-    if "gravity_m_s2" in found:
-        parts.append(f"g {plus_minus(found['gravity_m_s2'])} m/s²")
+    parts += [
+        f"{row.symbol} {plus_minus(found[row.name], row.scale)} {row.unit}"
+        for row in told()
+        if row.name in found
+    ]
     parts.append(": ".join(filter(None, [result.verdict, "; ".join(result.reasons)])))
     return "  ".join(parts)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.result import GOOD, Measured
+from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs as planned_runs
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ SIGNS = (0.5, -0.5, -0.5, 0.5)
 MEANS = (0.25, 0.25, 0.25, 0.25)
 """The same in the mean."""
 _REST = np.array([-1.0, 3.0, -3.0, 1.0])
-_CHAIN = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
-_SIDE = ("release_skew_s",)
 _CHAINS_OWN = ("rod places", "rod width")  # lines of a budget that are not the same for both
 
 Block = tuple["DropResult", "DropResult", "DropResult", "DropResult"]
@@ -94,9 +93,9 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
     for incline, numbers in sorted(planned.items()):
         blocks = _blocks([good.get(number) for number in numbers], first)
         if blocks:
-            names = [name for name in _CHAIN if name in blocks[0][0].quantities]
-            chain = {name: _contrast(blocks, name, SIGNS) for name in names}
-            side = {name: _contrast(blocks, name, MEANS) for name in _SIDE if name in names}
+            rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
+            chain = {r.name: _contrast(blocks, r.name, SIGNS) for r in rows if r.by_chain}
+            side = {r.name: _contrast(blocks, r.name, MEANS) for r in rows if r.by_side}
             found.append(Effects(incline, first, second, len(blocks), chain, side))
     return tuple(found)
 

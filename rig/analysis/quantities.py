@@ -10,12 +10,15 @@ from rig.analysis.adjust import uncertainty
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from rig.analysis.adjust import Estimate
     from rig.analysis.drop_model import DropModel
 
     Array = NDArray[np.float64]
+    Value = tuple[float, Array]
 
 
 def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
@@ -26,12 +29,10 @@ def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
     }
 
 
-def measurands(model: DropModel, x: Array) -> dict[str, tuple[float, Array]]:
-    """Return the value of each measurand and its derivatives by all unknowns."""
-    if "impact" not in model.sides:
-        return {"gravity_m_s2": _gravity(model, x)}
-    found = _separation(model, x) if "free" in model.sides else {}
-    return found | _impact(model, x)
+def measurands(model: DropModel, x: Array) -> dict[str, Value]:
+    """Return the value of each measurand of the scene and its derivatives by all unknowns."""
+    found = ((name, compute(model, x)) for name, compute in COMPUTED.items())
+    return {name: value for name, value in found if value is not None}
 
 
 def _measured(model: DropModel, estimate: Estimate, value: float, gradient: Array) -> Measured:
@@ -39,42 +40,82 @@ def _measured(model: DropModel, estimate: Estimate, value: float, gradient: Arra
     return Measured(value, u, max(1.0, estimate.degrees), budget)
 
 
-def _gravity(model: DropModel, x: Array) -> tuple[float, Array]:
+def _gravity(model: DropModel, x: Array) -> Value | None:
+    """The acceleration of a chain that strikes nothing."""
+    if "impact" in model.sides:
+        return None
     gradient = np.zeros(x.size)
     gradient[model.unknowns["gravity"]] = 1.0
     return model.protocol.gravity.value + float(x[model.unknowns["gravity"]][0]), gradient
 
 
-def _impact(model: DropModel, x: Array) -> dict[str, tuple[float, Array]]:
-    """V just before the top rod strikes, and how long that took."""
+def _speed(model: DropModel, x: Array) -> Value | None:
+    """V just before the top rod strikes."""
+    if "impact" not in model.sides:
+        return None
+    path = model.trajectory("impact", x)
+    return path.arrival, model.spread("impact", path.d_arrival)
+
+
+def _fall_time(model: DropModel, x: Array) -> Value | None:
+    """How long it takes until the top rod strikes."""
+    if "impact" not in model.sides:
+        return None
     path = model.trajectory("impact", x)
     duration = model.spread("impact", path.d_time[-1])
     duration[model.unknowns["impact release"]] = 0.0  # it moves both ends
-    return {
-        "speed_m_s": (path.arrival, model.spread("impact", path.d_arrival)),
-        "fall_time_s": (float(path.time[-1] - path.time[0]), duration),
-    }
+    return float(path.time[-1] - path.time[0]), duration
 
 
-def _separation(model: DropModel, x: Array) -> dict[str, tuple[float, Array]]:
-    """Δz raw and at simultaneous release, and the release skew."""
-    at = model.unknowns
-    struck, free = model.trajectory("impact", x), model.trajectory("free", x)
-    skew = float(free.time[0] - struck.time[0])
-    d_skew = np.zeros(x.size)
-    d_skew[at["free release"]], d_skew[at["impact release"]] = 1.0, -1.0
+def _release_skew(model: DropModel, x: Array) -> Value | None:
+    """The free chain's release less the impact chain's."""
+    if not _both(model):
+        return None
+    gradient = np.zeros(x.size)
+    gradient[model.unknowns["free release"]] = 1.0
+    gradient[model.unknowns["impact release"]] = -1.0
+    begins = [float(model.trajectory(role, x).time[0]) for role in ("free", "impact")]
+    return begins[0] - begins[1], gradient
+
+
+def _separation_raw(model: DropModel, x: Array) -> Value | None:
+    """Δz at the instant of the top rod's strike."""
+    if not _both(model):
+        return None
+    struck = model.trajectory("impact", x)
+    return _apart(model, x, float(struck.time[-1]), model.spread("impact", struck.d_time[-1]))
+
+
+def _separation(model: DropModel, x: Array) -> Value | None:
+    """Δz had both chains been let go together: the free one that much later, or earlier."""
+    skew = _release_skew(model, x)
+    if skew is None:
+        return None
+    struck = model.trajectory("impact", x)
+    hit, d_hit = float(struck.time[-1]), model.spread("impact", struck.d_time[-1])
+    return _apart(model, x, hit + skew[0], d_hit + skew[1])
+
+
+def _both(model: DropModel) -> bool:
+    return {"impact", "free"} <= set(model.sides)
+
+
+def _apart(model: DropModel, x: Array, when: float, d_when: Array) -> Value:
+    """Height of the free chain's top rod above the contact point at a moment."""
+    free, at = model.trajectory("free", x), model.unknowns
     top = model.sides["free"].chain.chain.length + float(x[at["free rods"]][-1])
-    d_hit = model.spread("impact", struck.d_time[-1])
+    height, speed = free.heights(np.array([when]))
+    gradient = model.spread("free", free.derivatives(np.array([when])))[0]
+    gradient[at["free rods"].stop - 1] += 1.0
+    return float(height[0]) + top, gradient - float(speed[0]) * d_when
 
-    def separation(when: float, d_when: Array) -> tuple[float, Array]:
-        height, speed = free.heights(np.array([when]))
-        gradient = model.spread("free", free.derivatives(np.array([when])))[0]
-        gradient[at["free rods"].stop - 1] += 1.0
-        return float(height[0]) + top, gradient - float(speed[0]) * d_when
 
-    hit = float(struck.time[-1])
-    return {
-        "separation_m": separation(hit + skew, d_hit + d_skew),
-        "separation_raw_m": separation(hit, d_hit),
-        "release_skew_s": (skew, d_skew),
-    }
+COMPUTED: dict[str, Callable[[DropModel, Array], Value | None]] = {
+    "separation_m": _separation,
+    "separation_raw_m": _separation_raw,
+    "release_skew_s": _release_skew,
+    "speed_m_s": _speed,
+    "fall_time_s": _fall_time,
+    "gravity_m_s2": _gravity,
+}
+"""How each row of `rig.measurands` follows from the unknowns; `None` where the scene has none."""

@@ -202,6 +202,9 @@ def _taught(
     lesson = None
     while lesson is None and len(good) >= FEWEST:
         lesson = learn(list(good.values()))
+        if not lesson.settled:  # nobody is to blame for edges that such an adjustment loses
+            lesson = None
+            break
         for (n, fit), drop in zip(list(good.items()), lesson.drops, strict=True):
             if drop.matched < _KEPT * fit.matched:
                 why = f"only {drop.matched} of its {fit.matched} edges go with the other runs"
@@ -209,7 +212,7 @@ def _taught(
                 del good[n]
                 lesson = None
     keys = [(results[n].run.number, results[n].attempt) for n in good]
-    if lesson is None or not lesson.settled:
+    if lesson is None:
         return found, None, dict(zip(keys, good.values(), strict=True))
     budgets = Budgets(lesson)
     for n, drop in zip(good, lesson.drops, strict=True):

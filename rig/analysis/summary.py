@@ -11,6 +11,7 @@ import numpy as np
 
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
+from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ COMMON = frozenset(
     }
 )
 """Budget lines that are the same in every run, so that averaging does not reduce them."""
-MEASURANDS = ("separation_m", "speed_m_s", "gravity_m_s2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +75,14 @@ class Incline:
         for name, mean in self.means.items():
             found[name] = mean.json()
             if name in self.deviations:
-                symbol, _, unit = name.partition("_")
-                found[f"{symbol}_sd_{unit}"] = self.deviations[name]
-                found[f"{symbol}_se_{unit}"] = self.deviations[name] / math.sqrt(self.n)
+                found[MEASURANDS[name].key("sd")] = self.deviations[name]
+                found[MEASURANDS[name].key("se")] = self.deviations[name] / math.sqrt(self.n)
         found["predicted"] = {name: model.value for name, model in self.predicted.items()}
         found["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
         main, *others = self.means
         found["normalized_error"] = self.normalized_error(main)
         found |= {
-            f"normalized_error_{name.partition('_')[0]}": self.normalized_error(name)
+            f"normalized_error_{MEASURANDS[name].stem}": self.normalized_error(name)
             for name in others
         }
         return found
@@ -118,7 +117,7 @@ def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]
 
 def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
     run = results[0].run
-    names = [name for name in MEASURANDS if name in results[0].quantities]
+    names = [row.name for row in averaged() if row.name in results[0].quantities]
     values = {name: [result.quantities[name] for result in results] for name in names}
     return Incline(
         run.incline_deg,
@@ -129,7 +128,7 @@ def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
             for name, found in values.items()
             if len(found) > 1
         },
-        _predicted(protocol, run, names),
+        {name: model for name, model in predicted_run(protocol, run).items() if name in names},
         protocol.striker(run),
     )
 
@@ -176,15 +175,3 @@ def _common(runs: Sequence[Measured]) -> tuple[float, list[float]]:
         return math.sqrt(together @ together), [math.sqrt(one @ one) for one in shared]
     each = [math.hypot(*(u for name, u in run.budget.items() if name in COMMON)) for run in runs]
     return math.sqrt(fmean(part**2 for part in each)), each
-
-
-def _predicted(protocol: Protocol, run: Run, names: Sequence[str]) -> dict[str, Quantity]:
-    """Return what the model says for such runs; nothing outside its domain."""
-    if protocol.surface is None:
-        found = {"gravity_m_s2": protocol.gravity}
-    else:
-        separation, speed = predicted_run(protocol, run)
-        if separation is None or speed is None:
-            return {}
-        found = {"separation_m": separation, "speed_m_s": speed}
-    return {name: found[name] for name in names if name in found}

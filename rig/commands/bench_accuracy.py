@@ -12,6 +12,7 @@ from rig.bench.dials import DOUBLED, STACK, doubled
 from rig.bench.proof import proof_table
 from rig.bench.quick import BLOCK, quick_accuracy
 from rig.commands.output import print_json, say
+from rig.measurands import MEASURANDS
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -21,14 +22,6 @@ SESSIONS = 5
 """Of the whole protocol, through the whole stack."""
 RIGS = 260
 """Short sessions for each dial: with 4 drops each, more than a thousand."""
-_UNITS = {
-    "separation_m": ("Δz at simultaneous release", "mm", 1e3),
-    "separation_raw_m": ("Δz as it happened", "mm", 1e3),
-    "speed_m_s": ("V", "mm/s", 1e3),
-    "release_skew_s": ("release skew", "ms", 1e3),
-    "fall_time_s": ("fall time", "ms", 1e3),
-    "gravity_m_s2": ("g", "mm/s²", 1e3),
-}
 
 
 def main(arguments: Namespace) -> int:
@@ -83,19 +76,21 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         f"{'bias/U':>8}  in U95",
     ]
     for name, errors in found["quantities"].items():
-        label, unit, scale = _UNITS[name]
-        rms, bias, worst, u = (errors[key] * scale for key in ("rms", "bias", "worst", "mean_U95"))
+        row = MEASURANDS[name]
+        rms, bias, worst, u = (
+            errors[key] * row.fine_scale for key in ("rms", "bias", "worst", "mean_U95")
+        )
         lines.append(
-            f"{f'{label} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}{u:10.3f}"
+            f"{f'{row.label} ({row.fine})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}{u:10.3f}"
             f"{errors['bias_over_U']:8.2f}  {errors['coverage']:.1%}"
             + (f" ± {errors['coverage_se']:.1%}" if "coverage_se" in errors else "")
         )
-    for rival, label_ in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
+    for rival, label in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
         for name, errors in found.get(rival, {}).items():
-            label, unit, scale = _UNITS[name]
-            rms, bias, worst = (errors[key] * scale for key in ("rms", "bias", "worst"))
+            row = MEASURANDS[name]
+            rms, bias, worst = (errors[key] * row.fine_scale for key in ("rms", "bias", "worst"))
             lines.append(
-                f"{f'{label_} {label.split()[0]} ({unit})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}"
+                f"{f'{label} {row.symbol} ({row.fine})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}"
             )
     own = found["analysis_ms_per_run"]
     plain = found.get("plain_fit_ms_per_run")

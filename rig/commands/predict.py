@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.commands.output import print_json
 from rig.errors import InputError
+from rig.measurands import MEASURANDS
 from rig.predictions import predictions
 from rig.protocol import reader
 
@@ -39,19 +40,20 @@ def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
     if protocol.surface is None:
         columns = {"speed (m/s)": ("speed_m_s", 1.0, ".4f"), "t (s)": ("fall_time_s", 1.0, ".5f")}
         return _laid_out(columns, found)
+    apart, end = MEASURANDS["separation_m"], MEASURANDS["speed_m_s"]
     columns = {
         "incline (°)": ("incline_deg", 1.0, "g"),
         "strikes": ("impact_chain", 1, ""),
         "α": ("alpha", 1.0, ".4f"),
-        "Δz (cm)": ("separation_m", 100.0, ".3f"),
-        "u (cm)": ("separation_u_m", 100.0, ".3f"),
-        "V (m/s)": ("speed_m_s", 1.0, ".4f"),
-        "u (m/s)": ("speed_u_m_s", 1.0, ".4f"),
+        f"{apart.symbol} ({apart.unit})": (apart.name, apart.scale, ".3f"),
+        f"u ({apart.unit})": (apart.key("u"), apart.scale, ".3f"),
+        f"{end.symbol} ({end.unit})": (end.name, end.scale, ".4f"),
+        f"u ({end.unit})": (end.key("u"), end.scale, ".4f"),
         "t (s)": ("fall_time_s", 1.0, ".5f"),
         "free fall V (m/s)": ("free_fall_speed_m_s", 1.0, ".4f"),
     }
     if not protocol.two_chains:
-        del columns["Δz (cm)"], columns["u (cm)"]
+        del columns[f"{apart.symbol} ({apart.unit})"], columns[f"u ({apart.unit})"]
     return _laid_out(columns, found)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from rig.design.cases import cases
 from rig.design.outlook import outlook
 from rig.design.readable import MARGIN, margin
+from rig.measurands import averaged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from rig.design.cases import Cases
     from rig.protocol.scene import Protocol, Side
 
-GOALS = ("separation_m", "speed_m_s", "gravity_m_s2", "restitution", "friction")
-"""What a layout is judged by, as far as the scene has it: the mean of the logarithms."""
+COEFFICIENTS = ("restitution", "friction")
+"""What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
 FEW = 3
 """Inclines that the search looks at; the outlook looks at all of them."""
 _GRID_M = 4e-3  # between candidates
@@ -172,8 +173,9 @@ def _crowded(
 
 def score(protocol: Protocol, found: Cases, layout: Sequence[int]) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
-    wanted = outlook(protocol, found, layout, GOALS, sure=True).wanted()
-    values = [math.log(wanted[name]) for name in GOALS if name in wanted]
+    goals = (*(row.name for row in averaged()), *COEFFICIENTS)
+    wanted = outlook(protocol, found, layout, goals, sure=True).wanted()
+    values = [math.log(wanted[name]) for name in goals if name in wanted]
     return sum(values) / len(values)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -10,8 +11,9 @@ import numpy as np
 
 from rig.analysis.result import GOOD
 from rig.analysis.student import coverage_factor
-from rig.analysis.summary import MEASURANDS, by_case, mean
+from rig.analysis.summary import by_case, mean
 from rig.estimate.tail import chi2_tail
+from rig.measurands import averaged
 from rig.predictions import predicted_run
 from rig.units import Quantity
 
@@ -43,10 +45,10 @@ def agreement(protocol: Protocol, results: Iterable[DropResult]) -> list[dict[st
     good = [result for result in results if result.verdict in GOOD]
     cases = by_case(protocol, good, lambda one: one.run)
     # Outside the model's domain there is nothing to compare with.
-    cases = [runs for runs in cases if _model(protocol, runs, 0) is not None]
+    cases = [runs for runs in cases if predicted_run(protocol, runs[0].run)]
     if not cases:
         return []
-    names = [name for name in MEASURANDS[:2] if all(name in one.quantities for one in cases[0])]
+    names = [row.name for row in averaged() if _tells(protocol, cases, row.name)]
     return [_compared(protocol, cases, name) for name in names]
 
 
@@ -60,12 +62,10 @@ def _compared(
     single = np.array(
         [max(0.0, (one.expanded / known) ** 2 - one.budget["common"] ** 2) for one in means]
     )
-    which = MEASURANDS.index(name)
-    predicted = np.array([_model(protocol, runs, which) for runs in cases], dtype=float)
+    predicted = np.array([_model(protocol, runs, name) for runs in cases])
     slopes = np.stack(
         [
-            np.array([_model(high, runs, which) for runs in cases], dtype=float)
-            - np.array([_model(low, runs, which) for runs in cases], dtype=float)
+            np.array([_model(high, runs, name) - _model(low, runs, name) for runs in cases])
             for low, high in _moved(protocol)
         ]
         or [np.zeros(len(cases))],
@@ -107,10 +107,18 @@ def _shared(values: Sequence[Sequence[Measured]]) -> Array:
     return np.array([[mean(runs).budget["common"]] for runs in values])
 
 
-def _model(protocol: Protocol, runs: Sequence[DropResult], which: int) -> float | None:
-    """Prediction for these runs, which are of one case; `None` outside the domain."""
-    found = predicted_run(protocol, runs[0].run)[which]
-    return found.value if found is not None else None
+def _tells(protocol: Protocol, cases: Sequence[Sequence[DropResult]], name: str) -> bool:
+    """Whether a quantity is measured and predicted everywhere."""
+    return all(
+        name in predicted_run(protocol, runs[0].run) and all(name in one.quantities for one in runs)
+        for runs in cases
+    )
+
+
+def _model(protocol: Protocol, runs: Sequence[DropResult], name: str) -> float:
+    """Prediction for these runs, which are of one case; not a number outside the domain."""
+    found = predicted_run(protocol, runs[0].run)
+    return found[name].value if name in found else math.nan
 
 
 def _moved(protocol: Protocol) -> Iterator[tuple[Protocol, Protocol]]:

@@ -30,7 +30,7 @@ class Prediction:
         ``discrete`` and what α rests on; ``drag`` where there is air.
     alpha, gamma, separation, speed, time
         `None` where the model has no answer; `notes` says why.
-    separation_u, speed_u
+    separation_u, speed_u, time_u
         Standard uncertainties that follow from those of β, μ (or α), drop, gravity, initial speed
         and drag; `None` also where Eq. 13 is singular within the uncertainty of μ.
     in_domain
@@ -49,6 +49,7 @@ class Prediction:
     time: float | None = None
     separation_u: float | None = None
     speed_u: float | None = None
+    time_u: float | None = None
 
 
 class _Inputs(NamedTuple):
@@ -104,7 +105,7 @@ def predict(
     )
     centre = drops(inputs)
     notes = impact.notes
-    separation_u = speed_u = None
+    separation_u = speed_u = time_u = None
     try:
         spread = [
             (drops(low), drops(high), weight)
@@ -118,6 +119,7 @@ def predict(
     else:
         separation_u = math.hypot(*((b.separation_m - a.separation_m) * w for a, b, w in spread))
         speed_u = math.hypot(*((b.speed_m_s - a.speed_m_s) * w for a, b, w in spread))
+        time_u = math.hypot(*((b.time_s - a.time_s) * w for a, b, w in spread))
     if impact.basis == "pile":
         notes = (*notes, "rods gather on a pile: taken as level with the pile's restitution")
     return Prediction(
@@ -133,6 +135,7 @@ def predict(
         time=centre.time_s,
         separation_u=separation_u,
         speed_u=speed_u,
+        time_u=time_u,
     )
 
 

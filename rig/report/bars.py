@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
+from rig.measurands import MEASURANDS
 from rig.report.numbers import expanded, nested, value_of
 
 if TYPE_CHECKING:
@@ -33,12 +34,12 @@ def bar(line: Mapping[str, Any], name: str, bars: Bars) -> float | None:
         Expanded or standard uncertainty of the mean; standard error by scatter alone; standard
         deviation of one run, or half of it, as in Pantaleone's figures.
     """
-    symbol, _, unit = name.partition("_")
+    row = MEASURANDS[name]
     if bars == "U95":
         return expanded(line.get(name))
     if bars == "u":
         return value_of(nested(line, name, "u"))
     if bars == "SE":
-        return value_of(line.get(f"{symbol}_se_{unit}"))
-    found = value_of(line.get(f"{symbol}_sd_{unit}"))
+        return value_of(line.get(row.key("se")))
+    found = value_of(line.get(row.key("sd")))
     return found if found is None or bars == "SD" else found / 2.0

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import averaged, listed
 from rig.report.numbers import fixed, nested, plus_minus, value_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+    from rig.measurands import Measurand
 
     Record = Mapping[str, Any]
     Cell = Callable[[Record], str]
@@ -60,37 +63,42 @@ def _audit(record: Record) -> str:
     return " / ".join(count or "–" for count in counts) if any(counts) else ""
 
 
-SUMMARY = (
-    Column("incline (°)", incline),
-    Column("strikes", _text("impact_chain"), numeric=False),
-    Column("n", _count("n")),
-    Column("Δz ± U (cm)", _quantity(100, 2, "separation_m")),
-    Column("predicted Δz (cm)", _number(100, 2, "predicted", "separation_m")),
-    Column("V ± U (m/s)", _quantity(1, 3, "speed_m_s")),
-    Column("predicted V (m/s)", _number(1, 3, "predicted", "speed_m_s")),
-    Column("g ± U (m/s²)", _quantity(1, 4, "gravity_m_s2")),
-    Column("predicted g (m/s²)", _number(1, 4, "predicted", "gravity_m_s2")),
-    Column("Eₙ", _number(1, 2, "normalized_error")),
-)
-"""Of `summary`. Unlike chains have a line each.
+def summary_columns() -> list[Column]:
+    """Columns of `summary`; unlike chains have a line each.
 
-Eₙ is the normalized error; within ±1 measurement and prediction agree.
-"""
+    Eₙ is the normalized error; within ±1 measurement and prediction agree.
+    """
+    return [
+        Column("incline (°)", incline),
+        Column("strikes", _text("impact_chain"), numeric=False),
+        Column("n", _count("n")),
+        *(column for row in averaged() for column in _beside_model(row)),
+        Column("Eₙ", _number(1, 2, "normalized_error")),
+    ]
 
-RUNS = (
-    Column("run", _count("run")),
-    Column("attempt", _count("attempt")),
-    Column("incline (°)", incline),
-    Column("impact chain", _text("impact_chain"), numeric=False),
-    Column("Δz ± U (cm)", _quantity(100, 2, "separation_m")),
-    Column("raw Δz ± U (cm)", _quantity(100, 2, "separation_raw_m")),
-    Column("V ± U (m/s)", _quantity(1, 3, "speed_m_s")),
-    Column("skew ± U (ms)", _quantity(1000, 2, "release_skew_s")),
-    Column("g ± U (m/s²)", _quantity(1, 4, "gravity_m_s2")),
-    Column("edges", _audit),
-    Column("verdict", _text("verdict"), numeric=False),
-)
-"""Of `runs`. Raw Δz is as it happened, not corrected to simultaneous release."""
+
+def _beside_model(row: Measurand) -> tuple[Column, Column]:
+    predicted = _number(row.scale, row.decimals, "predicted", row.name)
+    return measured(row), Column(f"predicted {row.symbol} ({row.unit})", predicted)
+
+
+def measured(row: Measurand) -> Column:
+    """Make the column of a quantity with its U."""
+    heading = f"{row.symbol} ± U ({row.unit})"
+    return Column(heading, _quantity(row.scale, row.decimals, row.name))
+
+
+def run_columns() -> list[Column]:
+    """Columns of `runs`; raw Δz is as it happened, not corrected to simultaneous release."""
+    return [
+        Column("run", _count("run")),
+        Column("attempt", _count("attempt")),
+        Column("incline (°)", incline),
+        Column("impact chain", _text("impact_chain"), numeric=False),
+        *(measured(row) for row in listed()),
+        Column("edges", _audit),
+        Column("verdict", _text("verdict"), numeric=False),
+    ]
 
 
 def filled(

@@ -5,19 +5,13 @@ from __future__ import annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import MEASURANDS
 from rig.report.columns import Column
 from rig.report.estimate import SYMBOLS
 from rig.report.table import aligned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-_MEASURANDS = {
-    "separation_m": ("Δz of one run (mm)", 1e3),
-    "speed_m_s": ("V of one run (mm/s)", 1e3),
-    "release_skew_s": ("release skew of one run (µs)", 1e6),
-    "gravity_m_s2": ("g of one run (mm/s²)", 1e3),
-}
 
 
 def design_text(found: Mapping[str, Any]) -> str:
@@ -56,10 +50,11 @@ def _records(found: Mapping[str, Any], layouts: list[str]) -> list[dict[str, str
     rows: dict[str, dict[str, str]] = {}
     for layout in layouts:
         for line in found[layout]["measurands"]:
-            if line["name"] in _MEASURANDS:
-                what, scale = _MEASURANDS[line["name"]]
+            quantity = MEASURANDS[line["name"]]
+            if quantity.told:
+                what = f"{quantity.symbol} of one run ({quantity.fine})"
                 row = rows.setdefault(what, {"what": what})
-                row[layout] = f"{line['u_run'] * scale:.3g}"
+                row[layout] = f"{line['u_run'] * quantity.fine_scale:.3g}"
         for line in found[layout]["coefficients"]:
             row = rows.setdefault(line["name"], {"what": SYMBOLS[line["name"]]})
             row[layout] = f"{line['u']:.2g}" if line["identified"] else "not identified"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import told
 from rig.report.columns import Column, incline
 from rig.report.numbers import fixed, nested, plus_minus, value_of
 from rig.report.parts import Part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+
+    from rig.measurands import Measurand
 
     Record = Mapping[str, Any]
 
@@ -33,24 +36,28 @@ def effects_parts(found: Mapping[str, Any]) -> Iterator[Part]:
                 "release skew when the chains change places goes with the sides: positive where "
                 "the free side lets go later."
             ],
-            _COLUMNS,
+            tuple(_columns()),
             effects,
         )
-
-
-def _quantity(scale: float, *path: str) -> Callable[[Record], str]:
-    return lambda record: plus_minus(nested(record, *path), scale)
 
 
 def _number(name: str) -> Callable[[Record], str]:
     return lambda record: fixed(value_of(record.get(name)), 0)
 
 
-_COLUMNS = (
-    Column("incline (°)", incline),
-    Column("blocks", _number("blocks")),
-    Column("Δz ± U (mm)", _quantity(1000.0, "chain", "separation_m")),
-    Column("V ± U (mm/s)", _quantity(1000.0, "chain", "speed_m_s")),
-    Column("skew ± U (ms)", _quantity(1000.0, "chain", "release_skew_s")),
-    Column("sides' skew ± U (ms)", _quantity(1000.0, "side", "release_skew_s")),
-)
+def _columns() -> Iterator[Column]:
+    yield Column("incline (°)", incline)
+    yield Column("blocks", _number("blocks"))
+    for row in told():
+        if row.by_chain:
+            yield _effect("chain", row.symbol, row)
+    for row in told():
+        if row.by_side:
+            yield _effect("side", f"sides' {row.symbol}", row)
+
+
+def _effect(of: str, what: str, row: Measurand) -> Column:
+    def cell(record: Record) -> str:
+        return plus_minus(nested(record, of, row.name), row.fine_scale)
+
+    return Column(f"{what} ± U ({row.fine})", cell)

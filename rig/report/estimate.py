@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import MEASURANDS
 from rig.report.columns import Column
 from rig.report.numbers import decimals_for, fixed, plus_minus, value_of
 from rig.report.parts import Part
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     _Make = Callable[[str, Record], Part | None]
 
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
-_QUANTITIES = {"separation_m": "Δz", "speed_m_s": "V"}
 
 
 def estimate_text(found: Mapping[str, Any], sections: Sections) -> str:
@@ -211,7 +211,7 @@ _IMPULSES = (
     Column("largest |Eₙ|", _worst),
 )
 _INCLINES = (
-    Column("quantity", lambda line: _QUANTITIES[line["quantity"]], numeric=False),
+    Column("quantity", lambda line: MEASURANDS[line["quantity"]].symbol, numeric=False),
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
     _STRIKES,
     Column("n", lambda line: str(line["n"])),
@@ -230,7 +230,7 @@ _RODS = (
     Column("Eₙ", lambda line: fixed(line["normalized_error"], 2)),
 )
 _COMPARISON = (
-    Column("quantity", lambda line: _QUANTITIES[line["quantity"]], numeric=False),
+    Column("quantity", lambda line: MEASURANDS[line["quantity"]].symbol, numeric=False),
     Column("χ²", lambda line: fixed(line["chi2"], 1)),
     Column("inclines", lambda line: str(line["degrees"])),
     Column("p", _p),

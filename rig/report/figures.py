@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import MEASURANDS, averaged
 from rig.report.bars import LABELS, bar
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
 from rig.report.numbers import expanded, fixed, nested, value_of
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from rig.measurands import Measurand
     from rig.report.bars import Bars
 
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2, "markeredgewidth": 0}
@@ -34,10 +36,6 @@ _MEAN: dict[str, Any] = {
     "markeredgewidth": 0.7,
     "zorder": 4,
 }
-_PANELS = (
-    ("separation_m", 100.0, "separation Δz (cm)"),
-    ("speed_m_s", 1.0, "end speed V (m/s)"),
-)
 _SEGMENTS: dict[str, tuple[Any, str]] = {
     "surface": ("-", "model, rods on the surface"),
     "pile": ((0, (5, 2.5)), "model, rods on a pile (level)"),
@@ -74,17 +72,17 @@ def incline_figure(
     curves = curves or {}
     measured = [*(analysis.get("summary") or ()), *(analysis.get("runs") or ())]
     panels = [
-        panel
-        for panel in _PANELS
-        if panel[0] in curves or any(value_of(line.get(panel[0])) is not None for line in measured)
-    ] or [_PANELS[0]]
+        row
+        for row in averaged()
+        if row.name in curves or any(value_of(line.get(row.name)) is not None for line in measured)
+    ] or [MEASURANDS["separation_m"]]
     with canvas((3.1,) * len(panels), simulated=simulated) as drawing:
-        for axes, (key, scale, label) in zip(drawing.axes, panels, strict=True):
-            _incline_panel(axes, analysis, curves, key, scale, bars)
-            axes.set_ylabel(label)
-            if key == "separation_m":
+        for axes, row in zip(drawing.axes, panels, strict=True):
+            _incline_panel(axes, analysis, curves, row, bars)
+            axes.set_ylabel(row.axis)
+            if row.name == "separation_m":
                 axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-            else:
+            elif row.name == "speed_m_s":
                 _free_fall_line(axes, value_of(curves.get("free_fall_speed_m_s")))
         # The empty corner: both quantities fall towards steep surfaces.
         if drawing.axes[0].get_legend_handles_labels()[0]:
@@ -184,7 +182,7 @@ def gravity_figure(
                 label=f"site, {fixed(site, 4)} m/s²",
             )
         run_points(axes, runs, "gravity_m_s2", 1.0)
-        axes.set_ylabel("acceleration g (m/s²)")
+        axes.set_ylabel(MEASURANDS["gravity_m_s2"].axis)
         axes.ticklabel_format(axis="y", useOffset=False)
         legend_above(axes)
         run_axis(axes)
@@ -195,13 +193,12 @@ def _incline_panel(
     axes: Axes,
     analysis: Mapping[str, Any],
     curves: Mapping[str, Any],
-    key: str,
-    scale: float,
+    row: Measurand,
     bars: Bars,
 ) -> None:
-    stem, unit = ("speed", "_m_s") if key == "speed_m_s" else ("separation", "_m")
+    key, scale = row.name, row.scale
     first = None
-    for name, part in _segments(curves):
+    for name, part in _segments(curves) if key in curves else ():
         where, _, chain = name.partition(", ")  # unlike chains have curves of their own
         style, label = _SEGMENTS.get(where, (":", f"model, {where}"))
         label = f"{label}, {chain}" if chain else label
@@ -210,7 +207,7 @@ def _incline_panel(
         inclines = [curves["incline_deg"][index] for index in part]
         values = [_scaled(curves[key][index], scale) for index in part]
         axes.plot(inclines, values, linestyle=style, color=color, label=label, zorder=3)
-        band = curves.get(f"{stem}_U95{unit}")
+        band = curves.get(row.key("U95"))
         if band is not None:
             widths = [_scaled(band[index], scale) for index in part]
             low = [value - width for value, width in zip(values, widths, strict=True)]

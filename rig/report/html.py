@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from rig.files import write_atomic
-from rig.report.columns import AUDIT, RUNS, SUMMARY, Column, filled
+from rig.report.columns import AUDIT, Column, filled, run_columns, summary_columns
 from rig.report.embed import dark_figure_css, embedded
 from rig.sections import Sections
 
@@ -146,13 +146,13 @@ def _summary(analysis: Mapping[str, Any]) -> str:
             " Eₙ is the difference from the prediction over its expanded uncertainty: within ±1 "
             "they agree."
         )
-    return f'<h2>Summary</h2>{_table(SUMMARY, lines)}<p class="note">{note}</p>'
+    return f'<h2>Summary</h2>{_table(summary_columns(), lines)}<p class="note">{note}</p>'
 
 
 def _runs(analysis: Mapping[str, Any]) -> str:
     html = ""
     if analysis.get("runs"):
-        html += f"<h2>Runs</h2>{_table(RUNS, analysis['runs'])}"
+        html += f"<h2>Runs</h2>{_table(run_columns(), analysis['runs'])}"
         if any(run.get("separation_raw_m") for run in analysis["runs"]):
             html += (
                 '<p class="note">Δz is corrected to simultaneous release, raw Δz is as it '
@@ -161,7 +161,7 @@ def _runs(analysis: Mapping[str, Any]) -> str:
         if any(run.get("edges") for run in analysis["runs"]):
             html += f'<p class="note">Edges: {" / ".join(AUDIT)}.</p>'
     if analysis.get("superseded"):
-        html += f"<h2>Earlier attempts</h2>{_table(RUNS, analysis['superseded'])}"
+        html += f"<h2>Earlier attempts</h2>{_table(run_columns(), analysis['superseded'])}"
     return html
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.measurands import MEASURANDS
 from rig.model import paper
 from rig.model.fall import free_fall_speed
 from rig.report.canvas import INK, MODEL, MUTED, SECOND, canvas
@@ -58,20 +59,18 @@ def _caption() -> str:
 
 def _figure_3(axes: list[Axes], columns: Columns) -> None:
     """Δz above, V below."""
-    for panel, name, scale, label in (
-        (axes[0], "separation_m", 100.0, "separation Δz (cm)"),
-        (axes[1], "speed_m_s", 1.0, "end speed V (m/s)"),
-    ):
+    for panel, name in ((axes[0], "separation_m"), (axes[1], "speed_m_s")):
+        row = MEASURANDS[name]
         for pile, style, words in ((0.0, "-", "rods on the surface"), (1.0, "--", "on a pile")):
             rows = [i for i, flag in enumerate(columns["pile"]) if flag == pile]
             # The rod does not slide between level and arctan μ: no line across.
             inclines = [columns["incline_deg"][i] for i in rows]
-            values = [columns[name][i] * scale for i in rows]
+            values = [columns[name][i] * row.scale for i in rows]
             start = 1 if not pile and inclines[0] == 0.0 else 0
             if start:
                 panel.plot(inclines[:1], values[:1], "o", color=MODEL, markersize=4)
             panel.plot(inclines[start:], values[start:], style, color=MODEL, label=words)
-        panel.set_ylabel(label)
+        panel.set_ylabel(row.axis)
     axes[0].legend(loc="upper right")
     axes[1].axhline(paper.TEXT_FREE_FALL_SPEED, color=SECOND, linestyle=":", linewidth=1.2)
     axes[1].text(89, paper.TEXT_FREE_FALL_SPEED, "free fall in the text, 5.08 m/s ", color=SECOND,
@@ -106,15 +105,16 @@ def _figure_4(axes: list[Axes], columns: Columns) -> None:
 
 def _figure_6(axes: list[Axes], columns: Columns) -> None:
     """Against ξ, with the closed forms beside the discrete model."""
-    for panel, name, other, words, scale, label in (
-        (axes[0], "separation_m", "eq15_separation_m", "Eq. 15", 100.0, "separation Δz (cm)"),
-        (axes[1], "speed_m_s", "eq14_speed_m_s", "Eq. 14", 1.0, "end speed V (m/s)"),
+    for panel, row, other, words in (
+        (axes[0], MEASURANDS["separation_m"], "eq15_separation_m", "Eq. 15"),
+        (axes[1], MEASURANDS["speed_m_s"], "eq14_speed_m_s", "Eq. 14"),
     ):
         inertia = columns["inertia"]
-        panel.plot(inertia, [scale * v for v in columns[name]], color=MODEL, label="discrete model")
-        panel.plot(inertia, [scale * v for v in columns[other]], "--", color=INK, label=words)
+        discrete, closed = ([row.scale * v for v in columns[key]] for key in (row.name, other))
+        panel.plot(inertia, discrete, color=MODEL, label="discrete model")
+        panel.plot(inertia, closed, "--", color=INK, label=words)
         panel.axvline(paper.UNIFORM.inertia, color=MUTED, linestyle=":", linewidth=1.2)
-        panel.set_ylabel(label)
+        panel.set_ylabel(row.axis)
         panel.legend(loc="upper right")
     axes[1].set_xlabel("rotational inertia of the rods, ξ (dotted: uniform rods, 1/3)")
 

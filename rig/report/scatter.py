@@ -5,6 +5,7 @@ from __future__ import annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import averaged
 from rig.report.bars import LABELS, bar
 from rig.report.columns import Column, incline
 from rig.report.numbers import fixed, value_of
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-_QUANTITIES = {
-    "separation_m": ("Δz (mm)", 1e3, 3),
-    "speed_m_s": ("V (mm/s)", 1e3, 2),
-    "gravity_m_s2": ("g (mm/s²)", 1e3, 2),
-}
 _HEADINGS = {"incline": "incline (°)", "strikes": "strikes", "n": "n", "quantity": ""}
 _HEADINGS |= {"mean": "mean", "SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "half-SD": "SD/2"}
 _COLUMNS = tuple(
@@ -50,18 +46,18 @@ def scatter_part(found: Mapping[str, Any]) -> Part:
 
 def _records(summary: Any) -> Iterator[Record]:
     for line in summary:
-        for name, (label, scale, decimals) in _QUANTITIES.items():
-            if name not in line:
+        for row in averaged():
+            if row.name not in line:
                 continue
-            values: dict[str, float | None] = {"mean": value_of(line[name])}
-            values |= {kind: bar(line, name, kind) for kind in LABELS}
+            values: dict[str, float | None] = {"mean": value_of(line[row.name])}
+            values |= {kind: bar(line, row.name, kind) for kind in LABELS}
             yield {
                 "incline": incline(line),
                 "strikes": str(line.get("impact_chain", "")),
                 "n": fixed(line["n"], 0),
-                "quantity": label,
+                "quantity": f"{row.symbol} ({row.fine})",
                 **{
-                    key: "" if value is None else fixed(value * scale, decimals)
+                    key: "" if value is None else fixed(value * row.fine_scale, 3)
                     for key, value in values.items()
                 },
             }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.measurands import MEASURANDS
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, canvas
 from rig.sweep.compute import PILE
 from rig.sweep.variables import VARIABLES
@@ -51,6 +52,7 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
     caption = _caption(facts)
     foot = _LINE_HEIGHT * (caption.count("\n") + 2)
     flat = len(layout.grid.axes) == 2
+    apart, end = MEASURANDS["separation_m"], MEASURANDS["speed_m_s"]
     with canvas(
         (3.4, foot) if flat else (2.9, 2.9, foot),
         9.0 if flat else 7.0,
@@ -59,8 +61,8 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
         description=json.dumps(facts, ensure_ascii=False),
     ) as drawing:
         for panel, values, label in (
-            (drawing.axes[0], 100.0 * swept.separation_m, "separation Δz (cm)"),
-            (drawing.axes[1], swept.speed_m_s, "end speed V (m/s)"),
+            (drawing.axes[0], apart.scale * swept.separation_m, apart.axis),
+            (drawing.axes[1], end.scale * swept.speed_m_s, end.axis),
         ):
             if flat:
                 image = _map(panel, layout.grid.axes, values, swept.in_domain)

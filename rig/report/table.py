@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.report.columns import SUMMARY, filled
+from rig.report.columns import filled, summary_columns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ def summary_table(analysis: Mapping[str, Any]) -> str:
     summary = analysis.get("summary") or ()
     if not summary:
         return "No accepted runs, so no summary."
-    return "\n".join(aligned(SUMMARY, summary))
+    return "\n".join(aligned(summary_columns(), summary))
 
 
 def aligned(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> list[str]:

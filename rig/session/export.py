@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError
 from rig.files import write_atomic
+from rig.measurands import MEASURANDS
 from rig.session.edges_csv import write_edges
 
 if TYPE_CHECKING:
@@ -33,14 +34,6 @@ _MEANINGS = {
     "superseded": "1 where a later attempt replaces this one",
     "incline_deg": "inclination of the surface",
     "impact_chain": "chain on the impact side",
-    "separation_m": "height of the free chain's top rod over the impact chain's when that one "
-    "reaches the surface, corrected to simultaneous release",
-    "separation_raw_m": "the same as it happened",
-    "separation_sd_m": "standard deviation between runs",
-    "speed_m_s": "speed of the impact chain's top rod just before it reaches the surface",
-    "release_skew_s": "release of the free chain less that of the impact chain; positive: the "
-    "free chain left later",
-    "gravity_m_s2": "acceleration of the falling chain",
     "verdict": "accepted, marginal, void or rejected",
     "reasons": "why, separated by semicolons",
     "n": "number of runs",
@@ -51,6 +44,16 @@ _MEANINGS = {
     "state": "of the run; in edges.csv 1 is a blocked beam, 0 a clear one",
     "tick": "device clock, 32 bits",
 }
+
+
+def _meanings() -> dict[str, str]:
+    """What columns mean, those of the measurands too."""
+    found = dict(_MEANINGS)
+    for row in MEASURANDS.values():
+        found[row.name] = row.meaning
+        found[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
+        found[row.key("se")] = f"{row.symbol}: standard error of the mean"
+    return found
 
 
 def export_csv(
@@ -172,6 +175,6 @@ def _describe(column: str) -> str:
     if column.endswith(("_u", "_U95")):
         return ""
     unit = next((unit for end, unit in _UNITS.items() if column.endswith(end)), "")
-    meaning = _MEANINGS.get(column, "")
+    meaning = _meanings().get(column, "")
     told = " ".join(filter(None, [f"[{unit}]" if unit else "", meaning]))
     return f": {told}" if told else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import averaged
 from rig.records import Job
 from rig.report.numbers import expanded, value_of
 from rig.results.view import good
@@ -78,10 +79,8 @@ def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]
     found = []
     runs = [run for run in findings.analysis["runs"] if run["run"] != hidden and good(run)]
     summary = [] if hidden is not None else findings.analysis["summary"]
-    for name, scale, title in (
-        ("separation_m", 100.0, "Δz (cm), incline (°)"),
-        ("speed_m_s", 1.0, "V (m/s), incline (°)"),
-    ):
+    for row in averaged():
+        name, scale, title = row.name, row.scale, f"{row.symbol} ({row.unit}), incline (°)"
         curve = findings.curves.get(name)
         if curve is None:
             continue

@@ -72,7 +72,7 @@ def test_a_curve_ends_when_the_top_rod_strikes(scene):
     np.testing.assert_array_equal(at, when)
     assert heights[-1] == pytest.approx(-length, abs=1e-9)
     assert when[-1] < 1.0
-    assert model[-1] == pytest.approx(predicted_run(scene, run)[0].value, abs=1e-9)
+    assert model[-1] == pytest.approx(predicted_run(scene, run)["separation_m"].value, abs=1e-9)
 
 
 def test_live_a_missed_edge_shifts_nothing(scene):

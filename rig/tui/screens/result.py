@@ -9,6 +9,7 @@ from textual.containers import Horizontal
 from textual.content import Content
 
 from rig.analysis.student import coverage_factor
+from rig.measurands import listed
 from rig.predictions import predicted_run
 from rig.report.columns import AUDIT
 from rig.report.numbers import fixed, plus_minus
@@ -23,20 +24,11 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
-    from rig.protocol.scene import Protocol, Run
     from rig.records import Job
     from rig.results.view import SessionView
     from rig.tui.model import Model
     from rig.tui.widgets.figure import Picture
     from rig.units import Quantity
-
-_ROWS = (
-    ("separation_m", "Δz corrected", 100.0, "cm"),
-    ("separation_raw_m", "Δz as it fell", 100.0, "cm"),
-    ("speed_m_s", "V", 1.0, "m/s"),
-    ("release_skew_s", "release skew", 1e3, "ms"),
-    ("gravity_m_s2", "g", 1.0, "m/s²"),
-)
 
 
 class ResultPage(Page):
@@ -86,22 +78,22 @@ def drop_pictures(findings: SessionView, job: Job) -> tuple[Picture | None, Pict
 def number_table(findings: SessionView, job: Job, *, wide: bool = True) -> Content:
     """Write the numbers with U95; where there is room, the model's and the normalized error too."""
     record = findings.record(job)
-    expected = expectations(findings.protocol, findings.plan[job.run])
+    expected = predicted_run(findings.protocol, findings.plan[job.run])
     head = f"{'':15}{'measured ± U95':>20}"
     lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
-    for name, label, scale, unit in _ROWS:
-        if name not in record:
+    for row in listed():
+        if row.name not in record:
             continue
-        line = f"{label:15}{plus_minus(record[name], scale):>20} {unit:4}"
-        model = expected.get(name)
+        line = f"{row.label:15}{plus_minus(record[row.name], row.scale):>20} {row.unit:4}"
+        model = expected.get(row.name)
         if not wide:
             pass
         elif model is not None:
             own = coverage_factor(math.inf) * model.u
             told = {"value": model.value, "U95": own} if own else model.value
-            line += f"{plus_minus(told, scale):>16}"
-            line += f"   {fixed(_normalized(record[name], model), 2):>5}"
-        elif name == "release_skew_s":
+            line += f"{plus_minus(told, row.scale):>16}"
+            line += f"   {fixed(_normalized(record[row.name], model), 2):>5}"
+        elif row.name == "release_skew_s":
             limit = findings.protocol.accept.release_skew * 1e3
             line += f"{f'limit ±{limit:g}':>16}"
         lines.append(Content(line))
@@ -109,15 +101,6 @@ def number_table(findings: SessionView, job: Job, *, wide: bool = True) -> Conte
     counts = " · ".join(f"{kind} {audit.get(kind, 0)}" for kind in AUDIT)
     lines.append(Content(f"{'edges':15}{counts}"))
     return Content("\n").join(lines)
-
-
-def expectations(protocol: Protocol, run: Run) -> dict[str, Quantity]:
-    """Return what the model says of this run, by JSON name."""
-    if protocol.surface is None:
-        return {"gravity_m_s2": protocol.gravity}
-    separation, speed = predicted_run(protocol, run)
-    found = {"separation_m": separation, "speed_m_s": speed}
-    return {name: value for name, value in found.items() if value is not None}
 
 
 def _normalized(measured: Mapping[str, float], model: Quantity) -> float | None:

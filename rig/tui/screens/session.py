@@ -11,6 +11,7 @@ from textual.content import Content
 
 from rig.analysis.learn import FEWEST
 from rig.campaign.plan import done, void_counts
+from rig.measurands import averaged
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import control_pictures, incline_pictures
 from rig.tui.screens.page import Page
@@ -170,13 +171,9 @@ def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:
 def _means(mean: Mapping[str, Any]) -> list[str]:
     """What is known of an incline so far."""
     parts = [
-        f"{label} {plus_minus(mean[name], scale)} {unit}"
-        for name, label, scale, unit in (
-            ("separation_m", "Δz", 100.0, "cm"),
-            ("speed_m_s", "V", 1.0, "m/s"),
-            ("gravity_m_s2", "g", 1.0, "m/s²"),
-        )
-        if name in mean
+        f"{row.symbol} {plus_minus(mean[row.name], row.scale)} {row.unit}"
+        for row in averaged()
+        if row.name in mean
     ]
     error = mean.get("normalized_error")
     return parts if error is None else [*parts, f"Eₙ {fixed(error, 2)}"]

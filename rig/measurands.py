@@ -1,0 +1,125 @@
+"""What is measured, one row a quantity: JSON, CSV, tables, figures and screens read it from here.
+
+A new measurand is a row here and the function that computes it in `rig.analysis.quantities`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_SUFFIXES = ("_m_s2", "_m_s", "_m", "_s")
+
+
+@dataclass(frozen=True, slots=True)
+class Measurand:
+    """One quantity.
+
+    Attributes
+    ----------
+    name
+        In JSON and CSV: what it is and its SI unit, ``separation_m``.
+    symbol, label, title
+        In headings, in a list of one drop's numbers, and in front of the symbol on an axis.
+    meaning
+        For who reads the CSV files.
+    unit, scale, decimals
+        For people: ``value · scale`` has that unit, and so many decimals where no uncertainty says.
+    fine, fine_scale
+        The same for differences and scatter.
+    averaged
+        Whether it has a mean over the runs of an incline, which is compared with the model.
+    listed
+        Whether it stands in the list of runs and among a drop's numbers on the screen.
+    told
+        Whether the one line on a drop names it.
+    by_chain, by_side
+        Whether the difference that the striking chain makes is a result, and that of the sides.
+    """
+
+    name: str
+    symbol: str
+    label: str
+    title: str
+    meaning: str
+    unit: str
+    scale: float
+    decimals: int
+    fine: str
+    fine_scale: float
+    averaged: bool = False
+    listed: bool = False
+    told: bool = False
+    by_chain: bool = False
+    by_side: bool = False
+
+    @property
+    def stem(self) -> str:
+        """The name without its unit."""
+        return next(self.name.removesuffix(end) for end in _SUFFIXES if self.name.endswith(end))
+
+    def key(self, what: str) -> str:
+        """Name something of it: ``sd`` of ``speed_m_s`` is ``speed_sd_m_s``."""
+        return f"{self.stem}_{what}{self.name.removeprefix(self.stem)}"
+
+    @property
+    def axis(self) -> str:
+        """Label of an axis."""
+        return f"{self.title} {self.symbol} ({self.unit})"
+
+
+MEASURANDS: dict[str, Measurand] = {
+    row.name: row
+    for row in (
+        Measurand(
+            "separation_m", "Δz", "Δz corrected", "separation",
+            "height of the free chain's top rod over the impact chain's when that one reaches the "
+            "surface, corrected to simultaneous release",
+            "cm", 100.0, 2, "mm", 1e3, averaged=True, listed=True, told=True, by_chain=True,
+        ),
+        Measurand(
+            "separation_raw_m", "raw Δz", "Δz as it fell", "separation",
+            "the same as it happened",
+            "cm", 100.0, 2, "mm", 1e3, listed=True, by_chain=True,
+        ),
+        Measurand(
+            "speed_m_s", "V", "V", "end speed",
+            "speed of the impact chain's top rod just before it reaches the surface",
+            "m/s", 1.0, 3, "mm/s", 1e3, averaged=True, listed=True, told=True, by_chain=True,
+        ),
+        Measurand(
+            "release_skew_s", "skew", "release skew", "release",
+            "release of the free chain less that of the impact chain; positive: the free chain "
+            "left later",
+            "ms", 1e3, 2, "ms", 1e3, listed=True, told=True, by_chain=True, by_side=True,
+        ),
+        Measurand(
+            "fall_time_s", "t", "fall time", "fall time",
+            "from the impact chain's release until its top rod reaches the surface",
+            "s", 1.0, 5, "ms", 1e3,
+        ),
+        Measurand(
+            "gravity_m_s2", "g", "g", "acceleration",
+            "acceleration of the falling chain",
+            "m/s²", 1.0, 4, "mm/s²", 1e3, averaged=True, listed=True, told=True,
+        ),
+    )
+}  # fmt: skip
+
+
+def averaged() -> Iterator[Measurand]:
+    """Yield those that have a mean over the runs of an incline."""
+    return (row for row in MEASURANDS.values() if row.averaged)
+
+
+def listed() -> Iterator[Measurand]:
+    """Yield those in the list of runs."""
+    return (row for row in MEASURANDS.values() if row.listed)
+
+
+def told() -> Iterator[Measurand]:
+    """Yield those that one line on a drop names."""
+    return (row for row in MEASURANDS.values() if row.told)
