@@ -28,7 +28,7 @@ class Measurand:
         For who reads the CSV files.
     unit, scale, decimals
         For people: ``value · scale`` has that unit, and so many decimals where no uncertainty says.
-    fine, fine_scale
+    fine, fine_scale, fine_decimals
         The same for differences and scatter.
     averaged
         Whether it has a mean over the runs of an incline, which is compared with the model.
@@ -50,6 +50,7 @@ class Measurand:
     decimals: int
     fine: str
     fine_scale: float
+    fine_decimals: int
     averaged: bool = False
     listed: bool = False
     told: bool = False
@@ -78,33 +79,33 @@ MEASURANDS: dict[str, Measurand] = {
             "separation_m", "Δz", "Δz corrected", "separation",
             "height of the free chain's top rod over the impact chain's when that one reaches the "
             "surface, corrected to simultaneous release",
-            "cm", 100.0, 2, "mm", 1e3, averaged=True, listed=True, told=True, by_chain=True,
+            "cm", 100.0, 2, "mm", 1e3, 3, averaged=True, listed=True, told=True, by_chain=True,
         ),
         Measurand(
             "separation_raw_m", "raw Δz", "Δz as it fell", "separation",
             "the same as it happened",
-            "cm", 100.0, 2, "mm", 1e3, listed=True, by_chain=True,
+            "cm", 100.0, 2, "mm", 1e3, 3, listed=True, by_chain=True,
         ),
         Measurand(
             "speed_m_s", "V", "V", "end speed",
             "speed of the impact chain's top rod just before it reaches the surface",
-            "m/s", 1.0, 3, "mm/s", 1e3, averaged=True, listed=True, told=True, by_chain=True,
+            "m/s", 1.0, 3, "mm/s", 1e3, 2, averaged=True, listed=True, told=True, by_chain=True,
         ),
         Measurand(
             "release_skew_s", "skew", "release skew", "release",
             "release of the free chain less that of the impact chain; positive: the free chain "
             "left later",
-            "ms", 1e3, 2, "ms", 1e3, listed=True, told=True, by_chain=True, by_side=True,
+            "ms", 1e3, 2, "ms", 1e3, 3, listed=True, told=True, by_chain=True, by_side=True,
         ),
         Measurand(
             "fall_time_s", "t", "fall time", "fall time",
             "from the impact chain's release until its top rod reaches the surface",
-            "s", 1.0, 5, "ms", 1e3,
+            "s", 1.0, 5, "ms", 1e3, 3,
         ),
         Measurand(
             "gravity_m_s2", "g", "g", "acceleration",
             "acceleration of the falling chain",
-            "m/s²", 1.0, 4, "mm/s²", 1e3, averaged=True, listed=True, told=True,
+            "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
         ),
     )
 }  # fmt: skip

@@ -57,7 +57,7 @@ def _records(summary: Any) -> Iterator[Record]:
                 "n": fixed(line["n"], 0),
                 "quantity": f"{row.symbol} ({row.fine})",
                 **{
-                    key: "" if value is None else fixed(value * row.fine_scale, 3)
+                    key: "" if value is None else fixed(value * row.fine_scale, row.fine_decimals)
                     for key, value in values.items()
                 },
             }

@@ -15,7 +15,7 @@ from tests.tui.lab import KEYS
 SPIN = Measurand(
     "free_arrival_m_s", "Vf", "free speed", "speed of the free chain",
     "speed of the free chain's top rod when the other one reaches the surface",
-    "m/s", 1.0, 3, "mm/s", 1e3, averaged=True, listed=True, told=True, by_chain=True,
+    "m/s", 1.0, 3, "mm/s", 1e3, 2, averaged=True, listed=True, told=True, by_chain=True,
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from rig.report.clock import clock_lines
-from rig.report.columns import RUNS
+from rig.report.columns import run_columns
 from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.table import aligned, summary_table
 from tests.report import fake_analysis
@@ -56,10 +56,10 @@ def test_where_nothing_is_struck_nothing_is_inclined() -> None:
     assert "incline" not in summary_table(fence)
     void = {**fence["runs"][0], "verdict": "void"}
     del void["gravity_m_s2"]
-    heading = aligned(RUNS, [void, fence["runs"][1]])[0]
+    heading = aligned(run_columns(), [void, fence["runs"][1]])[0]
     assert "incline" not in heading
     assert "impact" not in heading
-    assert "incline" in aligned(RUNS, fake_analysis.single_chain()["runs"])[0]
+    assert "incline" in aligned(run_columns(), fake_analysis.single_chain()["runs"])[0]
 
 
 def test_the_clock_is_told_in_plain_numbers() -> None:
