@@ -102,7 +102,7 @@ def _scene(chance: random.Random, kind: str) -> str:
     """Everything but the gates."""
     title = chance.choice(TITLES)
     lines = ["protocol: 1", *([f'title: "{title}"'] if title else [])]
-    rods = chance.choices((2, 3, 4, 5, 8, 12, 25, 40, 60), (3, 3, 3, 3, 3, 3, 3, 1, 1))[0]
+    rods = chance.choices((2, 3, 4, 5, 8, 12, 25, 40, 60), (8, 8, 8, 8, 8, 8, 6, 1, 1))[0]
     two = kind == "two" or (kind == "predicted" and chance.random() < 0.5)
     given = kind != "fence" and chance.random() < 0.2
     lines += ["chains:", *_chains(chance, rods, two=two, given=given)]
@@ -173,9 +173,9 @@ def _unlike(
 def _plan(chance: random.Random, kind: str, rods: int, *, two: bool) -> list[str]:
     """The plan's keys."""
     inclines = "" if kind == "fence" else chance.choice(INCLINES)
-    most = 8 if rods < 25 else 4  # drops, which may fall three times each
+    most = 6 if rods < 25 else 4  # drops, which may fall three times each
     found = [f"incline: {inclines}"] if inclines else []
-    repeats = [n for n in (1, 2, 3, 4, 6, 8) if n * (inclines.count(",") + 1) <= most]
+    repeats = [n for n in (1, 2, 3, 4, 6) if n * (inclines.count(",") + 1) <= most]
     found.append(f"repeats: {chance.choice(repeats)}")
     if two:
         found.append(f"order: {chance.choice(('ABBA', 'ABBA', 'alternate', 'fixed'))}")

@@ -243,8 +243,8 @@ class _Journey:
         if done.code != DONE:
             return
         html = page.read_text("utf-8")
-        for sentence in re.findall(r"[^<>]*could not be (?:made|worked out)[^<]*", html, re.I):
-            self.fault("report", sentence)
+        for failed in re.findall(r"[^<>]*(?:could|Could) not be (?:made|worked out)[^<]*", html):
+            self.fault("report", failed)
         said = re.sub(r"<(style|pre|title|h1|svg|dl)\b.*?</\1>", "", html, flags=re.DOTALL)
         text = re.sub(r"<[^>]+>", "\n", said)
         self.read("report", text)
@@ -289,7 +289,6 @@ class _Journey:
         if not done.out.rstrip().endswith("identical"):
             self.fault("replay", done.out[-300:])
         self.call("recover", self.session, "-o", self.folder / "recovered.session")
-        self.call("replay", self.folder / "recovered.session")
         self.call("doctor", "--session", self.session)
 
 
