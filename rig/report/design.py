@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.report.columns import Column
 from rig.report.estimate import SYMBOLS
+from rig.report.numbers import decimals_for, fixed
 from rig.report.table import aligned
 
 if TYPE_CHECKING:
@@ -59,8 +60,12 @@ def _records(found: Mapping[str, Any], layouts: list[str]) -> list[dict[str, str
             if line["name"] in _MEASURANDS:
                 what, scale = _MEASURANDS[line["name"]]
                 row = rows.setdefault(what, {"what": what})
-                row[layout] = f"{line['u_run'] * scale:.3g}"
+                row[layout] = _plain(line["u_run"] * scale)
         for line in found[layout]["coefficients"]:
             row = rows.setdefault(line["name"], {"what": SYMBOLS[line["name"]]})
-            row[layout] = f"{line['u']:.2g}" if line["identified"] else "not identified"
+            row[layout] = _plain(line["u"]) if line["identified"] else "not identified"
     return list(rows.values())
+
+
+def _plain(uncertainty: float) -> str:
+    return fixed(uncertainty, decimals_for(uncertainty))
