@@ -45,9 +45,13 @@ class Done(NamedTuple):
 
 def lacking(scene: Scene) -> tuple[str, ...]:
     """Words of what a scene does not have."""
-    if scene.protocol.surface is None:
-        return (*_PAIR, *_IMPACT)
-    return () if scene.protocol.two_chains else (*_PAIR, "free side")
+    surface = scene.protocol.surface
+    if surface is None:
+        return (*_PAIR, *_IMPACT, "pile")
+    words = () if scene.protocol.two_chains else (*_PAIR, "free side")
+    if all(rods.chain.alpha is not None for rods in scene.protocol.chains.values()):
+        return (*words, "restitution", "friction", "pile")
+    return (*words, "pile") if surface.pile is None else words
 
 
 def faults(scene: Scene, folder: Path) -> list[str]:
@@ -195,8 +199,9 @@ class _Journey:
         if self.scene.protocol.surface is not None:
             self.inclines("predict", done.out, (line["incline_deg"] for line in lines))
             wanted = list(dict.fromkeys(self.scene.protocol.plan.inclines))
-            if [line["incline_deg"] for line in lines] != wanted:
-                self.fault("predict --json", "not one prediction an incline")
+            # Unlike chains strike unlike: each has its own.
+            if list(dict.fromkeys(line["incline_deg"] for line in lines)) != wanted:
+                self.fault("predict --json", "not a prediction for every incline")
 
     def swept(self) -> None:
         table = self.folder / "sweep.csv"
