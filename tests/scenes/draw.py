@@ -88,17 +88,23 @@ class Scene:
     protocol: Protocol
 
 
-def scene(seed: int) -> Scene:
-    """Draw a scene; the same seed gives the same scene on every machine."""
+def scene(seed: int, drops: int = 4) -> Scene:
+    """Draw a scene; the same seed gives the same scene on every machine.
+
+    Parameters
+    ----------
+    drops
+        Planned at most; a void one may fall three times. Four are enough to learn from.
+    """
     chance = random.Random(f"scene {seed}")
     kind = chance.choices(("fence", "single", "two", "predicted"), (3, 4, 6, 1))[0]
-    text = _scene(chance, kind)
+    text = _scene(chance, kind, drops)
     if kind != "predicted":
         text = _with_gates(chance, text)
     return Scene(seed, text, chance.choice(PORTS), parse(text, f"scene-{seed}.yaml"))
 
 
-def _scene(chance: random.Random, kind: str) -> str:
+def _scene(chance: random.Random, kind: str, drops: int) -> str:
     """Everything but the gates."""
     title = chance.choice(TITLES)
     lines = ["protocol: 1", *([f'title: "{title}"'] if title else [])]
@@ -114,7 +120,7 @@ def _scene(chance: random.Random, kind: str) -> str:
     lines.append(chance.choice(GRAVITIES))
     if kind == "predicted":
         lines.append(chance.choice(("initial_speed: 1.5 m/s", "drag: {terminal_speed: 25 m/s}")))
-    lines.append(f"plan: {{{', '.join(_plan(chance, kind, rods, two=two))}}}")
+    lines.append(f"plan: {{{', '.join(_plan(chance, kind, drops, two=two))}}}")
     loose = "{release_skew: 50 ms, missed_edges: 60 %}"
     lines.append(f"accept: {chance.choice(('{missed_edges: 20 %}', loose))}")
     if chance.random() < 0.3:
@@ -170,12 +176,11 @@ def _unlike(
     return []
 
 
-def _plan(chance: random.Random, kind: str, rods: int, *, two: bool) -> list[str]:
+def _plan(chance: random.Random, kind: str, drops: int, *, two: bool) -> list[str]:
     """The plan's keys."""
     inclines = "" if kind == "fence" else chance.choice(INCLINES)
-    most = 6 if rods < 25 else 4  # drops, which may fall three times each
     found = [f"incline: {inclines}"] if inclines else []
-    repeats = [n for n in (1, 2, 3, 4, 6) if n * (inclines.count(",") + 1) <= most]
+    repeats = [n for n in (1, 2, 3, 4, 6, 8) if n * (inclines.count(",") + 1) <= drops]
     found.append(f"repeats: {chance.choice(repeats)}")
     if two:
         found.append(f"order: {chance.choice(('ABBA', 'ABBA', 'alternate', 'fixed'))}")
