@@ -81,7 +81,7 @@ def main(arguments: Namespace) -> int:
         )
     if arguments.figures is not None:
         _write_figures(Path(arguments.figures), figures)
-    for sentence in sections.failed.values():
+    for sentence in (*(estimated or {}).get("failed", ()), *sections.failed.values()):
         say(sentence)
     say(f"report: {arguments.output}")
     return 0

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS
 from rig.report.columns import Column
-from rig.report.estimate import SYMBOLS
+from rig.report.estimate import symbol
+from rig.report.numbers import decimals_for, fixed
 from rig.report.table import aligned
 
 if TYPE_CHECKING:
@@ -54,8 +55,12 @@ def _records(found: Mapping[str, Any], layouts: list[str]) -> list[dict[str, str
             if quantity.told:
                 what = f"{quantity.symbol} of one run ({quantity.fine})"
                 row = rows.setdefault(what, {"what": what})
-                row[layout] = f"{line['u_run'] * quantity.fine_scale:.3g}"
+                row[layout] = _plain(line["u_run"] * quantity.fine_scale)
         for line in found[layout]["coefficients"]:
-            row = rows.setdefault(line["name"], {"what": SYMBOLS[line["name"]]})
-            row[layout] = f"{line['u']:.2g}" if line["identified"] else "not identified"
+            row = rows.setdefault(line["name"], {"what": symbol(line["name"])})
+            row[layout] = _plain(line["u"]) if line["identified"] else "not identified"
     return list(rows.values())
+
+
+def _plain(uncertainty: float) -> str:
+    return fixed(uncertainty, decimals_for(uncertainty))

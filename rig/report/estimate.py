@@ -108,7 +108,7 @@ def _coefficient_words(found: Record) -> list[str]:
     names = found.get("correlation", {}).get("names", ())
     matrix = found.get("correlation", {}).get("matrix", ())
     pairs = [
-        f"{_symbol(one)} and {_symbol(other)} {fixed(matrix[i][j], 2)}"
+        f"{symbol(one)} and {symbol(other)} {fixed(matrix[i][j], 2)}"
         for i, one in enumerate(names)
         for j, other in enumerate(names[:i])
     ]
@@ -130,7 +130,7 @@ def _coefficient_words(found: Record) -> list[str]:
     return words
 
 
-def _symbol(name: str) -> str:
+def symbol(name: str) -> str:
     """Write a coefficient as its symbol; of given α's each has its chain's name."""
     what, _, chain = name.partition(" ")
     return SYMBOLS[what] + (f" of {chain}" if chain else "")
@@ -187,7 +187,7 @@ def _p(line: Record) -> str:
 _STRIKES = Column("strikes", lambda line: str(line.get("impact_chain", "")), numeric=False)
 """Which chain, where chains are unlike."""
 _COEFFICIENTS = (
-    Column("coefficient", lambda line: _symbol(line["name"]), numeric=False),
+    Column("coefficient", lambda line: symbol(line["name"]), numeric=False),
     Column("least squares ± U", lambda line: plus_minus(line["least_squares"])),
     Column("posterior, 95 %", _posterior),
     Column("protocol", _stated),

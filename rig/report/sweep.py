@@ -74,7 +74,10 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
         for below in drawing.axes[2:]:
             below.axis("off")
         below = drawing.axes[2]
-        said = below.text(0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes)
+        said = below.text(
+            0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes,
+            parse_math=False,  # a title may have a $
+        )  # fmt: skip
         said.set_in_layout(False)  # it may pass under the other map
         # The caption's panel must not take the labels of the axis all panels share.
         for panel in drawing.axes[:2] if flat else drawing.axes[1:2]:

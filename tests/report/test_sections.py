@@ -136,3 +136,17 @@ def test_a_report_is_written_without_its_estimate(single, tmp_path, capsys, monk
     assert sentence in html
     assert "<h2>Runs</h2>" in html
     assert "End speed against inclination" in html
+
+
+def test_what_an_estimate_lacks_is_said_on_stderr_too(single, tmp_path, capsys, monkeypatch):
+    from rig.cli import main
+
+    def fail(*_: object) -> None:
+        raise ValueError("no such rod")
+
+    monkeypatch.setattr("rig.estimate.session.impulses", fail)
+    assert main(["report", str(single), "-o", str(tmp_path / "r.html")]) == 0
+    sentence, last = capsys.readouterr().err.splitlines()
+    assert sentence.endswith("could not be made: ValueError: no such rod")
+    assert last == f"report: {tmp_path / 'r.html'}"
+    assert sentence in (tmp_path / "r.html").read_text("utf-8")

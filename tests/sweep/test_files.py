@@ -75,6 +75,13 @@ def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, 
     assert hashlib.sha256(SCENE.encode()).hexdigest() in svg
 
 
+def test_a_title_is_no_formula(sweep, tmp_path):
+    protocol = tmp_path / "priced.yaml"
+    protocol.write_text(SCENE.replace("title: ", "title: 5 $ and \\frac{ of $, "), "utf-8")
+    said = sweep("s.svg", "friction=0..1:3", ONE_INCLINE, protocol=protocol)
+    assert said == (0, f"{tmp_path / 's.svg'}: 3 points, 1 beyond the model's domain\n")
+
+
 @pytest.mark.parametrize(("output", "vary", "said"), [
     ("s.txt", ("friction=0..1:3",), "end the name in one of .csv, .npz, .svg"),
     ("s", ("friction=0..1:3",), "end the name in one of .csv, .npz, .svg"),

@@ -1,0 +1,17 @@
+"""What a layout of gates is said to tell."""
+
+from rig.report.design import design_text
+
+
+def test_uncertainties_are_plain_numbers():
+    layout = {
+        "gates": [{"side": "free", "height_m": 0.05}],
+        "readable": True,
+        "measurands": [
+            {"name": "release_skew_s", "u_run": 1.234e-3},
+            {"name": "gravity_m_s2", "u_run": 0.0256},
+        ],
+        "coefficients": [{"name": "friction", "u": 0.0000456, "identified": True}],
+    }
+    text = design_text({"runs": 4, "scatter": "stated", "current": layout})
+    assert [line.split()[-1] for line in text.splitlines()[4:7]] == ["1234", "26", "0.000046"]
