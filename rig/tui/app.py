@@ -41,6 +41,7 @@ _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
     Stage.DEVICE: "device",
     Stage.RESULT: "result",
+    Stage.HALTED: "result",
     Stage.DONE: "session",
 }
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rig.campaign.events import Closed, Found, Lost, Opened, Stage, Warned
 from rig.campaign.machine import BEFORE_RELEASE
 from rig.campaign.plan import unjudged
+from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
 from rig.records import Job
 from rig.tui.gates import Lamps
@@ -45,7 +46,7 @@ class Follower:
     findings
         The session file, as read last.
     voids
-        Its void attempts.
+        What its log says of them.
     judged
         Drops that this screen gave a verdict.
     unreadable
@@ -58,7 +59,7 @@ class Follower:
         self.state = State()
         self.lamps = Lamps()
         self.findings: SessionView | None = None
-        self.voids: frozenset[Job] = frozenset()
+        self.voids = Voids()
         self.judged: set[Job] = set()
         self.unreadable = ""
         self._wire = wire
@@ -82,7 +83,7 @@ class Follower:
         self._begin(self._read_quietly())
 
     def _forget(self, path: Path | None = None) -> None:
-        self._path, self._book, self.findings, self.voids = path, None, None, frozenset()
+        self._path, self._book, self.findings, self.voids = path, None, None, Voids()
 
     def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
         """Take what the daemon says now.
@@ -183,9 +184,7 @@ class Follower:
 
     def _take(self, found: SessionView) -> None:
         self.findings, self.unreadable = found, ""
-        self.voids = frozenset(
-            Job(entry.run, entry.attempt) for entry in found.states if entry.state == "void"
-        )
+        self.voids = voids_of(found.states)
         if self._wire is not None:
             self._wire.changed = True
         else:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.campaign.events import Stage
+from rig.campaign.voids import Voids
 
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
@@ -33,7 +34,7 @@ class Model:
     Attributes
     ----------
     voids
-        Attempts that are void.
+        What the log says of them.
     connected
         Whether the daemon is heard.
     driving
@@ -57,7 +58,7 @@ class Model:
     lamps: Lamps
     protocol: Protocol | None = None
     findings: SessionView | None = None
-    voids: frozenset[Job] = frozenset()
+    voids: Voids = field(default_factory=Voids)
     connected: bool = False
     driving: bool = False
     job: Job | None = None

@@ -6,7 +6,7 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from rig.campaign.events import Stage
-from rig.campaign.plan import again, rest_s, void_counts
+from rig.campaign.plan import again, rest_s
 from rig.campaign.plan import next_job as next_of
 from rig.records import Job
 from rig.tui.model import Model
@@ -59,7 +59,7 @@ def next_job(app: RigApp) -> Job | None:
     lines, flow = runs(app), app.flow
     if flow.stage is Stage.PREPARE and flow.job is not None:
         return again(lines, flow.job.run)
-    return next_of(lines, void_counts(app.follower.voids, lines))
+    return next_of(lines, app.follower.voids.counts(lines))
 
 
 def job(app: RigApp) -> Job | None:

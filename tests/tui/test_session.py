@@ -155,3 +155,29 @@ def test_leaving_does_not_stop_what_falls(lab):
 
     run(work())
     assert log_of(lab.session)[1][-1][1] is RunState.ACCEPTED
+
+
+def test_after_three_voids_of_a_kind_it_says_so_and_waits(lab):
+    lab.stop()
+    lab.daemons.clear()
+    lab.protocol.write_text(short(), "utf-8")
+    lab.url += "&skew_sd=1s"
+    lab.start()
+
+    async def work():
+        async with lab.ready() as op:
+            for attempt in (1, 2, 3):
+                await op.at(Stage.PREPARE)
+                await op.press("enter")
+                await op.at(Stage.RESULT)
+                await op.sees(f"run 1, attempt {attempt}", "VOID")
+                await op.until(lambda: op.app.flow.logged)
+                await op.press("enter")
+            await op.at(Stage.HALTED)
+            await op.sees("the last 3 drops are void for the same reason", "try again", "VOID")
+            await op.press("enter")
+            await op.at(Stage.PREPARE)
+            await op.sees("RUN 1 of 4 · attempt 4")
+            assert "same reason" not in text_of(op.app)
+
+    run(work())

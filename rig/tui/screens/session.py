@@ -10,7 +10,7 @@ from textual.containers import Grid, VerticalScroll
 from textual.content import Content
 
 from rig.analysis.learn import FEWEST
-from rig.campaign.plan import done, void_counts
+from rig.campaign.plan import done
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import control_pictures, incline_pictures
 from rig.tui.screens.page import Page
@@ -102,7 +102,7 @@ class SessionPage(Page):
 
 def _progress(model: Model) -> Content:
     runs = model.state.runs
-    voids = void_counts(model.voids, runs)
+    voids = model.voids.counts(runs)
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
     if not runs:
         return Content("No session is open.")
