@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rig.campaign.machine import Flow
     from rig.protocol.scene import Protocol, Run
     from rig.records import Job
-    from rig.results.view import SessionView
-    from rig.tui.gates import Lamps
+    from rig.results.live import SessionView
+    from rig.tui.indicators import Indicators
     from rig.tui.state import State
 
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
@@ -55,9 +55,9 @@ class Model:
 
     state: State
     flow: Flow
-    lamps: Lamps
+    indicators: Indicators
     protocol: Protocol | None = None
-    findings: SessionView | None = None
+    view: SessionView | None = None
     voids: Voids = field(default_factory=Voids)
     connected: bool = False
     driving: bool = False
@@ -81,9 +81,9 @@ class Model:
     @property
     def run(self) -> Run | None:
         """The planned run in hand."""
-        if self.findings is None or self.job is None:
+        if self.view is None or self.job is None:
             return None
-        return self.findings.plan.get(self.job.run)
+        return self.view.plan.get(self.job.run)
 
     @property
     def verdict(self) -> tuple[str, tuple[str, ...]]:
@@ -98,7 +98,7 @@ class Model:
     @property
     def simulated(self) -> bool:
         """Whether a stamp is needed."""
-        return self.state.simulated or bool(self.findings and self.findings.simulated)
+        return self.state.simulated or bool(self.view and self.view.simulated)
 
     @property
     def blindfold(self) -> bool:

@@ -56,13 +56,13 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab, page):
     async def work():
         async with lab.ready(countdown_s=600.0) as op:
             called = []
-            real = op.app.wire.call
+            real = op.app.client.call
 
             async def call(method, **params):
                 called.append(method)
                 return await real(method, **params)
 
-            op.app.wire.call = call
+            op.app.client.call = call
             await op.press(page)
             await op.press("f9")
             await op.until(lambda: "stop" in called)
@@ -120,8 +120,8 @@ def test_blind_numbers_come_after_the_decision(lab):
 def test_a_second_screen_watches_and_can_only_stop(lab):
     async def work():
         async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
-            await other.until(lambda: other.app.findings)
-            assert not other.app.wire.driving
+            await other.until(lambda: other.app.view)
+            assert not other.app.client.driving
             await op.press("enter")
             await op.at(Stage.COUNTDOWN)
             await other.sees("ARMED by another client", "watching rig tui")
@@ -133,7 +133,7 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
             await op.press("k", "c")
             await other.until(lambda: other.app.state.holder is None)
             await other.press("c")
-            await other.until(lambda: other.app.wire.driving)
+            await other.until(lambda: other.app.client.driving)
 
     run(work())
 
