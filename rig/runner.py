@@ -26,7 +26,8 @@ from rig.campaign.events import (
     refused,
 )
 from rig.campaign.machine import Flow, step
-from rig.campaign.plan import RunLine, next_job, rest_s, void_counts, what_to_hang
+from rig.campaign.plan import RunLine, next_job, rest_s, what_to_hang
+from rig.campaign.voids import voids_of
 from rig.daemon.connecting import connect
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, InputError
@@ -160,7 +161,11 @@ class Campaign:
         self.operator = operator
         self.interrupts = interrupts
         self.plan = runs(protocol)
-        self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=operator.ask is not None)
+        voids = voids_of(self.session.states())
+        self._forgiven = voids.forgiven
+        self.flow = Flow(
+            Stage.DEVICE, countdown_s=0.0, attended=operator.ask is not None, row=voids.row
+        )
         self._left = deque(self.plan)  # runs that are not done yet
         self._unjudged: deque[Job] = deque()
         self._effects: deque[Effect] = deque()
@@ -171,7 +176,7 @@ class Campaign:
         self._failed: DeviceRefusedError | None = None
 
     def carry_out(self) -> None:
-        """Do every run that is not done yet, in order.
+        """Do every run that is not done yet, in order, unless voids show that it is no use.
 
         Raises
         ------
@@ -182,9 +187,12 @@ class Campaign:
             entry = self.session.latest_state(run.number)
             if entry is not None and entry.state is RunState.RECORDED:
                 self._unjudged.append(Job(run.number, entry.attempt))
-        while self.flow.stage is not Stage.DONE:
+        while self.flow.stage not in {Stage.DONE, Stage.HALTED}:
             self._take(self._next())
             self._carry_out()
+        if self.flow.stage is Stage.HALTED:
+            why, _, hint = self.flow.trouble.partition("\n")
+            self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command goes on)")
 
     def _next(self) -> Event:
         """Say what the operator would: at each stage where the campaign waits for one."""
@@ -206,8 +214,8 @@ class Campaign:
             line = RunLine(run.number, run.incline_deg, run.impact, run.free)
             if entries:
                 line = line._replace(attempt=entries[-1].attempt, state=entries[-1].state)
-            voids = {Job(*entry[:2]) for entry in entries if entry.state is RunState.VOID}
-            job = next_job([line], void_counts(voids, ()))
+            void = {Job(*entry[:2]) for entry in entries if entry.state is RunState.VOID}
+            job = next_job([line], {run.number: len(void - self._forgiven)})
             if job is not None:
                 return job
             self._left.popleft()

@@ -27,6 +27,7 @@ class Stage(StrEnum):
     LIVE = "live"
     JUDGING = "judging"
     RESULT = "result"
+    HALTED = "halted"
     DONE = "done"
 
 

@@ -37,11 +37,13 @@ from rig.campaign.events import (
     Wait,
     Warned,
 )
+from rig.campaign.voids import after, why_halted
 from rig.link.messages import Reason
+from rig.records import Job
 
 if TYPE_CHECKING:
     from rig.campaign.events import Effect, Event
-    from rig.records import Job
+    from rig.campaign.voids import Row
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""
@@ -54,6 +56,7 @@ BEFORE_RELEASE = (
 )  # fmt: skip
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
+_VERDICT = (Stage.RESULT, Stage.HALTED)
 _PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
 """Refusals to arm that end by themselves, or that somebody at the rig can end."""
 _DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
@@ -90,6 +93,8 @@ class Flow:
         Where a stage leads that ends without a drop.
     not_armed, not_fired
         Refusals in a row.
+    row
+        Voids in a row.
     attended
         Whether somebody is there, who then begins every arming. Else what a device refuses is
         tried again, at most `LOOKS` times.
@@ -111,6 +116,7 @@ class Flow:
     not_armed: int = 0
     not_fired: int = 0
     attended: bool = True
+    row: Row = ()
 
     def to(self, stage: Stage, trouble: str = "") -> Flow:
         """Go to another stage; answers to earlier effects count no more."""
@@ -142,12 +148,12 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return replace(flow.to(Stage.TESTING), home=flow.stage), (Drive(),)
         case Opened() if flow.stage is Stage.PROTOCOL:
             return flow.to(Stage.DEVICE), ()
-        case Closed() if flow.stage in {*_IDLE, Stage.RESULT}:
-            return replace(flow.to(Stage.PROTOCOL), job=None), ()
-        case Found(job) if flow.stage in _IDLE:
+        case Closed() if flow.stage in {*_IDLE, *_VERDICT}:
+            return replace(flow.to(Stage.PROTOCOL), job=None, row=()), ()
+        case Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
             return replace(flow, job=job).to(Stage.JUDGING), (Judge(job),)
-        case Again(job) if flow.stage in {*_IDLE, Stage.RESULT} and flow.shown:
-            return replace(flow, job=job).to(Stage.PREPARE), ()
+        case Again(job) if flow.stage in {*_IDLE, *_VERDICT} and flow.shown:
+            return _onward(flow, job)
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             return _relogged(flow, "rejected", (cause.strip(),), shown=True)
         case Note(text) if flow.stage is Stage.RESULT and text.strip():
@@ -238,10 +244,11 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
 def _judged(flow: Flow, event: Judged) -> Outcome:
     if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
         return flow, ()
-    assert flow.job is not None
-    log = Log(flow.job, event.verdict, event.reasons)
-    flow = replace(flow, verdict=event.verdict, reasons=event.reasons, shown=not flow.blind)
-    return replace(flow.to(Stage.RESULT), logged=False), (log,)
+    job, verdict, reasons = flow.job, event.verdict, event.reasons
+    assert job is not None
+    flow = replace(flow, verdict=verdict, reasons=reasons, shown=not flow.blind, logged=False)
+    row = after(flow.row, job, verdict, reasons)
+    return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
@@ -251,11 +258,21 @@ def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
         return replace(flow, shown=True), ()  # blind, and nothing against it
     if flow.stage is Stage.RESULT and not flow.logged:
         return flow, ()  # what comes next depends on it
+    if flow.stage is Stage.HALTED and flow.job is not None:
+        return _onward(flow, Job(flow.job.run, flow.job.attempt + 1))
     if flow.stage in {Stage.DEVICE, Stage.RESULT, Stage.DONE}:
-        if job is None:
-            return flow.to(Stage.DONE), ()
-        return replace(flow, job=job).to(Stage.PREPARE), ()
+        return _onward(flow, job)
     return flow, ()
+
+
+def _onward(flow: Flow, job: Job | None) -> Outcome:
+    """Go to the next attempt, unless the last ones say that it would be void too."""
+    why = why_halted(flow.row) if flow.stage is Stage.RESULT else ""
+    if why:
+        return replace(flow.to(Stage.HALTED, why), row=()), ()
+    if job is None:
+        return flow.to(Stage.DONE), ()
+    return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
 def _relogged(flow: Flow, state: str, reasons: tuple[str, ...], *, shown: bool) -> Outcome:
@@ -263,5 +280,6 @@ def _relogged(flow: Flow, state: str, reasons: tuple[str, ...], *, shown: bool) 
     job = flow.job
     assert job is not None
     flow = replace(flow, verdict=state, reasons=reasons, shown=shown, logged=False)
-    flow = replace(flow, ticket=flow.ticket + 1, trouble="")
+    row = after(flow.row, job, state, reasons)
+    flow = replace(flow, ticket=flow.ticket + 1, trouble="", row=row)
     return flow, (Log(job, state, reasons),)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.records import Job
@@ -41,7 +40,7 @@ def next_job(runs: Iterable[RunLine], voids: Mapping[int, int]) -> Job | None:
     runs
         The plan, in order.
     voids
-        How many attempts at each run were void, as from `void_counts`.
+        How many attempts at each run were void, as from `rig.campaign.voids.Voids.counts`.
     """
     return next((_again(line) for line in runs if not done(line, voids.get(line.run, 0))), None)
 
@@ -63,12 +62,6 @@ def unjudged(runs: Iterable[RunLine]) -> Job | None:
 
 def _again(line: RunLine) -> Job:
     return Job(line.run, line.attempt + 1)
-
-
-def void_counts(known: Iterable[Job], runs: Iterable[RunLine]) -> Mapping[int, int]:
-    """Count void attempts at each run: those in the file, and those heard of since it was read."""
-    heard = {Job(line.run, line.attempt) for line in runs if line.state == "void"}
-    return Counter(job.run for job in {*known, *heard})
 
 
 def rest_s(settle_s: float, clock_u: float | None) -> float:

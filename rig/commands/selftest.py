@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from rig.commands.output import say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
+from rig.selftest.board import Options
 from rig.selftest.run import selftest
-from rig.selftest.stage import Options
 from rig.selftest.verdicts import Verdict
 
 if TYPE_CHECKING:

@@ -20,7 +20,6 @@ from rig.analysis.session import gather, overruled, sum_up
 from rig.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
-from rig.results.view import SessionView
 from rig.results.whole import protocol_of, rejected
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -39,6 +38,66 @@ if TYPE_CHECKING:
 
 _SAME_SCALE = 5e-6
 """Relative change of the tick rate below which a drop is not analysed again: 50 nm in 10 mm."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionView:
+    """A session as it stands on the disk.
+
+    Attributes
+    ----------
+    reading
+        Which reading of the file this is: what is drawn from it changes with it.
+    drops, results
+        Every recorded attempt, and what it says by itself.
+    gravity
+        What each good drop's free chain says of gravity, m/s².
+    analysis
+        What ``rig analyze --json`` prints: of the drops that `fitted` counts, or, before there is
+        a joint fit, of all of them by themselves.
+    fitted
+        How many drops were fitted jointly in `analysis`; 0 for none.
+    lagging
+        Whether a joint fit would say more than is in `analysis`.
+    curves
+        The model against inclination, as `rig.analysis.curves.model_curves` gives it.
+    pace_s
+        Usual time from drop to drop; `None` before the third.
+    """
+
+    path: Path
+    reading: int
+    protocol: Protocol
+    simulated: bool
+    created: str
+    plan: Mapping[int, Run]
+    drops: Mapping[Job, Drop]
+    results: Mapping[Job, DropResult]
+    scales: Mapping[Job, TimeScale]
+    gravity: Mapping[Job, Measured]
+    analysis: Mapping[str, Any]
+    fitted: int
+    lagging: bool
+    curves: Mapping[str, Any]
+    clock: Calibration
+    states: tuple[StateEntry, ...]
+    pace_s: float | None
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        """Every recorded attempt, in order of recording."""
+        return tuple(self.drops)
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """Channels of the scene's gates."""
+        gates = self.protocol.gates
+        return () if gates is None else tuple(gate.channel for gate in gates.gates)
+
+    def record(self, job: Job) -> Mapping[str, Any]:
+        """One attempt's result as `rig analyze --json` prints it; empty when not analysed."""
+        result = self.results.get(job)
+        return {} if result is None else result.json()
 
 
 class _Analysed(NamedTuple):
@@ -187,3 +246,8 @@ def _pace(states: Sequence[StateEntry]) -> float | None:
     at = [entry.host_ns for entry in states if entry.state is RunState.RECORDED]
     gaps = [(b - a) * 1e-9 for a, b in itertools.pairwise(at) if b > a]
     return median(gaps) if len(gaps) > 1 else None
+
+
+def good(record: Mapping[str, Any]) -> bool:
+    """Whether a run takes part in the summary."""
+    return record.get("verdict") in GOOD

@@ -6,108 +6,108 @@ from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.messages import TEST_RUN, Phase, Reason
-from rig.selftest.stage import LABEL, OTHER_LABEL, PULSE_US
+from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
 if TYPE_CHECKING:
-    from rig.selftest.stage import Stage
+    from rig.selftest.board import BoardUnderTest
 
 _BUSY_MS = 400
 
 
-def certificate(stage: Stage) -> str:
+def certificate(board: BoardUnderTest) -> str:
     """See that the certificate is about what was ordered and what was sent."""
-    order = stage.order()
-    recorded = stage.drop(gates=order.gates)
+    order = board.order()
+    recorded = board.drop(gates=order.gates)
     seen = recorded.certificate
     said = (seen.label, seen.gates, seen.initial_state, seen.fire_tick, seen.events, seen.crc32)
     sent = (LABEL, order.gates, 0, recorded.fired.tick, len(recorded.events), recorded.crc32)
     if said != sent:
         raise CheckFailedError(f"after {sent} it certifies {said}")
-    state = stage.answer(wire.Status(), wire.State)
+    state = board.answer(wire.Status(), wire.State)
     if (state.phase, state.label, state.events) != (Phase.HOLDING, LABEL, seen.events):
         raise CheckFailedError(f"after the drop it says {state}")
     return ""
 
 
-def busy(stage: Stage) -> str:
+def busy(board: BoardUnderTest) -> str:
     """See that nothing else is begun while the board records."""
-    token = stage.arm(record_ms=_BUSY_MS)
-    fired = stage.fire(token)
-    state = stage.answer(wire.Status(), wire.State)
+    token = board.arm(record_ms=_BUSY_MS)
+    fired = board.fire(token)
+    state = board.answer(wire.Status(), wire.State)
     if (state.phase, state.label) != (Phase.RECORDING, LABEL):
         raise CheckFailedError(f"recording, it says {state}")
-    stage.refused(stage.order(label=OTHER_LABEL), Reason.BUSY)
-    stage.refused(wire.Read(LABEL, 0, 0), Reason.BUSY)
-    stage.refused(wire.Acknowledge(LABEL, 0), Reason.BUSY)
-    stage.refused(wire.Fire(token), Reason.NOT_ARMED)
-    stage.ending(fired, _BUSY_MS)
+    board.refused(board.order(label=OTHER_LABEL), Reason.BUSY)
+    board.refused(wire.Read(LABEL, 0, 0), Reason.BUSY)
+    board.refused(wire.Acknowledge(LABEL, 0), Reason.BUSY)
+    board.refused(wire.Fire(token), Reason.NOT_ARMED)
+    board.ending(fired, _BUSY_MS)
     return ""
 
 
-def abort_a_recording(stage: Stage) -> str:
+def abort_a_recording(board: BoardUnderTest) -> str:
     """See that ABORT ends a recording at once and keeps what there is."""
-    fired = stage.fire(stage.arm(record_ms=20_000))
-    stage.answer(wire.Abort(), wire.Done)
-    stage.ending(fired)
-    if stage.phase() is not Phase.HOLDING:
+    fired = board.fire(board.arm(record_ms=20_000))
+    board.answer(wire.Abort(), wire.Done)
+    board.ending(fired)
+    if board.phase() is not Phase.HOLDING:
         raise CheckFailedError("after ABORT it does not hold the drop")
     return ""
 
 
-def holding(stage: Stage) -> str:
+def holding(board: BoardUnderTest) -> str:
     """See that a held drop forbids arming, until it is aborted and armed anew."""
-    stage.drop()
+    board.drop()
     for label in (LABEL, OTHER_LABEL):
-        stage.refused(stage.order(label=label), Reason.HOLDING_A_DROP, TEST_RUN)
-    stage.answer(wire.Abort(), wire.Done)
-    stage.refused(stage.order(label=OTHER_LABEL), Reason.HOLDING_A_DROP, TEST_RUN)
-    stage.arm()
+        board.refused(board.order(label=label), Reason.HOLDING_A_DROP, TEST_RUN)
+    board.answer(wire.Abort(), wire.Done)
+    board.refused(board.order(label=OTHER_LABEL), Reason.HOLDING_A_DROP, TEST_RUN)
+    board.arm()
     return ""
 
 
-def reading_again(stage: Stage) -> str:
+def reading_again(board: BoardUnderTest) -> str:
     """See that a held drop reads as it was sent, and nothing beyond it."""
-    recorded = stage.drop()
+    recorded = board.drop()
     count = recorded.certificate.events
-    again = stage.answer(wire.Read(LABEL, 0, 0), wire.DropCertificate)
+    again = board.answer(wire.Read(LABEL, 0, 0), wire.DropCertificate)
     if again != recorded.certificate:
         raise CheckFailedError(f"it certifies {recorded.certificate}, then {again}")
     if count:
-        part = stage.answer(wire.Read(LABEL, 0, 1), wire.EventsFrame)
+        part = board.answer(wire.Read(LABEL, 0, 1), wire.EventsFrame)
         if part.events != recorded.events[:1]:
             raise CheckFailedError(f"it sends {recorded.events[0]}, then {part.events}")
-    stage.refused(wire.Read(LABEL, count, 1), Reason.BAD_PARAMETER)
-    stage.refused(wire.Read(OTHER_LABEL, 0, 0), Reason.NO_SUCH_DROP)
+    board.refused(wire.Read(LABEL, count, 1), Reason.BAD_PARAMETER)
+    board.refused(wire.Read(OTHER_LABEL, 0, 0), Reason.NO_SUCH_DROP)
     return f"{count} events"
 
 
-def acknowledging(stage: Stage) -> str:
+def acknowledging(board: BoardUnderTest) -> str:
     """See that only the right label and CRC-32 let a drop be forgotten."""
-    recorded = stage.drop()
+    recorded = board.drop()
     crc32 = recorded.certificate.crc32
-    stage.refused(wire.Acknowledge(LABEL, crc32 ^ 1), Reason.WRONG_CRC)
-    stage.refused(wire.Acknowledge(OTHER_LABEL, crc32), Reason.NO_SUCH_DROP)
-    stage.acknowledge(recorded)
-    if stage.phase() is not Phase.IDLE:
+    board.refused(wire.Acknowledge(LABEL, crc32 ^ 1), Reason.WRONG_CRC)
+    board.refused(wire.Acknowledge(OTHER_LABEL, crc32), Reason.NO_SUCH_DROP)
+    board.acknowledge(recorded)
+    if board.phase() is not Phase.IDLE:
         raise CheckFailedError("it was acknowledged, and is not idle")
-    stage.refused(wire.Acknowledge(LABEL, crc32), Reason.NO_SUCH_DROP)
+    board.refused(wire.Acknowledge(LABEL, crc32), Reason.NO_SUCH_DROP)
     return ""
 
 
-def cooling(stage: Stage) -> str:
+def cooling(board: BoardUnderTest) -> str:
     """See that a release rests after its pulse. Drives release 0."""
-    if not stage.options.release:
+    if not board.options.release:
         raise NotPossibleError(f"it drives release 0 for {PULSE_US // 1000} ms: --release")
-    order = stage.releasing_order()
-    recorded = stage.ending(stage.fire(stage.armed_by(stage.ask(order))), order.record_ms)
-    stage.acknowledge(recorded)
+    order = board.releasing_order()
+    recorded = board.ending(board.fire(board.armed_by(board.ask(order))), order.record_ms)
+    board.acknowledge(recorded)
     # It must rest for 150 ms, of which a slow line takes some.
-    refused = stage.refused(order, Reason.COOLING)
+    refused = board.refused(order, Reason.COOLING)
     if not 0 < refused.detail <= 3 * PULSE_US // 1000 + 1:
         raise CheckFailedError(
             f"after {PULSE_US // 1000} ms it wants to rest for {refused.detail} ms more"
         )
-    stage.clock.sleep(1.02e-3 * refused.detail)
-    stage.armed_by(stage.ask(order))
+    board.clock.sleep(1.02e-3 * refused.detail)
+    board.armed_by(board.ask(order))
     return f"{refused.detail} ms more"

@@ -9,20 +9,20 @@ from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import listed
 from rig.link.messages import PROTOCOL_VERSION, Reason
+from rig.selftest.board import insist_refused
 from rig.selftest.requests import UNKNOWN_CODES, wrong_lengths
-from rig.selftest.stage import insist_refused
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
 if TYPE_CHECKING:
-    from rig.selftest.stage import Stage
+    from rig.selftest.board import BoardUnderTest
 
 
-def handshake(stage: Stage) -> str:
+def handshake(board: BoardUnderTest) -> str:
     """See that the board introduces itself, sensibly and twice alike."""
-    stage.line.port.write(DELIMITER)
-    stage.unasked(BOOT_WAIT_S, wire.Boot)
-    identity = stage.answer(wire.Identify(), wire.Identity)
-    stage.identity = identity
+    board.line.port.write(DELIMITER)
+    board.unasked(BOOT_WAIT_S, wire.Boot)
+    identity = board.answer(wire.Identify(), wire.Identity)
+    board.identity = identity
     odd = [
         what
         for what, wrong in (
@@ -38,48 +38,48 @@ def handshake(stage: Stage) -> str:
     ]
     if odd:
         raise CheckFailedError(f"its IDENTITY has {', '.join(odd)}")
-    if stage.answer(wire.Identify(), wire.Identity) != identity:
+    if board.answer(wire.Identify(), wire.Identity) != identity:
         raise CheckFailedError("asked twice, it gives two different IDENTITYs")
     return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
 
 
-def another_version(stage: Stage) -> str:
+def another_version(board: BoardUnderTest) -> str:
     """See that clients of other versions are turned away."""
     for version in (0, PROTOCOL_VERSION + 1):
-        stage.refused(wire.Identify(version), Reason.VERSION, PROTOCOL_VERSION)
+        board.refused(wire.Identify(version), Reason.VERSION, PROTOCOL_VERSION)
     return ""
 
 
-def every_message(stage: Stage) -> str:
+def every_message(board: BoardUnderTest) -> str:
     """See that each request gets its own kind of answer; those about drops have their own tests."""
-    stage.answer(wire.Ping(), wire.Pong)
-    stage.answer(wire.Status(), wire.State)
-    stage.answer(wire.Reference(), wire.ReferencePulse)
-    stage.need_idle()  # ABORT would let a held drop be discarded
-    stage.answer(wire.Abort(), wire.Done)
+    board.answer(wire.Ping(), wire.Pong)
+    board.answer(wire.Status(), wire.State)
+    board.answer(wire.Reference(), wire.ReferencePulse)
+    board.need_idle()  # ABORT would let a held drop be discarded
+    board.answer(wire.Abort(), wire.Done)
     return ""
 
 
-def unknown_messages(stage: Stage) -> str:
+def unknown_messages(board: BoardUnderTest) -> str:
     """See that types that are no requests are refused."""
     for code in UNKNOWN_CODES:
         what = f"type 0x{code:02X}"
-        answer = stage.ask_raw(code, b"", what)
+        answer = board.ask_raw(code, b"", what)
         insist_refused(answer, what, Reason.UNKNOWN_MESSAGE, code)
     return ""
 
 
-def other_lengths(stage: Stage) -> str:
+def other_lengths(board: BoardUnderTest) -> str:
     """See that a request that is too long or too short is refused."""
     for code, payload in wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
         what = f"{wire.TABLE[code].__name__} of {len(payload)} bytes"
-        insist_refused(stage.ask_raw(code, payload, what), what, Reason.BAD_PARAMETER, 0)
+        insist_refused(board.ask_raw(code, payload, what), what, Reason.BAD_PARAMETER, 0)
     return ""
 
 
-def gates_now(stage: Stage) -> str:
+def gates_now(board: BoardUnderTest) -> str:
     """See that every gate is clear and keeps still."""
-    seen, count = stage.gates(), stage.known().gates
+    seen, count = board.gates(), board.known().gates
     faults = [
         f"{listed(mask)} {what}"
         for mask, what in (
@@ -95,15 +95,15 @@ def gates_now(stage: Stage) -> str:
     return f"{count} gates clear"
 
 
-def a_blocked_gate(stage: Stage) -> str:
+def a_blocked_gate(board: BoardUnderTest) -> str:
     """See that a gate that is blocked forbids arming."""
-    stage.need_idle()
-    stuck = stage.gates().stuck
+    board.need_idle()
+    stuck = board.gates().stuck
     if not stuck:
         raise NotPossibleError("no gate is blocked; block one by hand to see this")
     gate = stuck & -stuck
-    answer = stage.ask(stage.order(gates=gate))
+    answer = board.ask(board.order(gates=gate))
     if answer == wire.Refused(Reason.STOPPED, 0):
-        stage.armed_by(answer)
+        board.armed_by(answer)
     insist_refused(answer, "Arm", Reason.GATE_BLOCKED, gate)
     return listed(gate)

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
 if TYPE_CHECKING:
-    from rig.selftest.stage import Stage
+    from rig.selftest.board import BoardUnderTest
 
 _WRAP = 1 << 32
 
 
-def sync_edges(stage: Stage) -> str:
+def sync_edges(board: BoardUnderTest) -> str:
     """See that FIRE makes the one edge of the sync output, at once, and how exactly at once.
 
     The output goes high with FIRE; its way back ends the recording and so is in no drop.
     """
-    gate = stage.options.loopback
+    gate = board.options.loopback
     if gate is None:
         raise NotPossibleError("no wire from the sync output to a gate: --loopback GATE")
-    identity = stage.known()
+    identity = board.known()
     if gate >= identity.gates:
         raise NotPossibleError(f"there is no gate {gate}, they are 0 to {identity.gates - 1}")
-    seen = stage.gates()
+    seen = board.gates()
     if (seen.stuck | seen.flickering) >> gate & 1:
         raise CheckFailedError(f"gate {gate} is not clear before FIRE: where does its wire go?")
-    late = [_edge(stage, gate) for _ in range(stage.options.drops)]
+    late = [_edge(board, gate) for _ in range(board.options.drops)]
     us = [1e6 * ticks / identity.tick_hz for ticks in late]
     scatter = f"{stdev(us):.3f} µs" if len(us) > 1 else "unknown"
     said = (
@@ -39,11 +39,11 @@ def sync_edges(stage: Stage) -> str:
     return said
 
 
-def _edge(stage: Stage, gate: int) -> int:
+def _edge(board: BoardUnderTest, gate: int) -> int:
     """Fire once; give the ticks from FIRE to the edge."""
     mask = 1 << gate
-    recorded = stage.drop(gates=mask)
-    stage.acknowledge(recorded)
+    recorded = board.drop(gates=mask)
+    board.acknowledge(recorded)
     states = [event.state for event in recorded.events]
     if not states:
         raise CheckFailedError(f"FIRE made no edge at gate {gate}: is the wire in place?")

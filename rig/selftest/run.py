@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.errors import DeviceError
 from rig.link.messages import MessageError
 from rig.selftest import arming, disturbances, drops, greeting, loopback, timing
-from rig.selftest.stage import Stage
+from rig.selftest.board import BoardUnderTest
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError, Outcome, Verdict
 
 if TYPE_CHECKING:
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 
     from rig.link.clock import Clock
     from rig.link.port import Port
-    from rig.selftest.stage import Options
+    from rig.selftest.board import Options
 
 
 class Check(NamedTuple):
     """A check; one that needs a board that is idle cannot be made while it holds a drop."""
 
     name: str
-    make: Callable[[Stage], str]
+    make: Callable[[BoardUnderTest], str]
     idle: bool = True
 
 
-def _needs(what: str) -> Callable[[Stage], str]:
-    def never(_stage: Stage) -> str:
+def _needs(what: str) -> Callable[[BoardUnderTest], str]:
+    def never(_stage: BoardUnderTest) -> str:
         raise NotPossibleError(what)
 
     return never
@@ -87,33 +87,33 @@ def selftest(port: Port, clock: Clock, options: Options) -> Iterator[Outcome]:
     DeviceError
         The connection broke.
     """
-    stage = Stage(port, clock, options)
+    board = BoardUnderTest(port, clock, options)
     silent = ""
     try:
         for check in CHECKS:
             if silent:
                 yield Outcome(check.name, Verdict.NOT_POSSIBLE, silent)
                 continue
-            outcome = _made(check, stage)
+            outcome = _made(check, board)
             yield outcome
             if outcome.verdict is Verdict.FAILED:
-                silent = _lost(stage)
+                silent = _lost(board)
     except OSError as error:
         raise DeviceError(
             f"the connection broke: {error}", "check the cable, then start again"
         ) from error
     finally:
         with suppress(CheckFailedError, MessageError, OSError):
-            stage.settle()
+            board.settle()
 
 
-def _made(check: Check, stage: Stage) -> Outcome:
+def _made(check: Check, board: BoardUnderTest) -> Outcome:
     try:
-        if stage.identity is not None:
-            stage.settle()
+        if board.identity is not None:
+            board.settle()
         if check.idle:
-            stage.need_idle()
-        return Outcome(check.name, Verdict.OK, check.make(stage))
+            board.need_idle()
+        return Outcome(check.name, Verdict.OK, check.make(board))
     except CheckFailedError as failed:
         return Outcome(check.name, Verdict.FAILED, str(failed))
     except NotPossibleError as why:
@@ -122,12 +122,12 @@ def _made(check: Check, stage: Stage) -> Outcome:
         return Outcome(check.name, Verdict.FAILED, f"it sent what is no message: {error}")
 
 
-def _lost(stage: Stage) -> str:
+def _lost(board: BoardUnderTest) -> str:
     """Say why no more checks can be made, if so."""
-    if stage.identity is None:
+    if board.identity is None:
         return "nobody has introduced themselves"
     try:
-        stage.settle()
+        board.settle()
     except (CheckFailedError, MessageError) as error:
         return str(error)
     return ""

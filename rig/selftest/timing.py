@@ -13,8 +13,8 @@ from rig.records import Ping
 from rig.selftest.verdicts import CheckFailedError
 
 if TYPE_CHECKING:
+    from rig.selftest.board import BoardUnderTest
     from rig.selftest.line import Heard
-    from rig.selftest.stage import Stage
 
 _PINGS = 60
 _TIMEOUT_MS = 400
@@ -22,57 +22,57 @@ _ASK_S = 0.1
 _SLACK_S = 0.03  # of the computer, besides the line's own delay
 
 
-def round_trips(stage: Stage) -> str:
+def round_trips(board: BoardUnderTest) -> str:
     """Ping, unevenly, and see that answers come in good time and the clock keeps its rate."""
     pings = []
     for n in range(_PINGS):
-        sent = stage.clock.now_ns()
-        pong = stage.answer(wire.Ping(), wire.Pong)
-        pings.append(Ping(sent, stage.clock.now_ns(), pong.tick))
-        stage.clock.sleep(0.013 + 0.0071 * (n % 5))
+        sent = board.clock.now_ns()
+        pong = board.answer(wire.Ping(), wire.Pong)
+        pings.append(Ping(sent, board.clock.now_ns(), pong.tick))
+        board.clock.sleep(0.013 + 0.0071 * (n % 5))
     trips = sorted((p.host_recv_ns - p.host_send_ns) * 1e-9 for p in pings)
-    stage.slowest_s = trips[-1]
+    board.slowest_s = trips[-1]
     said = f"{trips[0] * 1e3:.2f} to {trips[-1] * 1e3:.2f} ms, median {median(trips) * 1e3:.2f} ms"
     if trips[-1] > HOST_SILENCE_MS / 2000:
         raise CheckFailedError(f"{said}: too slow for a board that disarms after a silence")
-    nominal = stage.known().tick_hz
+    nominal = board.known().tick_hz
     rate = tick_rate(pings, nominal)
     if not rate.n or abs(rate.hz / nominal - 1) > RESONATOR_TOLERANCE + 2 * rate.u_hz / nominal:
         raise CheckFailedError(f"{said}; but its clock is not at the {nominal} Hz that it states")
     return f"{said}; clock {(rate.hz / nominal - 1) * 1e6:+.0f} ppm"
 
 
-def arming_times_out(stage: Stage) -> str:
+def arming_times_out(board: BoardUnderTest) -> str:
     """See that an armed board that is asked now and then waits as long as it was told."""
-    sent = stage.clock.now_ns()
-    stage.arm(timeout_ms=_TIMEOUT_MS)
+    sent = board.clock.now_ns()
+    board.arm(timeout_ms=_TIMEOUT_MS)
     for _ in range(3):
-        stage.wait(_ASK_S, lambda _: False)
-        if stage.phase() is not Phase.ARMED:
+        board.wait(_ASK_S, lambda _: False)
+        if board.phase() is not Phase.ARMED:
             raise CheckFailedError("it did not stay armed, though it was asked every 100 ms")
-    return _disarms(stage, DisarmReason.TIMEOUT, _TIMEOUT_MS, sent)
+    return _disarms(board, DisarmReason.TIMEOUT, _TIMEOUT_MS, sent)
 
 
-def a_silent_host(stage: Stage) -> str:
+def a_silent_host(board: BoardUnderTest) -> str:
     """See that an armed board disarms when it hears nothing."""
-    sent = stage.clock.now_ns()
-    stage.arm()
-    found = _disarms(stage, DisarmReason.HOST_SILENT, HOST_SILENCE_MS, sent)
-    stage.refused(wire.Fire(1), Reason.NOT_ARMED)
+    sent = board.clock.now_ns()
+    board.arm()
+    found = _disarms(board, DisarmReason.HOST_SILENT, HOST_SILENCE_MS, sent)
+    board.refused(wire.Fire(1), Reason.NOT_ARMED)
     return found
 
 
-def _disarms(stage: Stage, reason: DisarmReason, ms: int, sent_ns: int) -> str:
+def _disarms(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_ns: int) -> str:
     """Wait in silence for DISARMED, neither early nor late."""
-    heard: Heard | None = stage.unasked(ms / 1000 + 0.3, wire.Disarmed)
+    heard: Heard | None = board.unasked(ms / 1000 + 0.3, wire.Disarmed)
     if heard is None:
         raise CheckFailedError(f"{ms} ms are over, and it did not disarm")
     if not isinstance(heard.message, wire.Disarmed) or heard.message.reason is not reason:
         raise CheckFailedError(f"it should say DISARMED({reason.name}), but: {heard.message}")
     took = (heard.at_ns - sent_ns) * 1e-6
-    room = 1e3 * (_SLACK_S + 2 * stage.slowest_s)
+    room = 1e3 * (_SLACK_S + 2 * board.slowest_s)
     if not ms * (1 - RESONATOR_TOLERANCE) - 1 <= took <= ms * (1 + RESONATOR_TOLERANCE) + room:
         raise CheckFailedError(f"it disarmed after {took:.0f} ms instead of {ms} ms")
-    if stage.phase() is not Phase.IDLE:
+    if board.phase() is not Phase.IDLE:
         raise CheckFailedError("it says DISARMED and is not idle")
     return f"after {took:.0f} ms"

@@ -12,7 +12,7 @@ from rig.campaign.machine import BEFORE_RELEASE
 
 ANY = frozenset(Stage)
 _JUDGED = frozenset({Stage.RESULT})
-_AT_REST = frozenset({Stage.DEVICE, Stage.PREPARE, Stage.RESULT, Stage.DONE})
+_AT_REST = frozenset({Stage.DEVICE, Stage.PREPARE, Stage.RESULT, Stage.HALTED, Stage.DONE})
 
 
 class Action(NamedTuple):
@@ -53,12 +53,12 @@ ACTIONS: tuple[Action, ...] = (
     Action("reject", "x", "reject", "Reject this drop, with a cause", "", _JUDGED, driving=True),
     Action("note", "n", "note", "Add a note to this drop", "", _JUDGED, driving=True),
     Action("again", "a", "again", "Another attempt at this run", "",
-           frozenset({Stage.RESULT, Stage.DONE}), driving=True),
+           frozenset({Stage.RESULT, Stage.HALTED, Stage.DONE}), driving=True),
     Action("blind", "b", "blind", "Blind mode: judge a drop before its numbers are shown", "",
            ANY - _JUDGED),
     Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
     Action("close", "z", "close", "Close the session; another protocol can be chosen", "",
-           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
+           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.HALTED, Stage.DONE}), driving=True),
     Action("release_test", "l", "try release", "Try the release with nothing hung",
            "rig selftest --port PORT --release",
            frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),

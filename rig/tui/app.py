@@ -15,11 +15,11 @@ from rig.campaign.events import Refused, Stage, Tick
 from rig.campaign.machine import Flow, step
 from rig.tui import doing, effects, keyboard, pages, seen, themes
 from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, possible, shown_key
+from rig.tui.client import ReconnectingClient
 from rig.tui.follow import Follower
 from rig.tui.screens.protocol import ProtocolPage
 from rig.tui.widgets.status import Status
 from rig.tui.widgets.stopbar import StopBar
-from rig.tui.wire import Wire
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine, Iterable, Mapping
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from textual.screen import Screen
 
     from rig.campaign.events import Event
-    from rig.results.view import SessionView
-    from rig.tui.gates import Lamps
+    from rig.results.live import SessionView
+    from rig.tui.indicators import Indicators
     from rig.tui.model import Model
     from rig.tui.options import Options
     from rig.tui.screens.history import HistoryPage
@@ -41,6 +41,7 @@ _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
     Stage.DEVICE: "device",
     Stage.RESULT: "result",
+    Stage.HALTED: "result",
     Stage.DONE: "session",
 }
 
@@ -54,7 +55,7 @@ class RigApp(App[None]):
         What the command line says.
     keys
         Of every action, by name.
-    wire
+    client
         Another line to the rig than the options ask for.
     """
 
@@ -66,7 +67,9 @@ class RigApp(App[None]):
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-normal"), (160, "-wide")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 
-    def __init__(self, options: Options, keys: Mapping[str, str], wire: Wire | None = None) -> None:
+    def __init__(
+        self, options: Options, keys: Mapping[str, str], client: ReconnectingClient | None = None
+    ) -> None:
         super().__init__()
         self.options = options
         self.keys: Mapping[str, str] = keys
@@ -78,10 +81,10 @@ class RigApp(App[None]):
         self.page: str = ""
         self.asked: tuple[str, str] | None = None
         """Protocol and session that were opened from here."""
-        self.wire = wire
-        if wire is None and not options.offline:
-            self.wire = Wire(options.port, options.socket, self._reached)
-        self.follower = Follower(self.wire, self._begin)
+        self.client = client
+        if client is None and not options.offline:
+            self.client = ReconnectingClient(options.port, options.socket, self._reached)
+        self.follower = Follower(self.client, self._begin)
         self.protocols = ProtocolPage(options.files, options.session)
         self.pages: dict[str, Page] = {ProtocolPage.NAME: self.protocols}
         self._turning = asyncio.Lock()
@@ -100,8 +103,8 @@ class RigApp(App[None]):
         yield StopBar()
 
     async def on_mount(self) -> None:
-        if self.wire is not None:
-            self.run_worker(self.wire.keep(), group="wire")
+        if self.client is not None:
+            self.run_worker(self.client.keep(), group="client")
         elif self.options.session is not None:
             self.follower.look_at(self.options.session)
         await self._follow()
@@ -125,8 +128,8 @@ class RigApp(App[None]):
             self.event(Tick(passed))
         if "history" in self.pages:
             self.history.tick(passed)
-        if self.wire is not None and self.wire.changed:
-            self.wire.changed = False
+        if self.client is not None and self.client.changed:
+            self.client.changed = False
             reopens = self.asked is not None
             for event in self.follower.absorb(self.flow.stage, now, reopens=reopens):
                 self.event(event)
@@ -160,19 +163,19 @@ class RigApp(App[None]):
         return self.follower.state
 
     @property
-    def lamps(self) -> Lamps:
+    def indicators(self) -> Indicators:
         """The gates."""
-        return self.follower.lamps
+        return self.follower.indicators
 
     @property
-    def findings(self) -> SessionView | None:
+    def view(self) -> SessionView | None:
         """The session file, as read last."""
-        return self.follower.findings
+        return self.follower.view
 
     @property
     def driving(self) -> bool:
         """Whether this screen has control of the rig."""
-        return self.wire is not None and self.wire.driving
+        return self.client is not None and self.client.driving
 
     @property
     def model(self) -> Model:
@@ -183,8 +186,8 @@ class RigApp(App[None]):
 
     async def _reached(self) -> None:
         """Go on where the daemon, or a new one, is."""
-        assert self.wire is not None
-        if self.asked and self.wire.driving and not self.wire.state.section("session"):
+        assert self.client is not None
+        if self.asked and self.client.driving and not self.client.state.section("session"):
             await doing.open_session(self, *self.asked)
 
     def event(self, event: Event) -> None:
@@ -250,7 +253,7 @@ class RigApp(App[None]):
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
         action = BY_NAME[name]
-        if self.wire is None and name not in OFFLINE:
+        if self.client is None and name not in OFFLINE:
             return
         if not possible(action, self.flow.stage, driving=self.driving):
             if action.driving and not self.driving:
@@ -268,7 +271,7 @@ class RigApp(App[None]):
         """Name every action that makes sense now."""
         del screen
         for action in ACTIONS:
-            if self.wire is None and action.name not in OFFLINE:
+            if self.client is None and action.name not in OFFLINE:
                 continue
             if action.name != "palette" and possible(action, self.flow.stage, driving=self.driving):
                 told = f"{shown_key(self.keys[action.name])}  {action.command}".rstrip()

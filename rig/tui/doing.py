@@ -39,9 +39,9 @@ async def do(app: RigApp, name: str) -> None:
 
 async def open_session(app: RigApp, protocol: str, session: str) -> None:
     """Have the daemon open a session, now and whenever it had to be started again."""
-    assert app.wire is not None
+    assert app.client is not None
     try:
-        await app.wire.call(
+        await app.client.call(
             "open_session", protocol=protocol, session=session, seed=app.options.seed
         )
     except RigError as error:
@@ -62,31 +62,31 @@ async def _go_on(app: RigApp) -> None:
 
 async def _control(app: RigApp) -> None:
     """Take control, or give it back; who has it instead is said."""
-    wire = app.wire
-    assert wire is not None
-    if wire.driving:
-        await wire.release_control()
+    client = app.client
+    assert client is not None
+    if client.driving:
+        await client.release_control()
         return
     try:
-        await wire.take_control()
+        await client.take_control()
     except RigError as error:
         _refused(app, error)
 
 
 async def _close(app: RigApp) -> None:
     """Close the session, so that another can be chosen."""
-    assert app.wire is not None
+    assert app.client is not None
     app.asked = None
-    await app.wire.call("close_session")
+    await app.client.call("close_session")
 
 
 async def _try_release(app: RigApp) -> None:
     """Ask, then drive the release once."""
     await app.go("device")
-    findings = app.findings
-    if findings is None:
+    view = app.view
+    if view is None:
         return
-    pulse_ms = findings.protocol.release.pulse * 1e3
+    pulse_ms = view.protocol.release.pulse * 1e3
     question = (
         f"The release is driven once, for {pulse_ms:g} ms. Take the chains off: what hangs there "
         "falls. It is no run of the plan, and nothing of it is counted."
@@ -142,8 +142,8 @@ def _toggle_blind(app: RigApp) -> None:
     app.flow = replace(app.flow, blind=not app.flow.blind)
 
 
-def _begin_lamps(app: RigApp) -> None:
-    app.follower.lamps = app.lamps.reset()
+def _begin_check(app: RigApp) -> None:
+    app.follower.indicators = app.indicators.reset()
 
 
 def _next_theme(app: RigApp) -> None:
@@ -156,7 +156,7 @@ _SIMPLE: dict[str, Callable[[RigApp], object]] = {
     "note": lambda app: _ask(app, "Note on this drop:", Note),
     "again": _repeat,
     "blind": _toggle_blind,
-    "wave": _begin_lamps,
+    "wave": _begin_check,
     "control_chart": lambda app: app.pages[app.page].other_chart(),
     "previous": lambda app: app.pages[app.page].move(-1),
     "next": lambda app: app.pages[app.page].move(1),

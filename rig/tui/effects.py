@@ -27,29 +27,29 @@ if TYPE_CHECKING:
 
 async def carry_out(app: RigApp, effect: Effect, ticket: int) -> None:
     """Do what the flow wants and tell it what came of it."""
-    wire = app.wire
-    assert wire is not None
+    client = app.client
+    assert client is not None
     token = None
     try:
         match effect:
             case GiveUp():
                 return  # what is wrong is shown, and the operator goes on from there
             case Stop(reason):
-                await wire.call("stop", reason=reason)
+                await client.call("stop", reason=reason)
                 return
             case Wait(seconds):
-                await wire.call("wait", seconds=seconds)
+                await client.call("wait", seconds=seconds)
             case Arm(job):
-                answer = await wire.call("arm", run=job.run, attempt=job.attempt)
+                answer = await client.call("arm", run=job.run, attempt=job.attempt)
                 token = int(answer["token"])
             case Fire(token_):
-                await wire.call("fire", token=token_)
+                await client.call("fire", token=token_)
             case Drive():
-                await wire.call("test_release")
+                await client.call("test_release")
             case Collect(job):
-                await wire.call("collect", run=job.run, attempt=job.attempt)
+                await client.call("collect", run=job.run, attempt=job.attempt)
             case Log(job, state, reasons):
-                await wire.call(
+                await client.call(
                     "log_state", run=job.run, attempt=job.attempt, state=state,
                     reasons=list(reasons),
                 )  # fmt: skip

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 from rig.campaign.events import Closed, Found, Lost, Opened, Stage, Warned
 from rig.campaign.machine import BEFORE_RELEASE
 from rig.campaign.plan import unjudged
+from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
 from rig.records import Job
-from rig.tui.gates import Lamps
+from rig.tui.indicators import Indicators
 from rig.tui.state import State, state_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator, Mapping
 
     from rig.campaign.events import Event
-    from rig.results.live import LiveAnalysis
-    from rig.results.view import SessionView
-    from rig.tui.wire import Wire
+    from rig.results.live import LiveAnalysis, SessionView
+    from rig.tui.client import ReconnectingClient
 
 _CLOCK_S = 3.0
 """Clock samples come between drops too, so the file is read again so often."""
@@ -31,7 +31,7 @@ class Follower:
 
     Parameters
     ----------
-    wire
+    client
         `None` to look at a file only.
     begin
         Runs a coroutine beside the screens.
@@ -40,12 +40,12 @@ class Follower:
     ----------
     state
         What the daemon said last.
-    lamps
+    indicators
         The gates.
-    findings
+    view
         The session file, as read last.
     voids
-        Its void attempts.
+        What its log says of them.
     judged
         Drops that this screen gave a verdict.
     unreadable
@@ -53,15 +53,17 @@ class Follower:
     """
 
     def __init__(
-        self, wire: Wire | None, begin: Callable[[Coroutine[Any, Any, None]], object]
+        self,
+        client: ReconnectingClient | None,
+        begin: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
         self.state = State()
-        self.lamps = Lamps()
-        self.findings: SessionView | None = None
-        self.voids: frozenset[Job] = frozenset()
+        self.indicators = Indicators()
+        self.view: SessionView | None = None
+        self.voids = Voids()
         self.judged: set[Job] = set()
         self.unreadable = ""
-        self._wire = wire
+        self._client = client
         self._begin = begin
         self._path: Path | None = None
         self._book: LiveAnalysis | None = None
@@ -82,7 +84,7 @@ class Follower:
         self._begin(self._read_quietly())
 
     def _forget(self, path: Path | None = None) -> None:
-        self._path, self._book, self.findings, self.voids = path, None, None, frozenset()
+        self._path, self._book, self.view, self.voids = path, None, None, Voids()
 
     def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
         """Take what the daemon says now.
@@ -96,13 +98,13 @@ class Follower:
         reopens
             Whether a session that is closed will be opened again from here.
         """
-        wire = self._wire
-        assert wire is not None
-        before, state = self.state, wire.state
+        client = self._client
+        assert client is not None
+        before, state = self.state, client.state
         self.state = state
         self._look_at_gates(state, now)
-        if not wire.up:
-            return [Lost(f"the line to the daemon broke\n{wire.silence}")]
+        if not client.up:
+            return [Lost(f"the line to the daemon broke\n{client.silence}")]
         events: list[Event] = [*self._back(state), *_broken(stage, state)]
         session = state.section("session")
         if session:
@@ -111,12 +113,12 @@ class Follower:
         elif before.section("session") and not reopens:
             self._forget()
             events.append(Closed())
-        if not wire.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
+        if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
             events.append(
                 Lost("control of the rig went to another client\nc takes it when it is free")
             )
         missed = unjudged(state.runs)
-        if missed and missed not in self.judged and wire.driving:
+        if missed and missed not in self.judged and client.driving:
             events.append(Found(missed))
         return events
 
@@ -130,8 +132,8 @@ class Follower:
             self._lost = {}
 
     def _look_at_gates(self, state: State, now: float) -> None:
-        if self.findings and not self.lamps.lamps:
-            self.lamps, self._counted = Lamps.of(self.findings.channels), (None, 0)
+        if self.view and not self.indicators.gates:
+            self.indicators, self._counted = Indicators.of(self.view.channels), (None, 0)
         drop = state.section("drop")
         job = Job(drop["run"], drop["attempt"]) if drop else None
         known, counted = self._counted
@@ -139,15 +141,15 @@ class Follower:
             counted = 0
         if len(state.edges) > counted and drop.get("state") == "fired":
             fresh = tuple(int(edge[1]) for edge in state.edges[counted:])
-            self.lamps = self.lamps.counted(fresh, now)
+            self.indicators = self.indicators.counted(fresh, now)
         else:
-            self.lamps = self.lamps.seen(state.blocked, now)
+            self.indicators = self.indicators.seen(state.blocked, now)
         self._counted = job, len(state.edges)
 
     def _look_at_session(self, session: Mapping[str, object], state: State, now: float) -> None:
         path = Path(str(session["path"]))
         if self._path != path:
-            self._path, self._book, self.lamps = path, None, Lamps()
+            self._path, self._book, self.indicators = path, None, Indicators()
         self._wanted = (path, state.runs, int(now / _CLOCK_S))
         if self._wanted != self._read and not self._reading:
             self._reading = True
@@ -182,15 +184,13 @@ class Follower:
         return found
 
     def _take(self, found: SessionView) -> None:
-        self.findings, self.unreadable = found, ""
-        self.voids = frozenset(
-            Job(entry.run, entry.attempt) for entry in found.states if entry.state == "void"
-        )
-        if self._wire is not None:
-            self._wire.changed = True
+        self.view, self.unreadable = found, ""
+        self.voids = voids_of(found.states)
+        if self._client is not None:
+            self._client.changed = True
         else:
             self.state = state_of(found)
-            self.lamps = Lamps.of(found.channels)
+            self.indicators = Indicators.of(found.channels)
 
     async def _read_quietly(self) -> None:
         try:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.campaign.events import Stage
+from rig.campaign.voids import Voids
 
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
     from rig.protocol.scene import Protocol, Run
     from rig.records import Job
-    from rig.results.view import SessionView
-    from rig.tui.gates import Lamps
+    from rig.results.live import SessionView
+    from rig.tui.indicators import Indicators
     from rig.tui.state import State
 
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
@@ -33,7 +34,7 @@ class Model:
     Attributes
     ----------
     voids
-        Attempts that are void.
+        What the log says of them.
     connected
         Whether the daemon is heard.
     driving
@@ -54,10 +55,10 @@ class Model:
 
     state: State
     flow: Flow
-    lamps: Lamps
+    indicators: Indicators
     protocol: Protocol | None = None
-    findings: SessionView | None = None
-    voids: frozenset[Job] = frozenset()
+    view: SessionView | None = None
+    voids: Voids = field(default_factory=Voids)
     connected: bool = False
     driving: bool = False
     job: Job | None = None
@@ -80,9 +81,9 @@ class Model:
     @property
     def run(self) -> Run | None:
         """The planned run in hand."""
-        if self.findings is None or self.job is None:
+        if self.view is None or self.job is None:
             return None
-        return self.findings.plan.get(self.job.run)
+        return self.view.plan.get(self.job.run)
 
     @property
     def verdict(self) -> tuple[str, tuple[str, ...]]:
@@ -97,7 +98,7 @@ class Model:
     @property
     def simulated(self) -> bool:
         """Whether a stamp is needed."""
-        return self.state.simulated or bool(self.findings and self.findings.simulated)
+        return self.state.simulated or bool(self.view and self.view.simulated)
 
     @property
     def blindfold(self) -> bool:

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 async def sessions(app: RigApp) -> None:
     """Let one session of the folder be chosen, and play it."""
-    mine = app.findings.path if app.findings else app.options.session
+    mine = app.view.path if app.view else app.options.session
     folder = mine.parent if mine else Path()
     volumes = await asyncio.to_thread(shelf, folder)
     await app.go("history")
-    now = app.history.findings.path if app.history.findings else mine
+    now = app.history.view.path if app.history.view else mine
     at = next((n for n, one in enumerate(volumes) if now and _same(one.path, now)), 0)
 
     def chosen(number: int | None) -> None:
@@ -42,7 +42,7 @@ async def sessions(app: RigApp) -> None:
 
 def drops(app: RigApp) -> None:
     """Let one drop of the session that is played be chosen."""
-    found, history = app.history.findings, app.history
+    found, history = app.history.view, app.history
     if found is None:
         return
     hidden = app.flow.job if app.model.blindfold and history.other is None else None
@@ -65,7 +65,7 @@ def drops(app: RigApp) -> None:
 
 
 async def _open(app: RigApp, volume: Volume) -> None:
-    history, live = app.history, app.findings
+    history, live = app.history, app.view
     if live is not None and _same(live.path, volume.path):
         history.other = None
     else:

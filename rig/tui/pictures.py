@@ -11,7 +11,7 @@ from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
-from rig.tui.gates import FLICKER_S
+from rig.tui.indicators import FLICKER_S
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import State, state_of
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.records import Job
-    from rig.results.view import SessionView
+    from rig.results.live import SessionView
 
 SIZE = (120, 36)
 _LIVE_SHARE = 0.9
 _FONT = '"DejaVu Sans Mono", "Liberation Mono", Menlo, Consolas, monospace'
 
 
-class Scene(NamedTuple):
+class Moment(NamedTuple):
     """One picture: its name, and the moment it shows."""
 
     name: str
@@ -55,20 +55,20 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
     list of Path
         The files.
     """
-    findings = LiveAnalysis(session).read()
+    view = LiveAnalysis(session).read()
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for scene in scenes(findings):
-        path = folder / f"{scene.name}.svg"
-        path.write_text(asyncio.run(_picture(scene, session, keys)), "utf-8")
+    for moment in moments(view):
+        path = folder / f"{moment.name}.svg"
+        path.write_text(asyncio.run(_picture(moment, session, keys)), "utf-8")
         written.append(path)
     return written
 
 
-def scenes(findings: SessionView) -> list[Scene]:
+def moments(view: SessionView) -> list[Moment]:
     """Choose the moments."""
-    job = findings.jobs[-1]
-    whole = state_of(findings)
+    job = view.jobs[-1]
+    whole = state_of(view)
     session = whole.sections["session"]
     state = replace(whole, sections={**QUIET, "session": session})
     before = replace(
@@ -78,43 +78,43 @@ def scenes(findings: SessionView) -> list[Scene]:
             for line in whole.runs
         ),
     )
-    record = findings.record(job)
+    record = view.record(job)
     result = Flow(
         Stage.RESULT, job, verdict=record["verdict"], reasons=tuple(record["reasons"])
     )  # fmt: skip
     return [
-        Scene("device", Flow(Stage.DEVICE), before),
-        Scene("run", Flow(Stage.PREPARE, job), before),
-        Scene("live", Flow(Stage.LIVE, job), _falling(before, findings, job)),
-        Scene("result", result, state),
-        Scene("session", Flow(Stage.DONE), state),
-        Scene("history", Flow(Stage.DONE), state),
+        Moment("device", Flow(Stage.DEVICE), before),
+        Moment("run", Flow(Stage.PREPARE, job), before),
+        Moment("live", Flow(Stage.LIVE, job), _falling(before, view, job)),
+        Moment("result", result, state),
+        Moment("session", Flow(Stage.DONE), state),
+        Moment("history", Flow(Stage.DONE), state),
     ]
 
 
-def _falling(state: State, findings: SessionView, job: Job) -> State:
+def _falling(state: State, view: SessionView, job: Job) -> State:
     """Stop the clock in the middle of a drop."""
-    drop = findings.drops[job]
+    drop = view.drops[job]
     until = _LIVE_SHARE * drop.edges[-1].tick
     section = {"run": job.run, "attempt": job.attempt, "state": "fired", "tick_hz": drop.tick_hz}
     edges = tuple([*edge] for edge in drop.edges if edge.tick <= until)
     return State(0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges)
 
 
-async def _picture(scene: Scene, session: Path, keys: Mapping[str, str]) -> str:
-    wire = Still(scene.state)
-    app = RigApp(Options(session=session), keys, wire)
-    app.flow = scene.flow
+async def _picture(moment: Moment, session: Path, keys: Mapping[str, str]) -> str:
+    client = Still(moment.state)
+    app = RigApp(Options(session=session), keys, client)
+    app.flow = moment.flow
     async with app.run_test(size=SIZE) as pilot:
-        while app.findings is None or app.findings.lagging or not app.lamps.known:
-            wire.changed = True
+        while app.view is None or app.view.lagging or not app.indicators.known:
+            client.changed = True
             await pilot.pause()
-        if scene.name == "history":
-            first = app.findings.jobs[0]
-            end = end_of(app.findings.drops[first], app.findings.scales[first].hz)
+        if moment.name == "history":
+            first = app.view.jobs[0]
+            end = end_of(app.view.drops[first], app.view.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             await app.go("history")
-        if scene.state.edges:  # all of them came at once, which looks like flicker for a while
+        if moment.state.edges:  # all of them came at once, which looks like flicker for a while
             await pilot.pause(FLICKER_S + PAUSE_S)
         before, now = "", app.export_screenshot(title="chainrig")
         while now != before:  # figures are drawn again when their place is known

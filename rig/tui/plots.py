@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.measurands import averaged
 from rig.records import Job
 from rig.report.numbers import expanded, value_of
-from rig.results.view import good
+from rig.results.live import good
 from rig.tui.motion import motions, separation
 from rig.tui.widgets.figure import Picture, Series
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from rig.protocol.scene import Protocol, Run
-    from rig.results.view import SessionView
+    from rig.results.live import SessionView
     from rig.tui.motion import Motion, Table
 
 _MARKS = {"impact": ("•", "primary"), "free": ("+", "secondary")}
@@ -68,7 +68,7 @@ def _expected_end(found: Sequence[Motion]) -> float:
     return max(ends, default=0.0)
 
 
-def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]:
+def incline_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
     """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing.
 
     Parameters
@@ -77,11 +77,11 @@ def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]
         A run whose numbers must not be seen yet.
     """
     found = []
-    runs = [run for run in findings.analysis["runs"] if run["run"] != hidden and good(run)]
-    summary = [] if hidden is not None else findings.analysis["summary"]
+    runs = [run for run in view.analysis["runs"] if run["run"] != hidden and good(run)]
+    summary = [] if hidden is not None else view.analysis["summary"]
     for row in averaged():
         name, scale, title = row.name, row.scale, f"{row.symbol} ({row.unit}), incline (°)"
-        curve = findings.curves.get(name)
+        curve = view.curves.get(name)
         if curve is None:
             continue
         dots = [(r["incline_deg"], value_of(r.get(name))) for r in runs]
@@ -92,7 +92,7 @@ def incline_pictures(findings: SessionView, hidden: int | None) -> list[Picture]
             Picture(
                 title,
                 (
-                    *_model_lines(findings.curves, name, scale),
+                    *_model_lines(view.curves, name, scale),
                     Series("dots", [x for x, _ in dots], _scaled([y for _, y in dots], scale),
                            "secondary", "·", "runs"),
                     Series("bars", [x for x, *_ in means], _scaled([y for _, y, _ in means], scale),
@@ -118,7 +118,7 @@ def _model_lines(curves: Mapping[str, Any], name: str, scale: float) -> Iterator
         )
 
 
-def control_pictures(findings: SessionView, hidden: int | None) -> list[Picture]:
+def control_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
     """Draw the control charts: of skew with its limits, and of gravity beside the expected one.
 
     Parameters
@@ -131,18 +131,18 @@ def control_pictures(findings: SessionView, hidden: int | None) -> list[Picture]
     list of Picture
         Those of quantities that this scene has.
     """
-    runs = [run for run in findings.analysis["runs"] if run["run"] != hidden]
+    runs = [run for run in view.analysis["runs"] if run["run"] != hidden]
     found = []
-    if findings.protocol.two_chains:
-        limit = findings.protocol.accept.release_skew * 1e3
+    if view.protocol.two_chains:
+        limit = view.protocol.accept.release_skew * 1e3
         lines = ((0.0, "foreground", ""), (limit, "warning", f"limit ±{limit:g}"),
                  (-limit, "warning", ""))  # fmt: skip
         points = [(run, _measured(run.get("release_skew_s"), 1e3)) for run in runs]
-        found.append(_chart("release skew (ms), run", findings, lines, points))
-    points = [(run, _gravity(findings, run)) for run in runs]
-    if findings.gravity or any(point for _, point in points):
-        expected = ((findings.protocol.gravity.value, "accent", "protocol"),)
-        found.append(_chart("g of the free chain (m/s²), run", findings, expected, points))
+        found.append(_chart("release skew (ms), run", view, lines, points))
+    points = [(run, _gravity(view, run)) for run in runs]
+    if view.gravity or any(point for _, point in points):
+        expected = ((view.protocol.gravity.value, "accent", "protocol"),)
+        found.append(_chart("g of the free chain (m/s²), run", view, expected, points))
     return found
 
 
@@ -152,20 +152,20 @@ def _measured(told: Mapping[str, float] | None, scale: float = 1.0) -> tuple[flo
     return None if value is None else (value * scale, (expanded(told) or 0.0) * scale)
 
 
-def _gravity(findings: SessionView, run: Mapping[str, Any]) -> tuple[float, float] | None:
+def _gravity(view: SessionView, run: Mapping[str, Any]) -> tuple[float, float] | None:
     own = _measured(run.get("gravity_m_s2"))
-    seen = findings.gravity.get(Job(run["run"], run["attempt"]))
+    seen = view.gravity.get(Job(run["run"], run["attempt"]))
     return own or (None if seen is None else (seen.value, seen.expanded))
 
 
 def _chart(
     title: str,
-    findings: SessionView,
+    view: SessionView,
     lines: Sequence[tuple[float, str, str]],
     points: Sequence[tuple[Mapping[str, Any], tuple[float, float] | None]],
 ) -> Picture:
     """Draw one number a run, with U95, in order of the runs."""
-    ends = (0.5, len(findings.plan) + 0.5)
+    ends = (0.5, len(view.plan) + 0.5)
     series = [Series("line", ends, (level, level), color, label=label)
               for level, color, label in lines]  # fmt: skip
     for counts, color, mark, label in ((True, "primary", "●", "counts ± U"),
@@ -177,7 +177,7 @@ def _chart(
                    color, mark, label if bars else label.removesuffix(" ± U"),
                    [u for *_, u in some] if bars else ())
         )  # fmt: skip
-    return Picture(title, tuple(series), ends, x_ticks=_whole(len(findings.plan)))
+    return Picture(title, tuple(series), ends, x_ticks=_whole(len(view.plan)))
 
 
 def _whole(count: int) -> list[float]:

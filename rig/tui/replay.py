@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rig.tui.gates import Lamps
+from rig.tui.indicators import Indicators
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,10 +83,10 @@ def until(edges: Sequence[Edge], hz: float, time_s: float) -> Sequence[Edge]:
     return [edge for edge in edges if edge.tick <= time_s * hz]
 
 
-def lamps_at(channels: tuple[int, ...], drop: Drop, seen: Sequence[Edge]) -> Lamps:
+def indicators_at(channels: tuple[int, ...], drop: Drop, seen: Sequence[Edge]) -> Indicators:
     """Return the gates as they were after these edges."""
     mask = drop.initial_state
     for edge in seen:
         mask = mask | 1 << edge.channel if edge.blocked else mask & ~(1 << edge.channel)
-    lamps = Lamps.of(channels).seen(mask, 0.0)
-    return lamps.counted(tuple(edge.channel for edge in seen), float("-inf"))
+    indicators = Indicators.of(channels).seen(mask, 0.0)
+    return indicators.counted(tuple(edge.channel for edge in seen), float("-inf"))

@@ -6,7 +6,7 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from rig.campaign.events import Stage
-from rig.campaign.plan import again, rest_s, void_counts
+from rig.campaign.plan import again, rest_s
 from rig.campaign.plan import next_job as next_of
 from rig.records import Job
 from rig.tui.model import Model
@@ -20,23 +20,23 @@ _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 
 def model(app: RigApp) -> Model:
     """Take everything that is drawn, as it is now."""
-    wire, follower = app.wire, app.follower
-    findings = follower.findings
+    client, follower = app.client, app.follower
+    view = follower.view
     return Model(
         state=follower.state,
         flow=app.flow,
-        lamps=follower.lamps,
-        protocol=findings.protocol if findings else None,
-        findings=findings,
+        indicators=follower.indicators,
+        protocol=view.protocol if view else None,
+        view=view,
         voids=follower.voids,
-        connected=wire is None or wire.up,
+        connected=client is None or client.up,
         driving=app.driving,
         job=job(app),
         now_s=monotonic(),
-        silence=wire.silence if wire else "",
+        silence=client.silence if client else "",
         settle_s=settle_s(app),
-        port=wire.port if wire else "",
-        offline=wire is None,
+        port=client.port if client else "",
+        offline=client is None,
         unreadable=follower.unreadable,
         read=follower.done,
     )
@@ -59,14 +59,14 @@ def next_job(app: RigApp) -> Job | None:
     lines, flow = runs(app), app.flow
     if flow.stage is Stage.PREPARE and flow.job is not None:
         return again(lines, flow.job.run)
-    return next_of(lines, void_counts(app.follower.voids, lines))
+    return next_of(lines, app.follower.voids.counts(lines))
 
 
 def job(app: RigApp) -> Job | None:
     """Name the attempt that the screens are about."""
-    findings = app.findings
-    latest = findings.jobs[-1] if findings and findings.jobs else None
-    if app.wire is None:
+    view = app.view
+    latest = view.jobs[-1] if view and view.jobs else None
+    if app.client is None:
         return latest
     drop = app.state.section("drop")
     if drop and not app.driving:
@@ -78,7 +78,7 @@ def job(app: RigApp) -> Job | None:
 
 def settle_s(app: RigApp) -> float:
     """Say how long the chains rest before the next drop."""
-    if app.findings is None:
+    if app.view is None:
         return 0.0
-    clock = app.findings.clock.device
-    return rest_s(app.findings.protocol.plan.settle, clock.u if clock else None)
+    clock = app.view.clock.device
+    return rest_s(app.view.protocol.plan.settle, clock.u if clock else None)

@@ -14,7 +14,7 @@ from rig.campaign.plan import RunLine
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.results.view import SessionView
+    from rig.results.live import SessionView
 
 EMPTY: Mapping[str, Any] = MappingProxyType({})
 

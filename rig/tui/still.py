@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Any
 
-from rig.tui.wire import Wire
+from rig.tui.client import ReconnectingClient
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,7 +32,7 @@ QUIET: Mapping[str, Any] = {
 """Sections of a rig at rest, without a session."""
 
 
-class Still(Wire):
+class Still(ReconnectingClient):
     """Shows one state and carries nothing out.
 
     Parameters

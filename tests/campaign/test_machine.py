@@ -234,3 +234,58 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
         again = {Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED}
         over = reason not in again or (number == LOOKS and not attended)
         assert effects[4:] == ([GiveUp()] if over else [])
+
+
+SKEW = "release skew {} ms is beyond 5 ms"
+
+
+def void(number, reason=SKEW):
+    """Arm and judge one drop, which is void."""
+    job = Job(1, number)
+    return (
+        *(GoOn(job), GoOn(job), DONE, Answered(-1, 7), Tick(9.0), DONE, DONE),
+        *(Judged(-1, "void", (reason.format(number),)), DONE),
+    )
+
+
+def voids(*reasons, **more):
+    flow = Flow(stage=Stage.DEVICE, **more)
+    for number, reason in enumerate(reasons, start=1):
+        flow, _ = through(flow, *void(number, reason))
+    return flow
+
+
+@pytest.mark.parametrize("attended", [True, False])
+def test_three_voids_of_a_kind_halt_it(attended):
+    flow, effects = through(voids(SKEW, SKEW, SKEW, attended=attended), GoOn(NEXT))
+    assert (flow.stage, effects) == (Stage.HALTED, [])
+    assert "the last 3 drops are void for the same reason: release skew … ms" in flow.trouble
+    assert "run 1 is tried again" in flow.trouble
+    assert through(flow, DONE, Tick(9.0), Opened()) == (flow, []), "it waits"
+    flow, effects = through(flow, GoOn(NEXT))
+    assert (flow.stage, flow.job, flow.trouble, effects) == (Stage.PREPARE, Job(1, 4), "", [])
+    flow, _ = through(flow, *void(4)[1:], GoOn(NEXT))
+    assert (flow.stage, flow.job) == (Stage.PREPARE, NEXT), "the count begins anew"
+
+
+@pytest.mark.parametrize("onward", [GoOn(None), Again(Job(1, 4))])
+def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
+    flow, effects = through(voids(SKEW, SKEW, SKEW), onward)
+    assert (flow.stage, effects) == (Stage.HALTED, [])
+
+
+def test_two_of_a_kind_or_three_of_others_do_not():
+    for reasons in ((SKEW, SKEW), (SKEW, "a gate {} is dead", SKEW)):
+        assert through(voids(*reasons), GoOn(NEXT))[0].stage is Stage.PREPARE
+    flow, _ = through(voids(SKEW, SKEW, SKEW), Reject("I moved a gate"), DONE, GoOn(NEXT))
+    assert flow.stage is Stage.PREPARE, "the operator knows why"
+
+
+def test_blind_it_halts_after_the_decision():
+    flow, _ = through(voids(SKEW, SKEW), GoOn(NEXT))
+    flow = replace(flow, blind=True)
+    flow, _ = through(flow, *void(3)[1:])
+    assert flow.trouble == ""
+    flow, _ = through(flow, GoOn(NEXT))
+    assert (flow.stage, flow.shown, flow.trouble) == (Stage.RESULT, True, "")
+    assert through(flow, GoOn(NEXT))[0].stage is Stage.HALTED

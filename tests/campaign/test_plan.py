@@ -10,7 +10,6 @@ from rig.campaign.plan import (
     next_job,
     rest_s,
     unjudged,
-    void_counts,
 )
 from rig.records import Job
 
@@ -27,7 +26,6 @@ def test_runs_come_in_order_until_each_is_settled_or_void_too_often():
     assert next_job(lines("interrupted", "planned"), {}) == Job(1, 2)
     assert again(runs, 1) == Job(1, 2)
     assert unjudged(lines("accepted", "recorded")) == Job(2, 1)
-    assert void_counts({Job(1, 1), Job(1, 2)}, lines("void")) == {1: 2}
 
 
 def test_chains_rest_longer_while_the_clock_is_not_known():

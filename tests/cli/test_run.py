@@ -160,27 +160,49 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(run, tmp_pat
     assert truth_of(tmp_path / "one") == truth_of(tmp_path / "two") != truth_of(tmp_path / "other")
 
 
-def test_a_run_that_stays_void_is_code_3_and_still_json(run, tmp_path):
+def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, tmp_path):
     done = run("s", "--json", port="sim://?skew_sd=1s")
     assert done.code == 3
     found = json.loads(done.out)
-    assert [(r["run"], r["attempt"], r["verdict"]) for r in found["runs"]] == [
-        (1, 3, "void"),
-        (2, 3, "void"),
-    ]
+    assert [(r["run"], r["attempt"], r["verdict"]) for r in found["runs"]] == [(1, 3, "void")]
     assert all(r["reasons"] for r in found["runs"])
-    assert [(r["run"], r["attempt"]) for r in found["superseded"]] == [
-        (1, 1),
-        (1, 2),
-        (2, 1),
-        (2, 2),
-    ]
+    assert [(r["run"], r["attempt"]) for r in found["superseded"]] == [(1, 1), (1, 2)]
     assert found["summary"] == []
+    told = done.err.splitlines()
+    assert len([line for line in told if line.startswith("run ")]) == 3
+    at = next(n for n, line in enumerate(told) if line.startswith("stopped: "))
+    assert "the last 3 drops are void for the same reason: " in told[at]
+    assert told[at + 1].startswith("  hint: put that right at the rig")
     log = log_of(tmp_path / "s")
     again = run("s", port="sim://?skew_sd=1s")
     assert again.code == 3
-    assert log_of(tmp_path / "s") == log, "what stays void is not tried again"
+    assert "stopped: the last 3 drops" in again.err
+    assert log_of(tmp_path / "s")[1][: len(log[1])] == log[1]
+    assert drops_of(tmp_path / "s")[:4] == [(1, 1), (1, 2), (1, 3), (1, 4)]
     assert "No accepted runs" in again.out
+
+
+def test_what_is_put_right_is_gone_on_with_by_the_same_command(call, tmp_path):
+    (tmp_path / "p.yaml").write_text(short("[40 deg, 60 deg]", 3), "utf-8")
+    args = ("run", tmp_path / "p.yaml", "--port", "sim://?skew_sd=6ms&seed=1", "--session")
+    first = call(*args, tmp_path / "s")
+    assert first.code == 3
+    assert "release skew … ms is beyond 5 ms" in first.err
+    assert [attempt for number, attempt in drops_of(tmp_path / "s") if number == 5] == [1, 2, 3]
+    assert call(*args, tmp_path / "s").code == 0
+    assert_whole(tmp_path / "s", 6)
+
+
+def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, protocol):
+    path, reasons = tmp_path / "s", ("a draught", "a lorry", "a moth")
+    Session.create(path, protocol.read_text("utf-8"), protocol.name, simulated=True,
+                   origin="sim://?seed=1").close()  # fmt: skip
+    with Session.open(path) as session:
+        for attempt, reason in enumerate(reasons, start=1):
+            session.add_state(1, attempt, RunState.VOID, 0, (reason,))
+        session.commit()
+    assert run("s").code == 0
+    assert [(run, len(entries)) for run, entries in log_of(path).items()] == [(1, 3), (2, 4)]
 
 
 def test_a_void_run_is_made_again(run, tmp_path):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from rig.selftest.board import Options
 from rig.selftest.run import selftest
-from rig.selftest.stage import Options
 from sim.board import VirtualBoard
 from sim.serial_port import SimulatedSerial
 

@@ -8,9 +8,9 @@ from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
 from rig.link.messages import Reason
+from rig.selftest.board import Options
 from rig.selftest.requests import BAD_ORDERS
 from rig.selftest.run import CHECKS, selftest
-from rig.selftest.stage import Options
 from rig.selftest.verdicts import Verdict
 from sim.board import VirtualBoard
 from sim.controller import Controller

@@ -42,7 +42,7 @@ def lab() -> Iterator[Lab]:
 
 
 @pytest.fixture
-def wired() -> Iterator[tuple[Stand, Lab]]:
+def cabled() -> Iterator[tuple[Stand, Lab]]:
     """A board behind a cable, and a daemon that owns its port."""
     with Stand(runs=2, seed=3) as stand:
         bench = Lab(stand.folder, stand.protocol, str(stand.port))

@@ -118,12 +118,12 @@ class Lab:
             countdown_s=countdown_s,
         )
         app = RigApp(options, KEYS)
-        if name and app.wire:
-            app.wire.name = name
+        if name and app.client:
+            app.client.name = name
         async with app.run_test(size=size) as pilot:
             yield Operator(app, pilot)
-            if app.wire and app.wire.daemon:
-                self.daemons.append(app.wire.daemon)
+            if app.client and app.client.daemon:
+                self.daemons.append(app.client.daemon)
 
     @asynccontextmanager
     async def ready(
@@ -131,10 +131,10 @@ class Lab:
     ) -> AsyncIterator[Operator]:
         """Sit down with the first run prepared."""
         async with self.operator(size, countdown_s) as operator:
-            await operator.until(lambda: operator.app.wire and operator.app.wire.driving)
+            await operator.until(lambda: operator.app.client and operator.app.client.driving)
             await operator.press("enter")
             await operator.at(Stage.DEVICE)
-            await operator.until(lambda: operator.app.findings and operator.app.lamps.known)
+            await operator.until(lambda: operator.app.view and operator.app.indicators.known)
             await operator.press("enter")
             await operator.at(Stage.PREPARE)
             yield operator

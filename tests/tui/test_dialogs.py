@@ -17,15 +17,15 @@ from tests.tui.lab import run
 @asynccontextmanager
 async def listening(op):
     """Hear what the daemon is asked for."""
-    called, real = [], op.app.wire.call
+    called, real = [], op.app.client.call
 
     async def call(method, **params):
         called.append(method)
         return await real(method, **params)
 
-    op.app.wire.call = call
+    op.app.client.call = call
     yield called
-    op.app.wire.call = real
+    op.app.client.call = real
 
 
 async def stops(op, key):

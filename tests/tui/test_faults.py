@@ -73,7 +73,7 @@ def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab, fence
 
     async def work():
         async with lab.operator() as op:
-            await op.until(lambda: op.app.wire.driving)
+            await op.until(lambda: op.app.client.driving)
             await op.sees("✗ this cannot be used", "fence.yaml:4:")
             await op.press("enter")
             lab.protocol.write_text(good, "utf-8")
@@ -97,7 +97,7 @@ def test_every_terminal_size_can_be_used(lab):
     async def work():
         for size in ((80, 24), (120, 36), (200, 60), (40, 12)):
             async with lab.operator(size) as op:
-                await op.until(lambda: op.app.wire.up)
+                await op.until(lambda: op.app.client.up)
                 for page in "123456":
                     await op.press(page)
                 await op.sees("STOP")

@@ -27,7 +27,7 @@ def kill(stand, lab):
 
 
 async def mended(op):
-    await op.until(lambda: op.app.state.link == "up" and op.app.wire.driving)
+    await op.until(lambda: op.app.state.link == "up" and op.app.client.driving)
     await op.until(lambda: op.app.state.section("session"))
 
 
@@ -41,14 +41,14 @@ async def armed(op):
 
 
 async def session_on(op):
-    await op.until(lambda: op.app.wire.driving and op.app.state.link == "up")
+    await op.until(lambda: op.app.client.driving and op.app.state.link == "up")
     await op.press("enter")
     await op.at(Stage.DEVICE)
-    await op.until(lambda: op.app.findings and op.app.lamps.known)
+    await op.until(lambda: op.app.view and op.app.indicators.known)
 
 
-def test_a_pulled_cable_is_said_on_every_screen(wired):
-    stand, lab = wired
+def test_a_pulled_cable_is_said_on_every_screen(cabled):
+    stand, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
@@ -73,8 +73,8 @@ def test_a_pulled_cable_is_said_on_every_screen(wired):
 
 
 @pytest.mark.parametrize("fault", [pull, kill])
-def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(wired, fault):
-    stand, lab = wired
+def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fault):
+    stand, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
@@ -93,8 +93,8 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(wired, faul
 
 
 @pytest.mark.parametrize("fault", [reset])
-def test_what_was_armed_is_not_when_the_line_breaks(wired, fault):
-    stand, lab = wired
+def test_what_was_armed_is_not_when_the_line_breaks(cabled, fault):
+    stand, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=600.0) as op:
@@ -110,8 +110,8 @@ def test_what_was_armed_is_not_when_the_line_breaks(wired, fault):
     run(work())
 
 
-def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(wired):
-    stand, lab = wired
+def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(cabled):
+    stand, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:

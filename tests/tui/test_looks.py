@@ -85,7 +85,7 @@ async def _screen(moment, size, path, theme=None):
     app = RigApp(Options(session=path), KEYS, Still(state))
     app.flow = flow
     async with app.run_test(size=size) as pilot:
-        while app.findings is None or not app.lamps.known:
+        while app.view is None or not app.indicators.known:
             await pilot.pause()
         if moment == "help":
             await pilot.press("question_mark")

@@ -14,7 +14,7 @@ from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.records import Drop, Edge
 from rig.tui.motion import motions, separation
-from rig.tui.replay import FASTEST, SLOWEST, Player, end_of, lamps_at, until
+from rig.tui.replay import FASTEST, SLOWEST, Player, end_of, indicators_at, until
 from rig.tui.widgets.figure import ticks
 from tests.cli.lab import short
 
@@ -109,9 +109,9 @@ def test_the_tape_goes_forwards_and_back_at_any_speed():
     assert Player().turned(1e-9).speed == SLOWEST
     assert Player(at=2).other(1, 3) == Player(at=0)
     seen = until(drop.edges, 1000, 0.15)
-    assert lamps_at((3, 5), drop, seen).blocked == (3, 5)
-    assert lamps_at((3, 5), drop, drop.edges).blocked == (5,)
-    assert [lamp.edges for lamp in lamps_at((3, 5), drop, drop.edges).lamps] == [2, 0]
+    assert indicators_at((3, 5), drop, seen).blocked == (3, 5)
+    assert indicators_at((3, 5), drop, drop.edges).blocked == (5,)
+    assert [one.edges for one in indicators_at((3, 5), drop, drop.edges).gates] == [2, 0]
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(0, 12))

@@ -41,10 +41,10 @@ async def click(op, action):
 def test_pages_keys_and_dialogs_go_by_mouse_alone(lab):
     async def work():
         async with lab.operator((120, 36)) as op:
-            await op.until(lambda: op.app.wire and op.app.wire.driving)
+            await op.until(lambda: op.app.client and op.app.client.driving)
             await click(op, "app.do('go_on')")
             await op.at(Stage.DEVICE)
-            await op.until(lambda: op.app.findings and op.app.lamps.known)
+            await op.until(lambda: op.app.view and op.app.indicators.known)
             for page in ("result", "session", "history", "protocol", "run", "device"):
                 await click(op, f"app.do('page_{page}')")
                 await op.until(lambda page=page: op.app.page == page)
@@ -82,17 +82,17 @@ def test_a_protocol_and_stop_are_clicked(lab, fence):
 
     async def work():
         async with lab.operator(files=(lab.protocol, other)) as op:
-            await op.until(lambda: op.app.wire and op.app.wire.driving)
+            await op.until(lambda: op.app.client and op.app.client.driving)
             await click(op, "app.choose('protocol', 1)")
             await op.sees("The other one")
             stopped = []
-            real = op.app.wire.call
+            real = op.app.client.call
 
             async def call(method, **params):
                 stopped.append(method)
                 return await real(method, **params)
 
-            op.app.wire.call = call
+            op.app.client.call = call
             await click(op, "app.do('stop')")
             await op.until(lambda: "stop" in stopped)
 

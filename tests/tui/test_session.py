@@ -56,13 +56,13 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab, page):
     async def work():
         async with lab.ready(countdown_s=600.0) as op:
             called = []
-            real = op.app.wire.call
+            real = op.app.client.call
 
             async def call(method, **params):
                 called.append(method)
                 return await real(method, **params)
 
-            op.app.wire.call = call
+            op.app.client.call = call
             await op.press(page)
             await op.press("f9")
             await op.until(lambda: "stop" in called)
@@ -120,8 +120,8 @@ def test_blind_numbers_come_after_the_decision(lab):
 def test_a_second_screen_watches_and_can_only_stop(lab):
     async def work():
         async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
-            await other.until(lambda: other.app.findings)
-            assert not other.app.wire.driving
+            await other.until(lambda: other.app.view)
+            assert not other.app.client.driving
             await op.press("enter")
             await op.at(Stage.COUNTDOWN)
             await other.sees("ARMED by another client", "watching rig tui")
@@ -133,7 +133,7 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
             await op.press("k", "c")
             await other.until(lambda: other.app.state.holder is None)
             await other.press("c")
-            await other.until(lambda: other.app.wire.driving)
+            await other.until(lambda: other.app.client.driving)
 
     run(work())
 
@@ -155,3 +155,29 @@ def test_leaving_does_not_stop_what_falls(lab):
 
     run(work())
     assert log_of(lab.session)[1][-1][1] is RunState.ACCEPTED
+
+
+def test_after_three_voids_of_a_kind_it_says_so_and_waits(lab):
+    lab.stop()
+    lab.daemons.clear()
+    lab.protocol.write_text(short(), "utf-8")
+    lab.url += "&skew_sd=1s"
+    lab.start()
+
+    async def work():
+        async with lab.ready() as op:
+            for attempt in (1, 2, 3):
+                await op.at(Stage.PREPARE)
+                await op.press("enter")
+                await op.at(Stage.RESULT)
+                await op.sees(f"run 1, attempt {attempt}", "VOID")
+                await op.until(lambda: op.app.flow.logged)
+                await op.press("enter")
+            await op.at(Stage.HALTED)
+            await op.sees("the last 3 drops are void for the same reason", "try again", "VOID")
+            await op.press("enter")
+            await op.at(Stage.PREPARE)
+            await op.sees("RUN 1 of 4 · attempt 4")
+            assert "same reason" not in text_of(op.app)
+
+    run(work())

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
 from rig.daemon.mirror import Mirror
-from rig.tui.gates import Lamps
+from rig.tui.indicators import Indicators
 from rig.tui.model import Model, alarm
 from rig.tui.state import State, typed
 
@@ -55,32 +55,32 @@ def test_what_the_daemon_does_not_know_is_not_known():
     assert (State().known, state.known) == (False, True)
 
 
-def test_lamps_count_name_and_judge_steadiness():
-    lamps = Lamps.of((0, 3)).seen(0b0000, 0.0).seen(0b1000, 1.0)
-    assert lamps.alone == 3
-    assert not lamps.ready(1.1)
-    lamps = lamps.seen(0, 1.2)
-    assert lamps.waved == {3}
-    assert not lamps.ready(1.3)
-    assert lamps.ready(2.3)
-    assert [lamp.edges for lamp in lamps.lamps] == [0, 2]
-    assert lamps.counted((0, 0, 0, 0), 5.0).lamps[0].flickers(5.0)
-    assert not lamps.seen(None, 3.0).ready(9.0)
-    assert lamps.reset().waved == frozenset()
+def test_indicators_count_name_and_judge_steadiness():
+    indicators = Indicators.of((0, 3)).seen(0b0000, 0.0).seen(0b1000, 1.0)
+    assert indicators.alone == 3
+    assert not indicators.ready(1.1)
+    indicators = indicators.seen(0, 1.2)
+    assert indicators.checked == {3}
+    assert not indicators.ready(1.3)
+    assert indicators.ready(2.3)
+    assert [one.edges for one in indicators.gates] == [0, 2]
+    assert indicators.counted((0, 0, 0, 0), 5.0).gates[0].flickers(5.0)
+    assert not indicators.seen(None, 3.0).ready(9.0)
+    assert indicators.reset().checked == frozenset()
 
 
-def test_a_lamp_that_is_blocked_from_the_beginning_has_not_changed():
-    lamps = Lamps.of((2,)).seen(0b100, 0.0)
-    assert (lamps.lamps[0].edges, lamps.blocked) == (0, (2,))
+def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
+    indicators = Indicators.of((2,)).seen(0b100, 0.0)
+    assert (indicators.gates[0].edges, indicators.blocked) == (0, (2,))
 
 
 def _model(state=None, **more):
-    return Model(typed(0, STATE | (state or {})), Flow(), Lamps(), connected=True, **more)
+    return Model(typed(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
 
 
 def test_what_is_wrong_is_said_with_what_to_do():
     assert alarm(_model()) is None
-    gone = alarm(Model(State(), Flow(), Lamps(), silence="it is gone"))
+    gone = alarm(Model(State(), Flow(), Indicators(), silence="it is gone"))
     assert "it is gone" in gone.message
     assert "supply" in gone.hint
     lost = alarm(

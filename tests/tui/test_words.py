@@ -6,7 +6,7 @@ import pytest
 
 from rig.campaign.machine import Flow, Stage
 from rig.records import Job
-from rig.tui.gates import Lamps
+from rig.tui.indicators import Indicators
 from rig.tui.model import Model
 from rig.tui.state import typed
 from rig.tui.widgets.banner import verdict_words
@@ -21,7 +21,7 @@ def model(text):
     state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
              "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
     flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(text,))
-    return Model(typed(0, state), flow, Lamps(), connected=True, job=Job(1, 1), port=text)
+    return Model(typed(0, state), flow, Indicators(), connected=True, job=Job(1, 1), port=text)
 
 
 @pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))

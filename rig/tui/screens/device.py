@@ -1,4 +1,4 @@
-"""Is the rig well? Connection, firmware, clock, and every gate as a lamp."""
+"""Is the rig well? Connection, firmware, clock, and every gate as a indicator."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textual.content import Content
 from rig.campaign.events import Stage
 from rig.report.numbers import fixed
 from rig.tui.screens.page import Page
-from rig.tui.widgets.lamps import LampBoard, named
+from rig.tui.widgets.gates import GateBoard, named
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
 
@@ -26,22 +26,22 @@ class DevicePage(Page):
     SCOPED_CSS = False
     DEFAULT_CSS = """
     DevicePage #facts { height: auto; padding: 0 1 1 1; }
-    DevicePage #wave { height: auto; padding: 1 1 0 1; }
+    DevicePage #check { height: auto; padding: 1 1 0 1; }
     DevicePage #release { height: auto; padding: 0 1; }
     .-low DevicePage #facts { padding: 0 1; }
     """
 
     def compose(self) -> ComposeResult:
         yield Words(id="facts")
-        yield LampBoard(id="lamps")
-        yield Words(id="wave")
+        yield GateBoard(id="indicators")
+        yield Words(id="check")
         yield Words(id="release")
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
         self.query_one("#facts", Words).say_content(_facts(model))
-        self.query_one(LampBoard).show(model.protocol, model.lamps, model.now_s)
-        self.query_one("#wave", Words).say_content(_wave(model))
+        self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
+        self.query_one("#check", Words).say_content(_gate_check(model))
         self.query_one("#release", Words).say_content(_release(model))
 
 
@@ -93,7 +93,7 @@ def _release(model: Model) -> Content:
 
 
 def _clock(model: Model) -> str:
-    details = model.findings.clock.details if model.findings else {}
+    details = model.view.clock.details if model.view else {}
     if "error_ppm" not in details or not details.get("samples"):
         return "not compared yet: needs a second or two"
     return (
@@ -102,21 +102,21 @@ def _clock(model: Model) -> str:
     )
 
 
-def _wave(model: Model) -> Content:
+def _gate_check(model: Model) -> Content:
     gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
-    lamps = model.lamps
-    if not lamps.known:
+    indicators = model.indicators
+    if not indicators.known:
         return Content("No word from the gates yet.")
-    if lamps.alone is not None:
+    if indicators.alone is not None:
         return Content.assemble(
-            ("☞ ", "bold $warning"), "you block ", (named(gates, lamps.alone), "bold")
+            ("☞ ", "bold $warning"), "you block ", (named(gates, indicators.alone), "bold")
         )
-    if lamps.blocked:
+    if indicators.blocked:
         return Content.assemble(
-            ("● ", "bold $warning"), f"{len(lamps.blocked)} beams are blocked: move what is in "
-            "their way, or align them"
+            ("● ", "bold $warning"),
+            f"{len(indicators.blocked)} beams are blocked: move what is in their way, or align them"
         )  # fmt: skip
-    left = [gate.channel for gate in gates if gate.channel not in lamps.waved]
+    left = [gate.channel for gate in gates if gate.channel not in indicators.checked]
     if not left:
         return Content.assemble(("✓ ", "bold $success"), "every gate has answered to your hand")
     many = "" if len(left) == len(gates) else f" ({len(gates) - len(left)} of {len(gates)} seen)"

@@ -1,4 +1,4 @@
-"""Any drop of the session again, with the same lamps and plots, forwards and back."""
+"""Any drop of the session again, with the same indicators and plots, forwards and back."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 
 from rig.tui.plots import chain_pictures
-from rig.tui.replay import Player, end_of, lamps_at, until
+from rig.tui.replay import Player, end_of, indicators_at, until
 from rig.tui.screens.page import Page
 from rig.tui.screens.result import number_table
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.figure import Figure
-from rig.tui.widgets.lamps import LampBoard
+from rig.tui.widgets.gates import GateBoard
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
 
     from rig.records import Job
-    from rig.results.view import SessionView
+    from rig.results.live import SessionView
     from rig.tui.model import Model
 
 
@@ -44,13 +44,13 @@ class HistoryPage(Page):
         self.player = Player()
         self.other: SessionView | None = None
         """Of another session than the one in hand."""
-        self._findings: SessionView | None = None
+        self._view: SessionView | None = None
 
     def compose(self) -> ComposeResult:
         yield Words(id="which")
         with Horizontal():
             with Vertical(id="left"):
-                yield LampBoard(id="lamps")
+                yield GateBoard(id="indicators")
                 yield Words(id="numbers")
             with Vertical(id="right"):
                 yield Figure(id="z")
@@ -59,14 +59,14 @@ class HistoryPage(Page):
     # ------------------------------------------------------------------ the tape
 
     @property
-    def findings(self) -> SessionView | None:
+    def view(self) -> SessionView | None:
         """What is played; `None` without a drop."""
-        return self._findings if self._findings and self._findings.jobs else None
+        return self._view if self._view and self._view.jobs else None
 
     @property
     def job(self) -> Job | None:
         """The drop that is played."""
-        found = self.findings
+        found = self.view
         return found.jobs[self.player.at % len(found.jobs)] if found else None
 
     def tick(self, seconds: float) -> None:
@@ -92,8 +92,8 @@ class HistoryPage(Page):
 
     def move(self, by: int) -> None:
         """Take another drop."""
-        if self.findings:
-            self.player = self.player.other(by, len(self.findings.jobs))
+        if self.view:
+            self.player = self.player.other(by, len(self.view.jobs))
 
     def choose(self, at: int) -> None:
         """Take one drop of the list."""
@@ -101,19 +101,19 @@ class HistoryPage(Page):
 
     @property
     def _end_s(self) -> float:
-        found, job = self.findings, self.job
+        found, job = self.view, self.job
         return end_of(found.drops[job], found.scales[job].hz) if found and job else 0.0
 
     # ------------------------------------------------------------------ drawing
 
     def show(self, model: Model) -> None:
         """Draw the drop at its moment."""
-        self._findings = self.other or model.findings
-        findings, job = self.findings, self.job
+        self._view = self.other or model.view
+        view, job = self.view, self.job
         said = self.query_one("#which", Words)
-        if findings is None or job is None:
+        if view is None or job is None:
             self._blank()
-            waiting = model.offline and self._findings is None and not model.unreadable
+            waiting = model.offline and self._view is None and not model.unreadable
             said.say(f"Reading the session: {model.read} drops so far …" if waiting
                      else "No drop is recorded yet. o lists other sessions.")  # fmt: skip
             return
@@ -121,43 +121,41 @@ class HistoryPage(Page):
             self._blank()
             said.say("This drop is blind: its numbers come with your decision.")
             return
-        said.say_content(_which(findings, job, self.player))
-        drop, hz = findings.drops[job], findings.scales[job].hz
+        said.say_content(_which(view, job, self.player))
+        drop, hz = view.drops[job], view.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
-        self.query_one(LampBoard).show(
-            findings.protocol, lamps_at(findings.channels, drop, seen), 0.0
-        )
+        self.query_one(GateBoard).show(view.protocol, indicators_at(view.channels, drop, seen), 0.0)
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        key = (findings.path, job, hz, len(seen))
+        key = (view.path, job, hz, len(seen))
         if z.wants(key):
-            matches = findings.results[job].matches or None
-            run = findings.plan[job.run]
-            first, second = chain_pictures(findings.protocol, run, seen, hz, matches)
+            matches = view.results[job].matches or None
+            run = view.plan[job.run]
+            first, second = chain_pictures(view.protocol, run, seen, hz, matches)
             z.show(first, key)
             dz.show(second, key)
-        self.query_one("#numbers", Words).say_content(number_table(findings, job, wide=False))
+        self.query_one("#numbers", Words).say_content(number_table(view, job, wide=False))
 
     def _blank(self) -> None:
         self.query_one("#numbers", Words).say("")
-        self.query_one(LampBoard).clear()
+        self.query_one(GateBoard).clear()
         for name in ("#z", "#dz"):
             self.query_one(name, Figure).show(None)
 
 
-def _which(findings: SessionView, job: Job, player: Player) -> Content:
-    run, result = findings.plan[job.run], findings.results[job]
+def _which(view: SessionView, job: Job, player: Player) -> Content:
+    run, result = view.plan[job.run], view.results[job]
     symbol, colour = LOOKS.get(result.verdict, ("?", "$foreground"))
     hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
-    place = findings.jobs.index(job) + 1
+    place = view.jobs.index(job) + 1
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ still {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} of"
-    stamp = "  ▲ SIMULATED" if findings.simulated else ""
+    stamp = "  ▲ SIMULATED" if view.simulated else ""
     return Content.assemble(
-        (f"drop {place} of {len(findings.jobs)}", "bold $primary"),
+        (f"drop {place} of {len(view.jobs)}", "bold $primary"),
         f"  run {job.run}, attempt {job.attempt} · {hung} · ",
         (f"{symbol} {result.verdict}", colour),
         f"\n{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · ",
-        (plain(findings.path.name, 60), "$foreground 70%"),
+        (plain(view.path.name, 60), "$foreground 70%"),
         (stamp, "bold $warning"),
     )

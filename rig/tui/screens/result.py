@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
 
     from rig.records import Job
-    from rig.results.view import SessionView
+    from rig.results.live import SessionView
     from rig.tui.model import Model
     from rig.tui.widgets.figure import Picture
     from rig.units import Quantity
@@ -51,34 +51,34 @@ class ResultPage(Page):
     def show(self, model: Model) -> None:
         """Draw what holds now."""
         self.query_one(Banner).show(model)
-        findings, job = model.findings, model.job
-        ready = findings is not None and job in findings.results and not model.blindfold
+        view, job = model.view, model.job
+        ready = view is not None and job in view.results and not model.blindfold
         numbers = self.query_one("#numbers", Words)
         numbers.display = ready
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        if not ready or findings is None or job is None:
+        if not ready or view is None or job is None:
             z.show(None)
             dz.show(None)
             return
-        numbers.say_content(number_table(findings, job))
-        key = (findings.path, job, findings.scales[job].hz)
+        numbers.say_content(number_table(view, job))
+        key = (view.path, job, view.scales[job].hz)
         if z.wants(key):
-            first, second = drop_pictures(findings, job)
+            first, second = drop_pictures(view, job)
             z.show(first, key)
             dz.show(second, key)
 
 
-def drop_pictures(findings: SessionView, job: Job) -> tuple[Picture | None, Picture | None]:
+def drop_pictures(view: SessionView, job: Job) -> tuple[Picture | None, Picture | None]:
     """Draw a recorded drop, with the rods as the analysis found them."""
-    matches = findings.results[job].matches or None
-    run, edges = findings.plan[job.run], findings.drops[job].edges
-    return chain_pictures(findings.protocol, run, edges, findings.scales[job].hz, matches)
+    matches = view.results[job].matches or None
+    run, edges = view.plan[job.run], view.drops[job].edges
+    return chain_pictures(view.protocol, run, edges, view.scales[job].hz, matches)
 
 
-def number_table(findings: SessionView, job: Job, *, wide: bool = True) -> Content:
+def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     """Write the numbers with U95; where there is room, the model's and the normalized error too."""
-    record = findings.record(job)
-    expected = predicted_run(findings.protocol, findings.plan[job.run])
+    record = view.record(job)
+    expected = predicted_run(view.protocol, view.plan[job.run])
     head = f"{'':15}{'measured ± U95':>20}"
     lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
     for row in listed():
@@ -94,7 +94,7 @@ def number_table(findings: SessionView, job: Job, *, wide: bool = True) -> Conte
             line += f"{plus_minus(told, row.scale):>16}"
             line += f"   {fixed(_normalized(record[row.name], model), 2):>5}"
         elif row.name == "release_skew_s":
-            limit = findings.protocol.accept.release_skew * 1e3
+            limit = view.protocol.accept.release_skew * 1e3
             line += f"{f'limit ±{limit:g}':>16}"
         lines.append(Content(line))
     audit = record.get("edges", {})

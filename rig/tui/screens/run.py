@@ -14,7 +14,7 @@ from rig.tui.motion import as_table
 from rig.tui.plots import chain_pictures
 from rig.tui.screens.page import Page
 from rig.tui.widgets.figure import Figure
-from rig.tui.widgets.lamps import LampBoard, named
+from rig.tui.widgets.gates import GateBoard, named
 from rig.tui.widgets.text import Words
 from rig.tui.words import duration, plain
 
@@ -42,7 +42,7 @@ class RunPage(Page):
     RunPage #checks { height: auto; padding: 1 1; }
     RunPage Digits { height: 3; padding: 0 2; color: $warning; display: none; }
     RunPage.-count Digits { display: block; }
-    RunPage #lamps { margin: 1 0 0 0; }
+    RunPage #indicators { margin: 1 0 0 0; }
     .-low RunPage #checks { padding: 0 1; }
     """
 
@@ -57,7 +57,7 @@ class RunPage(Page):
                 yield Words(id="card")
                 yield Digits("3", id="count")
                 yield Words(id="checks")
-                yield LampBoard(id="lamps")
+                yield GateBoard(id="indicators")
             with Vertical(id="right"):
                 yield Figure(id="z")
                 yield Figure(id="dz")
@@ -73,7 +73,7 @@ class RunPage(Page):
             self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
         checks = self.query_one("#checks", Words)
         checks.say_content(_checks(model))
-        self.query_one(LampBoard).show(model.protocol, model.lamps, model.now_s)
+        self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
         self._plots(model)
 
     def _plots(self, model: Model) -> None:
@@ -138,16 +138,17 @@ def _checks(model: Model) -> Content:
         return Content.styled("reading the drop back and analysing it …", "bold $primary")
     if model.job is None or model.run is None:
         return Content("")
-    lamps = model.lamps
+    indicators = model.indicators
     gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
-    blocked, restless = lamps.blocked, lamps.restless(model.now_s)
+    blocked, restless = indicators.blocked, indicators.restless(model.now_s)
     where = named(gates, blocked[0]) if blocked else ""
     more = f" and {len(blocked) - 1} more" if len(blocked) > 1 else ""
     lines = [
         _check(model.connected and model.state.link == "up", "device connected", "no device"),
-        _check(lamps.known and not blocked, "every beam clear",
-               f"blocked: {where}{more}" if lamps.known else "no word from the gates"),
-        _check(lamps.known and not restless, "gates steady", "gates moving: let the chains rest"),
+        _check(indicators.known and not blocked, "every beam clear",
+               f"blocked: {where}{more}" if indicators.known else "no word from the gates"),
+        _check(indicators.known and not restless, "gates steady",
+               "gates moving: let the chains rest"),
         Content.assemble(("○ ", "bold"), "hung as above, at rest, hands away"),
     ]  # fmt: skip
     settle = duration(model.settle_s)

@@ -10,7 +10,7 @@ from textual.containers import Grid, VerticalScroll
 from textual.content import Content
 
 from rig.analysis.learn import FEWEST
-from rig.campaign.plan import done, void_counts
+from rig.campaign.plan import done
 from rig.measurands import averaged
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import control_pictures, incline_pictures
@@ -69,17 +69,17 @@ class SessionPage(Page):
         self.query_one("#progress", Words).say_content(_progress(model))
         self.query_one("#lines", Words).say_content(_plan(model))
         figures = [self.query_one(f"#{name}", Figure) for name in _FIGURES]
-        findings = model.findings
-        if findings is None:
+        view = model.view
+        if view is None:
             for figure in figures:
                 figure.show(None)
             return
         hidden = model.job.run if model.blindfold and model.job else None
-        key = (findings.path, findings.reading, hidden, self._chart)
+        key = (view.path, view.reading, hidden, self._chart)
         if not any(figure.wants(key) for figure in figures):
             return
         low, wide = self.screen.has_class("-low"), self.screen.has_class("-wide")
-        means, charts = incline_pictures(findings, hidden), control_pictures(findings, hidden)
+        means, charts = incline_pictures(view, hidden), control_pictures(view, hidden)
         turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
         shown = {
             "separation": means[:1],
@@ -103,13 +103,13 @@ class SessionPage(Page):
 
 def _progress(model: Model) -> Content:
     runs = model.state.runs
-    voids = void_counts(model.voids, runs)
+    voids = model.voids.counts(runs)
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
     if not runs:
         return Content("No session is open.")
     width = 24
     filled = round(width * over / len(runs))
-    pace = model.findings.pace_s if model.findings else None
+    pace = model.view.pace_s if model.view else None
     left = (
         f" · about {duration(pace * (len(runs) - over))} left" if pace and over < len(runs) else ""
     )
@@ -129,8 +129,8 @@ def _plan(model: Model) -> Content:
         return line.incline_deg, (line.impact or "") if unlike else ""
 
     summary = {}
-    if model.findings is not None and not model.blindfold:
-        lines_ = model.findings.analysis["summary"]
+    if model.view is not None and not model.blindfold:
+        lines_ = model.view.analysis["summary"]
         summary = {(one["incline_deg"], one.get("impact_chain", "")): one for one in lines_}
     ordered = sorted(model.state.runs, key=case)
     groups = [list(group) for _, group in groupby(ordered, key=case)]
@@ -149,12 +149,12 @@ def _plan(model: Model) -> Content:
 
 def _taught(model: Model) -> tuple[str, str]:
     """Say whether the drops have taught each other what they have in common."""
-    findings = model.findings
-    if findings is None or model.blindfold or not findings.analysis["summary"]:
+    view = model.view
+    if view is None or model.blindfold or not view.analysis["summary"]:
         return "", ""
-    more = " · learning from the newest …" if findings.lagging else ""
-    if findings.fitted:
-        return f"\nafter learning from {findings.fitted} runs{more}", "$foreground 70%"
+    more = " · learning from the newest …" if view.lagging else ""
+    if view.fitted:
+        return f"\nafter learning from {view.fitted} runs{more}", "$foreground 70%"
     few = f"; they teach each other from {FEWEST} good ones on" if not more else ""
     return f"\neach drop by itself{few}{more}", "$foreground 70%"
 

@@ -27,6 +27,7 @@ _GO_ON = {
     Stage.DEVICE: "to the first run",
     Stage.PREPARE: "arm",
     Stage.RESULT: "acknowledge",
+    Stage.HALTED: "try again",
     Stage.DONE: "what is left",
 }
 _PAGES = tuple(action.name for action in ACTIONS if action.name.startswith("page_"))

@@ -7,7 +7,7 @@ from typing import TypeAlias
 from textual.content import Content
 from textual.widgets import Static
 
-Part: TypeAlias = "str | tuple[str, str]"
+Styled: TypeAlias = "str | tuple[str, str]"
 """Text, or text with its style."""
 
 
@@ -24,7 +24,7 @@ class Words(Static):
         """What stands here."""
         return self._said.plain if self._said is not None else ""
 
-    def say(self, *parts: Part) -> None:
+    def say(self, *parts: Styled) -> None:
         """Show these parts, one after the other."""
         self.say_content(Content.assemble(*parts))
 

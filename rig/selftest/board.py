@@ -67,7 +67,7 @@ class Recorded:
         return zlib.crc32(wire.pack(frame)[1][6:])
 
 
-class Stage:
+class BoardUnderTest:
     """One board during a self-test.
 
     No release is driven unless the options allow it: orders to arm pulse none, and where a check

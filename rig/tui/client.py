@@ -23,7 +23,7 @@ _AGAIN_S = 0.5
 _START_S = 5.0  # a daemon that was started has this long before another one is
 
 
-class Wire:
+class ReconnectingClient:
     """One client of the daemon for as long as the screen is open.
 
     Parameters

@@ -12,7 +12,7 @@ FLICKERS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Lamp:
+class Indicator:
     """One gate: its state, its edges so far, and when the latest of them were seen."""
 
     channel: int
@@ -30,74 +30,74 @@ class Lamp:
 
 
 @dataclass(frozen=True, slots=True)
-class Lamps:
+class Indicators:
     """All gates of the scene.
 
     Attributes
     ----------
-    waved
-        Channels that were seen blocked alone and clear again: the wave-your-hand test.
+    checked
+        Channels that were seen blocked alone and clear again: the gate check.
     alone
         The one channel that is blocked now; `None` for none or several.
     """
 
-    lamps: tuple[Lamp, ...] = ()
-    waved: frozenset[int] = frozenset()
+    gates: tuple[Indicator, ...] = ()
+    checked: frozenset[int] = frozenset()
     alone: int | None = None
     known: bool = False
 
     @classmethod
-    def of(cls, channels: tuple[int, ...]) -> Lamps:
-        """Begin with lamps nobody has looked at."""
-        return cls(tuple(Lamp(channel) for channel in channels))
+    def of(cls, channels: tuple[int, ...]) -> Indicators:
+        """Begin with gates that nobody has looked at."""
+        return cls(tuple(Indicator(channel) for channel in channels))
 
     @property
     def blocked(self) -> tuple[int, ...]:
         """Channels that are blocked."""
-        return tuple(lamp.channel for lamp in self.lamps if lamp.blocked)
+        return tuple(gate.channel for gate in self.gates if gate.blocked)
 
     def restless(self, now_s: float) -> tuple[int, ...]:
         """Channels that are not steady."""
-        return tuple(lamp.channel for lamp in self.lamps if not lamp.steady(now_s))
+        return tuple(gate.channel for gate in self.gates if not gate.steady(now_s))
 
     def ready(self, now_s: float) -> bool:
         """Whether every beam is clear and steady."""
         return self.known and not self.blocked and not self.restless(now_s)
 
-    def seen(self, mask: int | None, now_s: float) -> Lamps:
+    def seen(self, mask: int | None, now_s: float) -> Indicators:
         """Look at the gates' mask; `None` means that nobody knows."""
         if mask is None:
             return replace(self, known=False, alone=None)
-        lamps = tuple(_looked(lamp, mask, now_s, first=not self.known) for lamp in self.lamps)
-        blocked = tuple(lamp.channel for lamp in lamps if lamp.blocked)
-        waved = self.waved
+        gates = tuple(_looked(gate, mask, now_s, first=not self.known) for gate in self.gates)
+        blocked = tuple(gate.channel for gate in gates if gate.blocked)
+        checked = self.checked
         if self.alone is not None and not blocked:
-            waved |= {self.alone}
-        return Lamps(lamps, waved, blocked[0] if len(blocked) == 1 else None, known=True)
+            checked |= {self.alone}
+        return Indicators(gates, checked, blocked[0] if len(blocked) == 1 else None, known=True)
 
-    def counted(self, channels: tuple[int, ...], now_s: float) -> Lamps:
+    def counted(self, channels: tuple[int, ...], now_s: float) -> Indicators:
         """Count edges of a drop, one entry of `channels` an edge."""
         return replace(
             self,
-            lamps=tuple(
-                _struck(lamp, count, now_s) if (count := channels.count(lamp.channel)) else lamp
-                for lamp in self.lamps
+            gates=tuple(
+                _struck(gate, count, now_s) if (count := channels.count(gate.channel)) else gate
+                for gate in self.gates
             ),
         )
 
-    def reset(self) -> Lamps:
-        """Count from zero and begin the wave test again."""
-        return Lamps.of(tuple(lamp.channel for lamp in self.lamps))
+    def reset(self) -> Indicators:
+        """Count from zero and begin the gate check again."""
+        return Indicators.of(tuple(gate.channel for gate in self.gates))
 
 
-def _looked(lamp: Lamp, mask: int, now_s: float, *, first: bool) -> Lamp:
-    blocked = bool(mask >> lamp.channel & 1)
-    if blocked == lamp.blocked:
-        return lamp
-    lamp = replace(lamp, blocked=blocked)
-    return lamp if first else _struck(lamp, 1, now_s)
+def _looked(gate: Indicator, mask: int, now_s: float, *, first: bool) -> Indicator:
+    blocked = bool(mask >> gate.channel & 1)
+    if blocked == gate.blocked:
+        return gate
+    gate = replace(gate, blocked=blocked)
+    return gate if first else _struck(gate, 1, now_s)
 
 
-def _struck(lamp: Lamp, count: int, now_s: float) -> Lamp:
-    recent = (*lamp.recent_s, *(now_s,) * count)[-FLICKERS:]
-    return replace(lamp, edges=lamp.edges + count, recent_s=recent)
+def _struck(gate: Indicator, count: int, now_s: float) -> Indicator:
+    recent = (*gate.recent_s, *(now_s,) * count)[-FLICKERS:]
+    return replace(gate, edges=gate.edges + count, recent_s=recent)

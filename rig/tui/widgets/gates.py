@@ -1,4 +1,4 @@
-"""Gates as lamps: state, edges counted, steadiness; told by shape and word, not colour alone."""
+"""An indicator a gate: state, edges, steadiness; told by shape and word, not colour alone."""
 
 from __future__ import annotations
 
@@ -14,50 +14,50 @@ if TYPE_CHECKING:
     from textual.geometry import Size
 
     from rig.protocol.scene import Gate, Protocol
-    from rig.tui.gates import Lamp, Lamps
+    from rig.tui.indicators import Indicator, Indicators
 
 _WIDE, _SHORT = 50, 34
-"""Widths of one lamp with all words, and with the needed ones."""
+"""Widths of one indicator with all words, and with the needed ones."""
 _MOST = 8
-"""Lamps above each other: more would not fit a low screen."""
+"""Indicators above each other: more would not fit a low screen."""
 
 
-class Part(NamedTuple):
+class Cell(NamedTuple):
     """Text and its component class; none for the board's own look."""
 
     text: str
     look: str = ""
 
 
-class LampBoard(Widget):
+class GateBoard(Widget):
     """All gates, one side beside the other.
 
-    Every lamp changes at every tick of a drop: lines are made of a few parts each, without the
+    Every indicator changes at every tick of a drop: lines are made of a few parts each, without the
     wrapping and styling that other text goes through.
     """
 
-    COMPONENT_CLASSES = {"lamp--title", "lamp--unknown", "lamp--blocked", "lamp--clear"}  # noqa: RUF012
+    COMPONENT_CLASSES = {"gate--title", "gate--unknown", "gate--blocked", "gate--clear"}  # noqa: RUF012
     DEFAULT_CSS = """
-    LampBoard { height: auto; padding: 0 1; }
-    LampBoard > .lamp--title { text-style: bold; }
-    LampBoard > .lamp--unknown { color: $foreground 70%; }
-    LampBoard > .lamp--blocked { color: $warning; text-style: bold; }
-    LampBoard > .lamp--clear { color: $success; }
+    GateBoard { height: auto; padding: 0 1; }
+    GateBoard > .gate--title { text-style: bold; }
+    GateBoard > .gate--unknown { color: $foreground 70%; }
+    GateBoard > .gate--blocked { color: $warning; text-style: bold; }
+    GateBoard > .gate--clear { color: $success; }
     """
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
         super().__init__(id=id)
-        self._rows: list[list[Part]] = []
+        self._rows: list[list[Cell]] = []
 
-    def show(self, protocol: Protocol | None, lamps: Lamps, now_s: float) -> None:
+    def show(self, protocol: Protocol | None, indicators: Indicators, now_s: float) -> None:
         """Draw what the gates do now."""
-        self._take(board(protocol, lamps, now_s, self.size.width or 78))
+        self._take(board(protocol, indicators, now_s, self.size.width or 78))
 
     def clear(self) -> None:
         """Draw nothing."""
         self._take([])
 
-    def _take(self, rows: list[list[Part]]) -> None:
+    def _take(self, rows: list[list[Cell]]) -> None:
         if rows != self._rows:
             higher = len(rows) != len(self._rows)
             self._rows = rows
@@ -79,11 +79,13 @@ class LampBoard(Widget):
         return Strip(line).adjust_cell_length(width, plain)
 
 
-def board(protocol: Protocol | None, lamps: Lamps, now_s: float, width: int) -> list[list[Part]]:
-    """Draw the lamps in a width of characters."""
+def board(
+    protocol: Protocol | None, indicators: Indicators, now_s: float, width: int
+) -> list[list[Cell]]:
+    """Draw the indicators in a width of characters."""
     if protocol is None or protocol.gates is None:
-        return [[Part("no gates in this scene")]]
-    by_channel = {lamp.channel: lamp for lamp in lamps.lamps}
+        return [[Cell("no gates in this scene")]]
+    by_channel = {one.channel: one for one in indicators.gates}
     columns: list[tuple[str, list[Gate]]] = []
     for side in ("impact", "free"):
         gates = sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
@@ -91,31 +93,35 @@ def board(protocol: Protocol | None, lamps: Lamps, now_s: float, width: int) -> 
             title = "" if begin else f"{side} side"
             columns.append((title, gates[begin : begin + _MOST]))
     wide = width // len(columns)
-    rows = [[Part("".join(title.ljust(wide) for title, _ in columns), "lamp--title")]]
+    rows = [[Cell("".join(title.ljust(wide) for title, _ in columns), "gate--title")]]
     for at in range(max(len(gates) for _, gates in columns)):
-        row: list[Part] = []
+        row: list[Cell] = []
         for _, gates in columns:
             if at < len(gates):
-                lamp = by_channel.get(gates[at].channel)
-                row += _lamp(gates[at], lamp, lamps, now_s, wide)
+                indicator = by_channel.get(gates[at].channel)
+                row += _indicator(gates[at], indicator, indicators, now_s, wide)
             else:
-                row.append(Part(" " * wide))
+                row.append(Cell(" " * wide))
         rows.append(row)
     return rows
 
 
-def _lamp(gate: Gate, lamp: Lamp | None, lamps: Lamps, now_s: float, width: int) -> list[Part]:
-    if lamp is None or not lamps.known:
-        symbol, look, word = "?", "lamp--unknown", "unknown"
-    elif lamp.blocked:
-        symbol, look, word = "●", "lamp--blocked", "BLOCKED"
+def _indicator(
+    gate: Gate, indicator: Indicator | None, indicators: Indicators, now_s: float, width: int
+) -> list[Cell]:
+    if indicator is None or not indicators.known:
+        symbol, look, word = "?", "gate--unknown", "unknown"
+    elif indicator.blocked:
+        symbol, look, word = "●", "gate--blocked", "BLOCKED"
     else:
-        symbol, look, word = "○", "lamp--clear", "clear"
-    edges = 0 if lamp is None else lamp.edges
+        symbol, look, word = "○", "gate--clear", "clear"
+    edges = 0 if indicator is None else indicator.edges
     quiet = ""
-    if lamp is not None and lamps.known:
-        quiet = "FLICKERS" if lamp.flickers(now_s) else "" if lamp.steady(now_s) else "moving"
-        if not quiet and gate.channel in lamps.waved:
+    if indicator is not None and indicators.known:
+        quiet = (
+            "FLICKERS" if indicator.flickers(now_s) else "" if indicator.steady(now_s) else "moving"
+        )
+        if not quiet and gate.channel in indicators.checked:
             quiet = "seen ✓"
     where = f"{gate.height * 1e3:7.1f} mm"
     if width >= _WIDE:
@@ -124,7 +130,7 @@ def _lamp(gate: Gate, lamp: Lamp | None, lamps: Lamps, now_s: float, width: int)
         text = f" {where} ch{gate.channel:<2} {word:7}{edges:4} {quiet}"
     else:
         text = f" {where} {word:7}{edges:4}"
-    return [Part(symbol, look), Part(text[: width - 2].ljust(width - 1))]
+    return [Cell(symbol, look), Cell(text[: width - 2].ljust(width - 1))]
 
 
 def named(gates: Sequence[Gate], channel: int) -> str:
