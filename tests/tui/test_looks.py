@@ -17,6 +17,7 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.options import Options
+from rig.tui.pictures import at_rest
 from rig.tui.state import state_of
 from rig.tui.still import QUIET, Still
 from rig.tui.themes import NAMES
@@ -93,8 +94,5 @@ async def _screen(moment, size, path, theme=None):
             await pilot.press("n", *"warm")
         if theme is not None:
             app.theme = theme
-        before, text = "", text_of(app)
-        while before != text:
-            await pilot.pause(0.6)  # figures are drawn at most twice a second
-            before, text = text, text_of(app)
+        text = await at_rest(app, pilot, lambda: text_of(app))
         return text if theme is None else [*colours_of(app)]
