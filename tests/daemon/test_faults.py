@@ -26,6 +26,7 @@ def test_nothing_is_lost_whatever_dies():
         assert noise.result().bad_frames > 0
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_with_the_real_firmware():
     pytest.importorskip("rig_emulator")
     tally = disturbed("cable", 1, 3, runs=1, board="emu")
