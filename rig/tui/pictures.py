@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import re
 from dataclasses import replace
+from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
-from rig.tui.indicators import FLICKER_S
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import State, state_of
@@ -19,8 +19,10 @@ from rig.tui.still import QUIET, Still
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
+
+    from textual.pilot import Pilot
 
     from rig.records import Job
     from rig.results.live import SessionView
@@ -114,13 +116,37 @@ async def _picture(moment: Moment, session: Path, keys: Mapping[str, str]) -> st
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             await app.go("history")
-        if moment.state.edges:  # all of them came at once, which looks like flicker for a while
-            await pilot.pause(FLICKER_S + PAUSE_S)
-        before, now = "", app.export_screenshot(title="chainrig")
-        while now != before:  # figures are drawn again when their place is known
-            await pilot.pause(1.2 * PAUSE_S)
-            before, now = now, app.export_screenshot(title="chainrig")
-        return portable(now)
+        # All edges came at once, which looks like flicker for a while.
+        while len(moment.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
+            gate.flickers(now := monotonic()) or not gate.steady(now)
+            for gate in app.indicators.gates
+        ):
+            await pilot.pause(PAUSE_S)
+        return portable(await at_rest(app, pilot, lambda: app.export_screenshot(title="chainrig")))
+
+
+async def at_rest(app: RigApp, pilot: Pilot[None], look: Callable[[], str]) -> str:
+    """Look at a screen once it stays as it is.
+
+    Parameters
+    ----------
+    look
+        What to look at, such as the whole screen.
+
+    Returns
+    -------
+    str
+        What was seen last.
+    """
+    before, now = "", look()
+    while now != before:
+        # Figures are drawn again when their place is known, and only so often. Drawn here, for on
+        # a busy machine the app's own next drawing may be later.
+        await pilot.pause(1.2 * PAUSE_S)
+        app.draw()
+        await pilot.pause()
+        before, now = now, look()
+    return now
 
 
 def portable(svg: str) -> str:

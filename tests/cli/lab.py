@@ -12,6 +12,7 @@ from typing import Any
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 PROTOCOLS = ROOT / "protocols"
@@ -84,7 +85,7 @@ def rig(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
         command(*arguments),
         cwd=ROOT,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         check=False,
         **{**streams, **options},
     )

@@ -10,6 +10,7 @@ import pytest
 
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, ROOT, command, rig, short
+from tests.waiting import PATIENCE_S
 
 
 def assert_told(done, code=2):
@@ -299,7 +300,7 @@ def test_streams_may_be_closed(finished, tmp_path, closed):
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert done.returncode == 0

@@ -35,6 +35,7 @@ from tests.cli.lab import (
     short,
     truth_of,
 )
+from tests.waiting import PATIENCE_S
 
 NAMES = {signal.SIGINT: "SIGINT", signal.SIGTERM: "SIGTERM", signal.SIGKILL: "SIGKILL"}
 
@@ -51,7 +52,7 @@ def stopped(arguments, session, number, wait_s):
             time.sleep(0.002)
         time.sleep(wait_s)
         process.send_signal(number)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=PATIENCE_S)
     finally:
         process.kill()
         process.wait()

@@ -29,6 +29,7 @@ from tests.cli.lab import (
     short,
     truth_of,
 )
+from tests.waiting import PATIENCE_S
 
 Q = {"value", "u", "U95"}
 RUN = {
@@ -400,7 +401,7 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path):
         assert [r["run"] for r in json.loads(reader.stdout)["runs"]] == [1]
         assert second.returncode == 2
         assert f"is being written by process {writer.pid}" in second.stderr
-        out, err = writer.communicate(timeout=60)
+        out, err = writer.communicate(timeout=PATIENCE_S)
     finally:
         writer.kill()
         writer.wait()

@@ -21,11 +21,12 @@ def test_nothing_is_lost_whatever_dies():
         crowd = [pool.submit(make, 1, 9) for make in CROWD.values()]
         for tally in (one.result() for one in (noise, *made, *crowd)):
             assert tally.broken == []
-            assert max(tally.longest_on_s, tally.off_after_s) < OFF_S
+            assert tally.longest_on_s <= OFF_S
         assert [sum(one.result().fell_upon.values()) for one in made] == [2] * len(KINDS)
         assert noise.result().bad_frames > 0
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_with_the_real_firmware():
     pytest.importorskip("rig_emulator")
     tally = disturbed("cable", 1, 3, runs=1, board="emu")

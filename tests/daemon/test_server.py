@@ -22,6 +22,7 @@ from rig.daemon.faults import VersionError
 from rig.daemon.place import default_socket, prepare_folder
 from rig.daemon.server import Server
 from rig.errors import DeviceError, InputError, RigError
+from tests.waiting import PATIENCE_S
 
 _SECTIONS = {
     "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
@@ -38,9 +39,9 @@ def door(tmp_path):
             path = tmp_path / "door" / "rig.sock"
             server, ready = Server("sim://", path, tcp=tcp), asyncio.Event()
             serving = asyncio.get_running_loop().create_task(server.run(ready.set))
-            await asyncio.wait_for(ready.wait(), 5.0)
+            await asyncio.wait_for(ready.wait(), PATIENCE_S)
             try:
-                await asyncio.wait_for(test(server, path), 20.0)
+                await asyncio.wait_for(test(server, path), PATIENCE_S)
             finally:
                 server.end()
                 await serving

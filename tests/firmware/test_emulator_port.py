@@ -6,7 +6,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from itertools import pairwise
 from pathlib import Path
 from urllib.parse import quote
@@ -25,6 +24,7 @@ from rig.link.rate import tick_rate
 from rig_emulator import pty
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make
+from tests.waiting import PATIENCE_S
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 FENCE = PROTOCOLS / "picket-fence.yaml"
@@ -141,11 +141,10 @@ def test_a_clock_that_the_emulator_has_not_is_refused():
 def test_a_read_waits_in_virtual_time_only():
     port = open_port(url(latency="0 s"))
     Device(port, port_clock(port)).connect()
-    start, real = port.clock.now_ns(), time.perf_counter()
+    start = port.clock.now_ns()
     port.timeout = 0.25
     assert port.read(1) == b""
     assert port.clock.now_ns() - start == pytest.approx(0.25e9, rel=1e-4)
-    assert time.perf_counter() - real < 10
 
 
 def test_opening_resets_the_board():
@@ -217,7 +216,7 @@ class Terminal:
 
     def end(self) -> int:
         self.process.send_signal(signal.SIGTERM)
-        code = self.process.wait(timeout=20)
+        code = self.process.wait(PATIENCE_S)
         self.process.stdout.close()
         return code
 

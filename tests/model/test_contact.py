@@ -103,7 +103,7 @@ def test_keeps_its_digits_however_small_alpha(chain, alpha, gamma, drop, gravity
 
 
 @examples(60)
-@given(chains(most=6), ALPHAS, GAMMAS, st.floats(0.0, 3.0), decades(-2, 8), SPEEDS)
+@given(chains(most=6), ALPHAS, GAMMAS, DROPS, decades(-2, 8), SPEEDS)
 def test_keeps_its_digits_where_legs_are_short_against_the_contact_time(
     chain, alpha, gamma, drop, tau, speed
 ):

@@ -19,6 +19,7 @@ from rig.model.density import Exponential, Tabulated, Uniform
 from rig.model.fall import fall
 from tests.examples import examples
 from tests.model.chains import close, decades
+from tests.waiting import PATIENCE_S
 
 LENGTH, GRAVITY = 1.165, 9.81
 TIGHT = 1e-10  # at the default tolerance of 1e-12 a step; 5e-11 is the worst seen
@@ -205,6 +206,6 @@ assert "scipy" not in sys.modules
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=PATIENCE_S,
     )
     assert done.returncode == 0, done.stderr

@@ -17,6 +17,7 @@ from rig.errors import SessionError
 from rig.records import Certificate, Drop, Edge, HostBreak, Ping, Pulse
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 from rig.session.store import Session
+from tests.waiting import PATIENCE_S
 
 TEXT = "protocol: 1\ntitle: Übung\n"
 DEVICE_DROP = Drop(
@@ -307,7 +308,7 @@ def test_sigkill_keeps_every_committed_row_and_no_lock(path: Path) -> None:
         Session.open(path)
     assert caught.value.hint
     os.kill(child.pid, signal.SIGKILL)
-    rest, _ = child.communicate(timeout=30)
+    rest, _ = child.communicate(timeout=PATIENCE_S)
     last = max([last, *map(int, rest.split("\n")[:-1])])
     with Session.open(path) as session:
         stamps = [chunk.host_ns for chunk in session.byte_log()]

@@ -6,7 +6,6 @@ import os
 import signal
 import socket
 import subprocess
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from rig.sweep.executors import Inline, WorkersError, processes
 from rig.sweep.layout import lay_out
 from tests.cli.lab import PROTOCOLS, ROOT, command
 from tests.sweep.conftest import SCENE, VARY
+from tests.waiting import PATIENCE_S, until
 
 
 @pytest.fixture(scope="module")
@@ -93,9 +93,7 @@ def test_an_address_where_no_cluster_is(sweep, tmp_path, address, monkeypatch):
         where = f"tcp://127.0.0.1:{port}" if address in {"closed", "silent"} else address
         if address == "closed":
             server.close()
-        start = time.monotonic()
         done = sweep("x.csv", "friction=0..1:3", more=("--cluster", where))
-    assert time.monotonic() - start < 5.0
     assert done.code == 4
     assert done.err.startswith(f"--cluster {where}: cannot be reached")
     assert len(done.err.splitlines()) == 2
@@ -108,7 +106,7 @@ def _die(*_: object) -> None:
 
 def test_a_process_that_dies_is_told_and_not_waited_for():
     with pytest.raises(WorkersError, match="died"), processes(1) as pool:
-        pool.submit(_die).result(timeout=20)
+        pool.submit(_die).result(PATIENCE_S)
 
 
 def _children(pid: int) -> list[str]:
@@ -126,23 +124,25 @@ def test_the_end_of_the_command_is_the_end_of_all(tmp_path, number):
         text=True,
         start_new_session=True,
     ) as process:
-        while len(_children(process.pid)) < 3:  # the two, and multiprocessing's own
-            assert process.poll() is None, process.stderr.read()
-            time.sleep(0.01)
+        until(  # the two, and multiprocessing's own
+            lambda: process.poll() is not None or len(_children(process.pid)) >= 3
+        )
+        assert process.poll() is None, process.stderr.read()
         if number == signal.SIGINT:
             os.killpg(process.pid, number)  # as a terminal does: to all of them
         else:
             process.kill()
-        code, said = process.wait(timeout=20), process.stderr.read()
+        code, said = process.wait(PATIENCE_S), process.stderr.read()
     if number == signal.SIGINT:
         assert code == 130
         assert said == "rig: interrupted; nothing was written\n"
     assert list(tmp_path.iterdir()) == []
-    deadline = time.monotonic() + 10.0
-    while True:
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            break
-        assert time.monotonic() < deadline, "somebody is left"
-        time.sleep(0.02)
+    until(lambda: not _left(process.pid), lambda: "somebody is left")
+
+
+def _left(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True

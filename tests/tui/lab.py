@@ -12,6 +12,7 @@ import tempfile
 import time
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from inspect import isawaitable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from rig.tui.app import RigApp
 from rig.tui.options import Options
 from tests.cli.lab import ROOT
 from tests.tui.screen import text_of
+from tests.waiting import PATIENCE_S
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
@@ -28,7 +30,14 @@ if TYPE_CHECKING:
     from textual.pilot import Pilot
 
 KEYS = {action.name: action.keys for action in ACTIONS}
-PATIENCE_S = 60.0
+
+_DAEMON = """\
+import rig.daemon.lease
+rig.daemon.lease.LEASE_S = 60.0
+from rig.cli import main
+raise SystemExit(main())
+"""
+"""One that takes no screen for lost which a busy machine leaves no time for a sign of life."""
 
 
 @dataclass
@@ -44,12 +53,22 @@ class Operator:
     async def until(self, true: Callable[[], object]) -> None:
         """Wait for something to become true on the screen or behind it."""
         end = time.monotonic() + PATIENCE_S
-        while not true():
+        while not (await found if isawaitable(found := true()) else found):
             assert time.monotonic() < end, f"{self.app.flow}\n{text_of(self.app)}"
             await self.pilot.pause(0.02)
 
     async def at(self, stage: Stage) -> None:
         await self.until(lambda: self.app.flow.stage is stage)
+
+    async def arms(self, stage: Stage) -> None:
+        """Arm, and again where a busy machine let board or daemon wait too long, until `stage`."""
+
+        async def there() -> bool:
+            if self.app.flow.stage is Stage.PREPARE:
+                await self.press("enter")
+            return self.app.flow.stage is stage
+
+        await self.until(there)
 
     async def sees(self, *texts: str) -> None:
         """Wait until all of these stand on the screen, however lines are broken."""
@@ -79,7 +98,7 @@ class Lab:
 
     def start(self) -> None:
         """Start the daemon, and wait until it says that it is there."""
-        command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
+        command = [sys.executable, "-c", _DAEMON, "daemon", "--port", self.url]
         daemon = subprocess.Popen(
             [*command, "--socket", str(self.socket)], cwd=ROOT, stderr=subprocess.PIPE
         )
@@ -97,7 +116,7 @@ class Lab:
         for daemon in self.daemons:
             with suppress(ProcessLookupError):
                 os.kill(daemon.pid, signal.SIGTERM)
-            daemon.wait(30)
+            daemon.wait(PATIENCE_S)
             if daemon.stderr is not None:
                 daemon.stderr.close()
 

@@ -47,8 +47,8 @@ def test_stop_works_in_every_dialog(lab):
                 await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))
                 await stops(op, key)
                 await op.until(lambda: len(op.app.screen_stack) == 1)
-            await op.press("3", "enter")
-            await op.at(Stage.RESULT)
+            await op.press("3")
+            await op.arms(Stage.RESULT)
             await op.press("n", *"warm")
             await op.until(lambda: isinstance(op.app.screen, Ask))
             await stops(op, "f9")
@@ -83,8 +83,7 @@ def test_stop_works_in_every_state_that_lasts(lab):
                 await op.sees(said)
             await op.until(lambda: op.app.state.phase == "idle")
             op.app.flow = replace(op.app.flow, countdown_s=0.1)
-            await op.press("enter")
-            await op.at(Stage.LIVE)
+            await op.arms(Stage.LIVE)
             await stops(op, "escape")
             await op.at(Stage.RESULT)  # what there is is kept and judged
 

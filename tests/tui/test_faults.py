@@ -20,8 +20,8 @@ def test_a_killed_daemon_is_said_replaced_and_gone_on_with(lab, page):
             await op.sees("no daemon", "switch the release's supply off")
             await recovered(op, lab)
             await op.until(lambda: "no daemon" not in text_of(op.app))
-            await op.press("3", "enter")
-            await op.at(Stage.RESULT)
+            await op.press("3")
+            await op.arms(Stage.RESULT)
             await op.sees("ACCEPTED")
 
     run(work())
@@ -38,12 +38,12 @@ async def recovered(op, lab):
 def test_a_daemon_killed_while_armed_is_said(lab):
     async def work():
         async with lab.ready(countdown_s=600.0) as op:
-            await op.press("enter")
-            await op.at(Stage.COUNTDOWN)
+            await op.arms(Stage.COUNTDOWN)
+            attempt = op.app.flow.job.attempt
             await asyncio.to_thread(lab.kill)
             await op.at(Stage.PREPARE)
             await recovered(op, lab)
-            await op.sees("RUN 1 of 3 · attempt 2")
+            await op.sees(f"RUN 1 of 3 · attempt {attempt + 1}")
 
     run(work())
 

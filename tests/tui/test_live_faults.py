@@ -15,7 +15,11 @@ RESTARTED = ("✗ the port was lost and is back: the board restarted", "check it
 
 
 def pull(stand, lab):
-    stand.hand("pull 1.5")
+    stand.hand("pull 3600")
+
+
+def plug(stand):
+    stand.hand("pull 0")  # and in again at once
 
 
 def reset(stand, lab):
@@ -29,15 +33,6 @@ def kill(stand, lab):
 async def mended(op):
     await op.until(lambda: op.app.state.link == "up" and op.app.client.driving)
     await op.until(lambda: op.app.state.section("session"))
-
-
-async def armed(op):
-    """Arm, and again where a busy computer let the board wait too long."""
-    wanted = {Stage.COUNTDOWN, Stage.LIVE, Stage.JUDGING, Stage.RESULT}
-    while op.app.flow.stage not in wanted:
-        if op.app.flow.stage is Stage.PREPARE:
-            await op.press("enter")
-        await op.pilot.pause(0.02)
 
 
 async def session_on(op):
@@ -55,16 +50,17 @@ def test_a_pulled_cable_is_said_on_every_screen(cabled):
             await op.until(lambda: op.app.state.link == "up")
             pull(stand, lab)  # before there is a session
             await op.sees(*PULLED, "PROTOCOL")
+            plug(stand)
             await session_on(op)
             pull(stand, lab)
             for page in "123456":
                 await op.press(page)
                 await op.sees(*PULLED)
+            plug(stand)
             await mended(op)
             await op.sees("the port was lost and is back")
             await op.press("enter")
-            await armed(op)
-            await op.at(Stage.RESULT)
+            await op.arms(Stage.RESULT)
             pull(stand, lab)
             await op.sees(*PULLED, "RESULT")
             assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
@@ -80,16 +76,21 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
         async with lab.operator(countdown_s=0.1) as op:
             await session_on(op)
             await op.press("enter")
-            await armed(op)
-            await op.at(Stage.LIVE)
+            await op.arms(Stage.LIVE)
+            job = op.app.flow.job
             await asyncio.to_thread(fault, stand, lab)
-            await op.sees("no daemon" if fault is kill else "the port is lost")
+            if fault is pull:
+                await op.sees("the port is lost")
+                plug(stand)
+            else:
+                await op.sees("no daemon")
             await op.at(Stage.RESULT)
-            await op.sees("run 1, attempt 1", "ACCEPTED")
+            await op.sees(f"run 1, attempt {job.attempt}", "ACCEPTED")
+        return job
 
-    run(work())
+    job = run(work())
     with Session.open(lab.session, readonly=True) as session:
-        assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1)]
+        assert [(drop.run, drop.attempt) for drop in session.drops()] == [job]
 
 
 @pytest.mark.parametrize("fault", [reset])
@@ -100,12 +101,12 @@ def test_what_was_armed_is_not_when_the_line_breaks(cabled, fault):
         async with lab.operator(countdown_s=600.0) as op:
             await session_on(op)
             await op.press("enter")
-            await armed(op)
-            await op.at(Stage.COUNTDOWN)
+            await op.arms(Stage.COUNTDOWN)
+            attempt = op.app.flow.job.attempt
             fault(stand, lab)
             await op.at(Stage.PREPARE)  # at once: long before the count is over
             await mended(op)
-            await op.sees("nothing fell", "RUN 1 of 2 · attempt 2")
+            await op.sees("nothing fell", f"RUN 1 of 2 · attempt {attempt + 1}")
 
     run(work())
 
@@ -120,13 +121,13 @@ def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(cabled):
             await op.sees(*RESTARTED)
             await mended(op)
             await op.press("enter")
-            await armed(op)
-            await op.at(Stage.LIVE)
+            await op.arms(Stage.LIVE)
+            attempt = op.app.flow.job.attempt
             reset(stand, lab)
             await op.sees("restarted")
             await mended(op)
             await op.at(Stage.PREPARE)
-            await op.sees("RUN 1 of 2 · attempt 2")
+            await op.sees(f"RUN 1 of 2 · attempt {attempt + 1}")
 
     run(work())
 
@@ -134,8 +135,7 @@ def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(cabled):
 def test_a_stop_by_another_client_ends_the_countdown(lab):
     async def work():
         async with lab.ready(countdown_s=600.0) as op, lab.operator(name="other") as other:
-            await op.press("enter")
-            await op.at(Stage.COUNTDOWN)
+            await op.arms(Stage.COUNTDOWN)
             await other.until(lambda: other.app.state.phase == "armed")
             await other.press("f9")
             await op.at(Stage.PREPARE)

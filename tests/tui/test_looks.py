@@ -17,6 +17,7 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.options import Options
+from rig.tui.pictures import at_rest
 from rig.tui.state import state_of
 from rig.tui.still import QUIET, Still
 from rig.tui.themes import NAMES
@@ -40,12 +41,20 @@ MOMENTS = {
 }
 
 
-@pytest.mark.parametrize("size", SIZES, ids="{0[0]}x{0[1]}".format)
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_a_screen_looks_as_it_did(moment, size, tmp_path):
+@pytest.fixture
+def looks(tmp_path, monkeypatch):
+    """Make a session to look at, with figures that are drawn without a pause."""
+    for module in ("widgets.figure", "pictures"):
+        monkeypatch.setattr(f"rig.tui.{module}.PAUSE_S", 0.05)
     path = tmp_path / "looks.session"
     Session.create(path, short(), "looks.yaml", simulated=True, origin="sim://").close()
-    text = run(_screen(moment, size, path))
+    return path
+
+
+@pytest.mark.parametrize("size", SIZES, ids="{0[0]}x{0[1]}".format)
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_a_screen_looks_as_it_did(moment, size, looks):
+    (text,) = run(_screens(moment, size, looks, lambda app: [text_of(app)]))
     golden = GOLDENS / f"{moment}-{size[0]}x{size[1]}.txt"
     if os.environ.get("GOLDENS") == "write":
         GOLDENS.mkdir(exist_ok=True)
@@ -64,13 +73,10 @@ def luminance(colour) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-@pytest.mark.parametrize("theme", NAMES)
 @pytest.mark.parametrize("moment", ["device", "run", "trouble", "session"])
-def test_all_text_can_be_read_in_every_theme(moment, theme, tmp_path):
-    path = tmp_path / "looks.session"
-    Session.create(path, short(), "looks.yaml", simulated=True, origin="sim://").close()
-    found = run(_screen(moment, (120, 36), path, theme))
-    assert len(found) > 20
+def test_all_text_can_be_read_in_every_theme(moment, looks):
+    found = run(_screens(moment, (120, 36), looks, colours_of, NAMES))
+    assert len(found) > 20 * len(NAMES)
     for text, ink, paper in found:
         if not any(map(str.isalnum, text)):
             continue  # lines and marks
@@ -78,12 +84,14 @@ def test_all_text_can_be_read_in_every_theme(moment, theme, tmp_path):
         assert (bright + 0.05) / (dark + 0.05) >= READABLE, (text, ink, paper)
 
 
-async def _screen(moment, size, path, theme=None):
+async def _screens(moment, size, path, look, themes=NAMES[:1]):
+    """Look at a moment in each theme; everything that was seen."""
     flow, more = MOMENTS[moment]
     whole = state_of(LiveAnalysis(path).read())
     state = replace(whole, sections={**QUIET, **more, "session": whole.sections["session"]})
     app = RigApp(Options(session=path), KEYS, Still(state))
     app.flow = flow
+    found = []
     async with app.run_test(size=size) as pilot:
         while app.view is None or not app.indicators.known:
             await pilot.pause()
@@ -91,10 +99,8 @@ async def _screen(moment, size, path, theme=None):
             await pilot.press("question_mark")
         if moment == "note":
             await pilot.press("n", *"warm")
-        if theme is not None:
+        for theme in themes:
             app.theme = theme
-        before, text = "", text_of(app)
-        while before != text:
-            await pilot.pause(0.6)  # figures are drawn at most twice a second
-            before, text = text, text_of(app)
-        return text if theme is None else [*colours_of(app)]
+            await at_rest(app, pilot, lambda: text_of(app))
+            found += look(app)
+    return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from rig.campaign.machine import Stage
-from rig.records import Job
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import assert_whole, log_of, short
@@ -20,10 +19,9 @@ def test_a_whole_session_takes_two_keys_a_run(lab):
         async with lab.ready() as op:
             await op.sees("RUN 1 of 4", "impact side A", "free side B", "incline 40°", "180 mm")
             for number in range(1, 5):
-                await op.until(lambda: op.app.flow.stage is Stage.PREPARE)
-                await op.press("enter")
-                await op.at(Stage.RESULT)
-                await op.sees(f"run {number}, attempt 1", "Δz corrected", "limit ±5", "SIMULATED")
+                await op.at(Stage.PREPARE)
+                await op.arms(Stage.RESULT)
+                await op.sees(f"run {number}, attempt", "Δz corrected", "limit ±5", "SIMULATED")
                 await op.until(lambda: op.app.flow.logged)
                 await op.press("enter")
             await op.at(Stage.DONE)
@@ -39,8 +37,7 @@ def test_a_whole_session_takes_two_keys_a_run(lab):
 def test_any_key_before_the_release_stops_and_nothing_falls(lab, key):
     async def work():
         async with lab.ready(countdown_s=600.0) as op:
-            await op.press("enter")
-            await op.at(Stage.COUNTDOWN)
+            await op.arms(Stage.COUNTDOWN)
             await op.sees("ARMED", "Any key stops")
             await op.press(key)
             await op.until(lambda: op.app.state.line(1).state == "interrupted")
@@ -73,8 +70,7 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab, page):
 def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
     async def work():
         async with lab.ready() as op:
-            await op.press("enter")
-            await op.at(Stage.RESULT)
+            await op.arms(Stage.RESULT)
             await op.until(lambda: op.app.flow.logged)
             await op.press("n", *"[/b] hm", "enter")
             await op.sees("note: [/b] hm")
@@ -101,8 +97,8 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
 def test_blind_numbers_come_after_the_decision(lab):
     async def work():
         async with lab.ready() as op:
-            await op.press("b", "enter")
-            await op.at(Stage.RESULT)
+            await op.press("b")
+            await op.arms(Stage.RESULT)
             await op.sees("BLIND", "Anything against it?")
             for page in "56":
                 await op.press(page)
@@ -122,8 +118,7 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
         async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
             await other.until(lambda: other.app.view)
             assert not other.app.client.driving
-            await op.press("enter")
-            await op.at(Stage.COUNTDOWN)
+            await op.arms(Stage.COUNTDOWN)
             await other.sees("ARMED by another client", "watching rig tui")
             await other.press("k", "enter")
             await other.sees("this screen only watches")
@@ -146,10 +141,10 @@ def test_leaving_does_not_stop_what_falls(lab):
 
     async def work():
         async with lab.ready() as op:
-            await op.press("enter")
-            await op.at(Stage.LIVE)
+            await op.arms(Stage.LIVE)
+            job = op.app.flow.job
         async with lab.operator() as again:
-            await again.until(lambda: again.app.flow.job == Job(1, 1))
+            await again.until(lambda: again.app.flow.job == job)
             await again.at(Stage.RESULT)
             await again.sees("ACCEPTED")
 

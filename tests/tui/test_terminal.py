@@ -8,19 +8,18 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.cli.lab import ROOT, assert_whole, short
 from tests.tui.lab import short_folder
+from tests.waiting import PATIENCE_S, until
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-PATIENCE_S = 90.0
 _NEEDS_TMUX = pytest.mark.skipif(
     shutil.which("tmux") is None and not os.environ.get("CI"), reason="tmux is not installed"
 )
@@ -36,7 +35,7 @@ class Terminal:
     def tmux(self, *arguments: str) -> str:
         done = subprocess.run(
             ["tmux", "-S", str(self.socket), "-f", "/dev/null", *arguments],
-            capture_output=True, text=True, check=True, timeout=20,
+            capture_output=True, text=True, check=True, timeout=PATIENCE_S,
         )  # fmt: skip
         return done.stdout
 
@@ -50,9 +49,10 @@ class Terminal:
         self.tmux("send-keys", *keys)
 
     def sees(self, *texts: str) -> None:
-        end = time.monotonic() + PATIENCE_S
-        while not all(text in self.screen() for text in texts):
-            assert time.monotonic() < end, f"no {texts}:\n{self.tmux('capture-pane', '-p')}"
+        until(
+            lambda: all(text in self.screen() for text in texts),
+            lambda: f"no {texts}:\n{self.tmux('capture-pane', '-p')}",
+        )
 
 
 @pytest.fixture

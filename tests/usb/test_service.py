@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import _parser
+from tests.waiting import PATIENCE_S
 
 UNIT = Path(__file__).parents[2] / "packaging" / "chainrig.service"
 
@@ -31,7 +32,7 @@ def test_systemd_understands_it():
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=PATIENCE_S,
     )
     complaints = [line for line in done.stderr.splitlines() if UNIT.name in line]
     assert complaints == []
