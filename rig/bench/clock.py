@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from rig.clock.epochs import epochs
+from rig.clock.rate import ping_rate, pulse_rate
 from rig.daemon.record import Unrecorded
 from rig.daemon.station import Station
-from rig.link.epochs import epochs
-from rig.link.rate import ping_rate, pulse_rate
 from rig.protocol.scene import PPS_U
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.rate import TickRate
+    from rig.clock.rate import TickRate
     from rig.records import Ping, Pulse
 
 TICK_HZ = 16_000_000

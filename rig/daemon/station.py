@@ -7,12 +7,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
+from rig.clock.host import HostWatch, SystemClock
 from rig.daemon.faults import StoppedError
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.clock import SystemClock
-from rig.link.hostwatch import HostWatch
 from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
 from rig.link.port import open_port, port_clock
 from rig.link.transcript import Received

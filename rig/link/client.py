@@ -16,8 +16,8 @@ from rig.records import Ping
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rig.clock.host import Clock
     from rig.link.assembly import Assembly
-    from rig.link.clock import Clock
     from rig.link.exchange import OnRecord, Tap
     from rig.link.port import Port
     from rig.link.transcript import Record, Transcript

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 
 import serial
 
+from rig.clock.host import Clock, SystemClock
 from rig.errors import DeviceError, InputError, RigError
-from rig.link.clock import Clock, SystemClock
 from rig.link.network import NETWORK, REACH, NetworkPort, why_unreachable
 from rig.ports import check_name
 

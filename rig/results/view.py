@@ -11,9 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from rig.analysis.drop import TimeScale
     from rig.analysis.result import DropResult, Measured
-    from rig.calibration import Calibration
+    from rig.clock.calibration import Calibration, TimeScale
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop, Job
     from rig.session.reading import StateEntry

@@ -5,10 +5,10 @@ from __future__ import annotations
 from statistics import median
 from typing import TYPE_CHECKING
 
+from rig.clock.epochs import RESONATOR_TOLERANCE
+from rig.clock.rate import tick_rate
 from rig.link import messages as wire
-from rig.link.epochs import RESONATOR_TOLERANCE
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, Reason
-from rig.link.rate import tick_rate
 from rig.records import Ping
 from rig.selftest.verdicts import CheckFailedError
 

@@ -15,13 +15,13 @@ import pytest
 
 import rig.boards
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.clock.rate import tick_rate
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
-from rig.link.rate import tick_rate
 from rig_emulator import pty
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make

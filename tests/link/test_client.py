@@ -12,10 +12,10 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.clock.host import SystemClock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.clock import SystemClock
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError

@@ -10,11 +10,11 @@ from urllib.parse import quote
 
 import pytest
 
+from rig.clock.rate import tick_rate
 from rig.errors import InputError
 from rig.link.client import Device
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
-from rig.link.rate import tick_rate
 from rig.records import Drop, Ping
 from sim.protocol_sim import Serial
 from tests.sim.falls import PROTOCOLS

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from rig.link.rate import tick_rate
+from rig.clock.rate import tick_rate
 from rig.records import Ping
+from tests.clock.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
 from tests.examples import examples
-from tests.link.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
 
 TRIALS = 300
 FEWEST = int(binom.ppf(0.001, TRIALS, 0.95))  # of intervals that hold 95 %

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from rig.clock.epochs import epochs
+from rig.clock.rate import ping_rate, pulse_rate
 from rig.link import messages as wire
-from rig.link.epochs import epochs
 from rig.link.frames import Frame, encode
-from rig.link.rate import ping_rate, pulse_rate
 from rig.link.transcript import Transcript
 from rig.records import Ping, Pulse
-from tests.link.clocks import HZ, Clock, compared, ppm, seconds
+from tests.clock.clocks import HZ, Clock, compared, ppm, seconds
 
 
 def measured(clock, pulses, pings=None):

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.link.epochs import epochs
-from rig.link.samples import TICK
+from rig.clock.epochs import epochs
+from rig.clock.samples import TICK
 from rig.records import Ping
+from tests.clock.clocks import HZ, Clock, compared
 from tests.examples import examples
-from tests.link.clocks import HZ, Clock, compared
 
 WRAP_S = 2**32 / HZ
 

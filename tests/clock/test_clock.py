@@ -5,8 +5,8 @@ import statistics
 
 import pytest
 
-from rig.link.clock import SystemClock
-from rig.link.rate import tick_rate
+from rig.clock.host import SystemClock
+from rig.clock.rate import tick_rate
 from rig.records import Ping
 
 HZ = 16_000_000

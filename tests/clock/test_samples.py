@@ -7,12 +7,11 @@ from bisect import bisect_left
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.link.epochs import epochs
-from rig.link.hosttime import one_axis
-from rig.link.samples import samples
+from rig.clock.epochs import epochs
+from rig.clock.samples import one_axis, samples
 from rig.records import HostBreak, Ping
+from tests.clock.clocks import HZ
 from tests.examples import examples
-from tests.link.clocks import HZ
 
 WRAP = 2**32
 S = 10**9
