@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.clock.rate import TickRate
-    from rig.records import Ping, Pulse
+    from rig.records import ClockSample, Pulse
 
 TICK_HZ = 16_000_000
 CLOCK_PPM = -1300.0
@@ -31,10 +31,10 @@ SOURCES = {"pings": 0.0, "reference": PPS_U}
 class _Kept(Unrecorded):
     """A record of clock samples only."""
 
-    pings: list[Ping] = field(default_factory=list)
+    pings: list[ClockSample] = field(default_factory=list)
     pulses: list[Pulse] = field(default_factory=list)
 
-    def add_ping(self, ping: Ping) -> None:
+    def add_ping(self, ping: ClockSample) -> None:
         self.pings.append(ping)
 
     def add_pulse(self, pulse: Pulse) -> None:

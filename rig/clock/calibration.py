@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rig.clock.rate import TickRate
     from rig.clock.samples import Samples
-    from rig.records import Drop, HostBreak, Ping, Pulse
+    from rig.records import ClockSample, Drop, HostBreak, Pulse
 
 HOST_U = 50e-6 / sqrt(3)
 """Of a computer's clock, relative: ±50 ppm for its quartz with temperature and age; a steered one
@@ -39,7 +39,7 @@ class Recorded(Protocol):
     @property
     def simulated(self) -> bool: ...  # noqa: D102
     def identities(self) -> Sequence[tuple[int, Mapping[str, Any]]]: ...  # noqa: D102
-    def pings(self, after: int = 0) -> Sequence[Ping]: ...  # noqa: D102
+    def pings(self, after: int = 0) -> Sequence[ClockSample]: ...  # noqa: D102
     def pulses(self) -> Sequence[Pulse]: ...  # noqa: D102
     def host_breaks(self) -> Sequence[HostBreak]: ...  # noqa: D102
     def fired_ns(self) -> Mapping[tuple[int, int], int]: ...  # noqa: D102

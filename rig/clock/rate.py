@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rig.clock.epochs import Epochs
     from rig.clock.samples import Samples
-    from rig.records import Ping, Pulse
+    from rig.records import ClockSample, Pulse
 
     Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ class TickRate:
 
 
 def tick_rate(
-    pings: Iterable[Ping] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
+    pings: Iterable[ClockSample] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
 ) -> TickRate:
     """Measure the device's tick rate from clock samples in any order, see `ping_rate`.
 

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.records import HostBreak, Ping
+    from rig.records import ClockSample, HostBreak
 
 Samples: TypeAlias = "NDArray[np.int64]"
-"""Shape (n, 3): `rig.records.Ping`'s host time before and after, ns, and tick."""
+"""Shape (n, 3): `rig.records.ClockSample`'s host time before and after, ns, and tick."""
 SEND, RECV, TICK = range(3)
 _APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
 
 
-def samples(pings: Iterable[Ping] | Samples) -> Samples:
+def samples(pings: Iterable[ClockSample] | Samples) -> Samples:
     """Turn clock samples into columns; columns stay what they are."""
     rows = pings if isinstance(pings, np.ndarray) else list(pings)
     return np.asarray(rows, np.int64).reshape(-1, 3)
@@ -70,7 +70,7 @@ class HostTime:
 
 
 def one_axis(
-    pings: Iterable[Ping] | Samples,
+    pings: Iterable[ClockSample] | Samples,
     boots_ns: Sequence[int] = (),
     breaks: Sequence[HostBreak] = (),
 ) -> HostTime:

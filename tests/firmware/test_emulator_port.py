@@ -182,7 +182,7 @@ def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
 @pytest.mark.parametrize("word", rig.boards.BOARDS)
 def test_the_table_of_boards_says_what_the_firmware_says(word):
     port = open_port(url(board=word))
-    assert Device(port, port_clock(port)).connect().as_board() == rig.boards.BOARDS[word]
+    assert Device(port, port_clock(port)).connect().capabilities() == rig.boards.BOARDS[word]
 
 
 def test_every_board_of_the_table_can_be_emulated():
