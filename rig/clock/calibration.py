@@ -33,7 +33,7 @@ class TimeScale(NamedTuple):
     u: float
 
 
-class Recorded(Protocol):
+class ClockLog(Protocol):
     """What a session has of clocks; `rig.session.reading.Reader` says what each of these is."""
 
     @property
@@ -172,7 +172,7 @@ class Calibrator:
     def __init__(self) -> None:
         self._pings = samples(())
 
-    def look(self, session: Recorded, reference_u: float) -> Calibration:
+    def look(self, session: ClockLog, reference_u: float) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now.
 
         Parameters
@@ -187,7 +187,7 @@ class Calibrator:
         return _calibration(session, self._pings, reference_u)
 
 
-def _calibration(session: Recorded, pings: Samples, reference_u: float) -> Calibration:
+def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calibration:
     identities = session.identities()
     nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
     u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
