@@ -16,7 +16,7 @@ LONGEST_RECORD_MS = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
+class Capabilities:
     """What one kind of board can do.
 
     Attributes
@@ -41,7 +41,7 @@ class Board:
     streams: bool
 
 
-MEGA = Board("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
-UNO = Board("Arduino Uno", 12, 2, 0.5, 191, streams=True)
+MEGA = Capabilities("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
+UNO = Capabilities("Arduino Uno", 12, 2, 0.5, 191, streams=True)
 BOARDS = {"mega": MEGA, "uno": UNO}
 """By the word for them at the command line."""

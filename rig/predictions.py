@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rig.model.predict import Prediction
     from rig.protocol.scene import Protocol, Run
@@ -111,8 +111,14 @@ def notes(protocol: Protocol) -> list[str]:
     at: dict[str, list[str]] = {}
     for one in predictions(protocol):
         for note in one["notes"]:
-            at.setdefault(note, []).append(f"{one['incline_deg']:g}°")
-    return [f"{', '.join(inclines)}: {note}" for note, inclines in at.items()]
+            at.setdefault(note, []).append(label(one))
+    return [f"{', '.join(labels)}: {note}" for note, labels in at.items()]
+
+
+def label(one: Mapping[str, Any]) -> str:
+    """Name a prediction by its incline and, where chains are unlike, by the one that strikes."""
+    chain = one.get("impact_chain")
+    return f"{one['incline_deg']:g}°{' ' + chain if chain else ''}"
 
 
 def _free_fall(protocol: Protocol) -> dict[str, Any]:

@@ -28,7 +28,7 @@ class Job(NamedTuple):
     attempt: int
 
 
-class Ping(NamedTuple):
+class ClockSample(NamedTuple):
     """One clock sample: host time before and after, and the device's tick between (u32)."""
 
     host_send_ns: int

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.link.messages import TEST_RUN
 from rig.link.transcript import Transcript
-from rig.records import Drop, Ping, Pulse
+from rig.records import ClockSample, Drop, Pulse
 from rig.results import results
 
 if TYPE_CHECKING:
@@ -57,11 +57,11 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     return Outcome(tuple(lines), tuple(differences))
 
 
-def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping], list[Pulse]]:
+def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[ClockSample], list[Pulse]]:
     """Parse the whole byte log."""
     transcript = Transcript()
     drops: list[Drop] = []
-    pings: list[Ping] = []
+    pings: list[ClockSample] = []
     pulses: list[Pulse] = []
     chunks = 0
     for host_ns, direction, data in session.byte_log():
@@ -70,7 +70,7 @@ def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[Ping], list[Puls
             if isinstance(record, Drop):
                 if record.run != TEST_RUN:  # of the release, and of no plan
                     drops.append(record)
-            elif isinstance(record, Ping):
+            elif isinstance(record, ClockSample):
                 pings.append(record)
             elif isinstance(record, Pulse):
                 pulses.append(record)

@@ -6,7 +6,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from rig.link.messages import EVENTS_PER_FRAME, DropCertificate, EventsFrame
-from rig.link.records import Event
+from rig.link.wiretypes import Event
 
 if TYPE_CHECKING:
     from rig.link.messages import Arm, Identity

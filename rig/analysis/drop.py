@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from rig.analysis.causes import causes
 from rig.analysis.components import STATED, Components
@@ -15,15 +15,9 @@ from rig.analysis.suspects import suspects
 from rig.analysis.verdict import judge, pattern_faults
 
 if TYPE_CHECKING:
+    from rig.clock.calibration import TimeScale
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
-
-
-class TimeScale(NamedTuple):
-    """Seconds from ticks: the rate in Hz and its relative standard uncertainty."""
-
-    hz: float
-    u: float
 
 
 def analyze_drop(

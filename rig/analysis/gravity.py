@@ -23,8 +23,8 @@ from rig.analysis.unknowns import DRAG_U
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.analysis.drop import TimeScale
     from rig.analysis.result import DropResult
+    from rig.clock.calibration import TimeScale
     from rig.protocol.scene import Protocol
     from rig.records import Drop
     from rig.units import Quantity

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.causes import causes
-from rig.analysis.drop import TimeScale, fit_drop
+from rig.analysis.drop import fit_drop
 from rig.analysis.learn import FEWEST, learn
 from rig.analysis.lesson_json import lesson_json
 from rig.analysis.pairs import Effects, effects
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
     from rig.analysis.learn import Lesson, Taught
     from rig.analysis.result import DropResult
+    from rig.clock.calibration import TimeScale
     from rig.protocol.scene import Protocol
     from rig.records import Drop
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from rig.clock.epochs import epochs
+from rig.clock.rate import ping_rate, pulse_rate
 from rig.daemon.record import Unrecorded
 from rig.daemon.station import Station
-from rig.link.epochs import epochs
-from rig.link.rate import ping_rate, pulse_rate
 from rig.protocol.scene import PPS_U
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.rate import TickRate
-    from rig.records import Ping, Pulse
+    from rig.clock.rate import TickRate
+    from rig.records import ClockSample, Pulse
 
 TICK_HZ = 16_000_000
 CLOCK_PPM = -1300.0
@@ -31,10 +31,10 @@ SOURCES = {"pings": 0.0, "reference": PPS_U}
 class _Kept(Unrecorded):
     """A record of clock samples only."""
 
-    pings: list[Ping] = field(default_factory=list)
+    pings: list[ClockSample] = field(default_factory=list)
     pulses: list[Pulse] = field(default_factory=list)
 
-    def add_ping(self, ping: Ping) -> None:
+    def add_ping(self, ping: ClockSample) -> None:
         self.pings.append(ping)
 
     def add_pulse(self, pulse: Pulse) -> None:

@@ -28,8 +28,8 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rig.analysis.drop import TimeScale
     from rig.analysis.fit import Fit
+    from rig.clock.calibration import TimeScale
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
 

@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any
 from rig.bench.decoding import bytewise, checked, frames, speed, to_edges
 from rig.bench.stand import Stand
 from rig.bench.terminal import Terminal
+from rig.clock.host import SystemClock
 from rig.daemon.server import Server
 from rig.daemon.view import View
-from rig.link.clock import SystemClock
 from rig.link.exchange import Exchange
 from rig.link.messages import EVENTS_PER_FRAME, Fired
 from rig.link.port import open_port

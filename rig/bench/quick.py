@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.drop import TimeScale
 from rig.analysis.session import analyze
 from rig.bench.accuracy import Tally
 from rig.bench.dials import with_setting
+from rig.clock.calibration import TimeScale
 from rig.errors import RigError
 from rig.protocol import reader
 from rig.protocol.plan import runs

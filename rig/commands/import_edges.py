@@ -6,9 +6,9 @@ import hashlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.clock.host import SystemClock
 from rig.commands.output import say
 from rig.errors import InputError
-from rig.link.clock import SystemClock
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs

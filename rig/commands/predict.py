@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.measurands import MEASURANDS
-from rig.predictions import predictions
+from rig.predictions import label, predictions
 from rig.protocol import reader
 
 if TYPE_CHECKING:
@@ -79,10 +79,5 @@ def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[st
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-    notes = [
-        f"{line['incline_deg']:g}°{' ' + line['impact_chain'] if 'impact_chain' in line else ''}: "
-        f"{note}"
-        for line in found
-        for note in line["notes"]
-    ]
+    notes = [f"{label(line)}: {note}" for line in found for note in line["notes"]]
     return "\n".join([*lines, *notes])

@@ -143,7 +143,7 @@ class Desk:
             self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
             self._home.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
-            check_board(scene, self.connect().as_board())
+            check_board(scene, self.connect().capabilities())
             self._home.bound = True
             with self.interrupts.held():
                 opened.put_results([], __version__)  # of less than there will be

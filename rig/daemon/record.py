@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rig.link.transcript import Direction
-    from rig.records import Drop, HostBreak, Ping, Pulse
+    from rig.records import ClockSample, Drop, HostBreak, Pulse
     from rig.session.schema import RunState
 
 
@@ -19,7 +19,7 @@ class Record(Protocol):
 
     def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None: ...  # noqa: D102
 
-    def add_ping(self, ping: Ping) -> None: ...  # noqa: D102
+    def add_ping(self, ping: ClockSample) -> None: ...  # noqa: D102
 
     def add_pulse(self, pulse: Pulse) -> None: ...  # noqa: D102
 
@@ -45,7 +45,7 @@ class Unrecorded:
     def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None:
         """Forget who was there."""
 
-    def add_ping(self, ping: Ping) -> None:
+    def add_ping(self, ping: ClockSample) -> None:
         """Forget a clock sample."""
 
     def add_pulse(self, pulse: Pulse) -> None:

@@ -7,18 +7,17 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
+from rig.clock.host import HostWatch, SystemClock
 from rig.daemon.faults import StoppedError
 from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.clock import SystemClock
-from rig.link.hostwatch import HostWatch
 from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
 from rig.link.port import open_port, port_clock
 from rig.link.transcript import Received
 from rig.ports import told
 from rig.protocol.measurable import record_ms
-from rig.records import Ping, Pulse
+from rig.records import ClockSample, Pulse
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ class Station:
         self._uneven = random.Random(0)  # noqa: S311 - spacing, not secrets
         self._armed: tuple[int, int] | None = None
         self.lapsed: DisarmReason | None = None
-        self._sample: Ping | None = None  # the latest
+        self._sample: ClockSample | None = None  # the latest
         self._host: HostWatch | None = None
         self._reference_ns = 0  # when to ask for the next pulse
         self._disk_must_not_matter = False
@@ -360,7 +359,7 @@ class Station:
                 raise
 
     def _note(self, record: Record) -> None:
-        if isinstance(record, Ping):
+        if isinstance(record, ClockSample):
             self.session.add_ping(record)
         elif isinstance(record, Pulse):
             self.session.add_pulse(record)

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
-from rig.link.edges import ALL_GATES, edges
+from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Received
 from rig.link.wiretypes import EVENTS
 from rig.session.schema import RunState

@@ -14,7 +14,7 @@ from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
 from rig.link.refusals import DeviceRefusedError
 
 if TYPE_CHECKING:
-    from rig.link.clock import Clock
+    from rig.clock.host import Clock
     from rig.link.messages import Identity
     from rig.link.port import Port
     from rig.records import Edge

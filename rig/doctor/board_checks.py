@@ -6,11 +6,11 @@ import cmath
 from math import tau
 from typing import TYPE_CHECKING
 
+from rig.clock.epochs import RESONATOR_TOLERANCE
+from rig.clock.rate import tick_rate
 from rig.doctor.findings import Finding
-from rig.link.epochs import RESONATOR_TOLERANCE
 from rig.link.gatewatch import listed
 from rig.link.messages import HOST_SILENCE_MS
-from rig.link.rate import tick_rate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rig.link.gatewatch import GateStates
     from rig.link.messages import Identity
-    from rig.records import Edge, Ping
+    from rig.records import ClockSample, Edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class BoardFacts:
 
     identity: Identity
     shipped: str
-    pings: tuple[Ping, ...]
+    pings: tuple[ClockSample, ...]
     held: tuple[int, int] | None
     states: GateStates
     edges: tuple[Edge, ...] | None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.boards import MEGA, UNO, Board
+from rig.boards import MEGA, UNO, Capabilities
 
 FIRMWARE = "chainrig"
 """What a firmware of this project begins its name with; its version follows."""
@@ -27,7 +27,7 @@ class Target:
         First address that belongs to the boot loader.
     """
 
-    board: Board
+    board: Capabilities
     part: str
     programmer: str
     baudrate: int

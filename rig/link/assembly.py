@@ -5,17 +5,19 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING
 
-from rig.link.edges import ALL_GATES, edges, ticks_since
+from rig.boards import GATES
 from rig.link.messages import EVENTS_PER_FRAME, unpack_label
 from rig.link.wiretypes import EVENTS
 from rig.records import Certificate, Drop, Edge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from rig.link.messages import DropCertificate, EventsFrame
 
+ALL_GATES = (1 << GATES) - 1
 _WRAP = 1 << 32
+_HALF = _WRAP // 2
 
 
 class Assembly:
@@ -191,3 +193,41 @@ class Assembly:
 def _account(seen: DropCertificate) -> Certificate:
     sense = ticks_since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
     return Certificate(seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
+
+
+def edges(
+    events: Iterable[tuple[int, int]], state: int, gates: int, fire_tick: int
+) -> list[tuple[int, int, bool]]:
+    """List the edges between snapshots.
+
+    Parameters
+    ----------
+    events
+        Tick (u32) and state of each snapshot, none missing.
+    state
+        Of the gates before the first one.
+    gates
+        Mask of the gates that count.
+    fire_tick
+        Tick of the release.
+
+    Returns
+    -------
+    list of (int, int, bool)
+        As `rig.records.Edge` has them; of one snapshot, by channel.
+    """
+    found: list[tuple[int, int, bool]] = []
+    for tick, now in events:
+        changed = (state ^ now) & gates
+        state = now
+        while changed:
+            lowest = changed & -changed
+            changed ^= lowest
+            since = (tick - fire_tick + _HALF) % _WRAP - _HALF
+            found.append((since, lowest.bit_length() - 1, now & lowest != 0))
+    return found
+
+
+def ticks_since(fire_tick: int, tick: int) -> int:
+    """Ticks from the fire stamp; negative before it."""
+    return (tick - fire_tick + _HALF) % _WRAP - _HALF

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.records import Scalar, Tail
-from rig.link.wiretypes import Chars, Raw
+from rig.link.wiretypes import Chars, Raw, Tail, Unsigned
 
 if TYPE_CHECKING:
     from enum import IntEnum
@@ -62,7 +61,7 @@ def _message(code: int, name: str, fields: tuple[Field, ...]) -> list[str]:
         if fixed:
             lines.append(_define(f"{prefix}_{_upper(field.name)}", offset))
         match field.wire:
-            case Scalar(size=size) | Raw(size=size):
+            case Unsigned(size=size) | Raw(size=size):
                 offset += size
             case Chars(limit=limit):
                 lines.append(_define(f"{prefix}_{_upper(field.name)}_LIMIT", limit))

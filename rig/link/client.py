@@ -11,13 +11,13 @@ from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received
-from rig.records import Ping
+from rig.records import ClockSample
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rig.clock.host import Clock
     from rig.link.assembly import Assembly
-    from rig.link.clock import Clock
     from rig.link.exchange import OnRecord, Tap
     from rig.link.port import Port
     from rig.link.transcript import Record, Transcript
@@ -63,13 +63,13 @@ class Device:
         tries: int = 8,
         give_way: Callable[[], None] = lambda: None,
     ) -> None:
-        self._samples: list[Ping] = []
+        self._samples: list[ClockSample] = []
         self._record_ms: dict[int, int] = {}  # of the last armed drop, by label
         self._disarmed: wire.DisarmReason | None = None  # by itself, since it was armed
 
         def know(record: Record) -> None:
             match record:
-                case Ping():
+                case ClockSample():
                     self._samples.append(record)
                 case Received(message=wire.Armed()):
                     self._disarmed = None
@@ -137,12 +137,12 @@ class Device:
             "port_waiting": line.waiting(),
         }
 
-    def ping(self) -> Ping | None:
+    def ping(self) -> ClockSample | None:
         """Take a clock sample.
 
         Returns
         -------
-        Ping or None
+        ClockSample or None
             `None` when the request had to be repeated: such a sample would be ambiguous.
         """
         self._samples.clear()

@@ -13,7 +13,7 @@ from rig.link.transcript import Received, Record, Transcript
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.clock import Clock
+    from rig.clock.host import Clock
     from rig.link.port import Port
     from rig.link.transcript import Direction
 

@@ -9,7 +9,7 @@ from rig.boards import GATES
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.clock import Clock
+    from rig.clock.host import Clock
 
 _LOOK_S = 0.0017  # in step with neither a USB frame nor the mains
 

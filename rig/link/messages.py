@@ -24,14 +24,14 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated, Any, TypeAlias
 
-from rig.boards import Board
+from rig.boards import Capabilities
 from rig.link.frames import PAYLOAD_LIMIT
-from rig.link.records import Event
 from rig.link.wiretypes import (
     BYTE_ENUM,
     U8,
     U16,
     U32,
+    Event,
     EventList,
     Field,
     Line,
@@ -239,10 +239,10 @@ class Identity:
     late_ticks: U16
     channels: Line
 
-    def as_board(self) -> Board:
+    def capabilities(self) -> Capabilities:
         """What this board can do, as it says itself."""
         pulse = self.max_pulse_us / 1e6
-        return Board(
+        return Capabilities(
             self.board, self.gates, self.releases, pulse, self.capacity, bool(self.streams)
         )
 

@@ -1,16 +1,18 @@
-"""Opening a port by name or URL (``/dev/ttyACM0``, ``sim://``, ``replay://``)."""
+"""Opening a port by name or URL: ``/dev/ttyACM0``, ``sim://``, ``socket://HOST:PORT``."""
 
 from __future__ import annotations
 
+import array
 import errno
+import os
+import socket
 import warnings
 from typing import Any, Protocol
 
 import serial
 
+from rig.clock.host import Clock, SystemClock
 from rig.errors import DeviceError, InputError, RigError
-from rig.link.clock import Clock, SystemClock
-from rig.link.network import NETWORK, REACH, NetworkPort, why_unreachable
 from rig.ports import check_name
 
 BAUDRATE = 500_000
@@ -31,6 +33,11 @@ _CAUSES = {
     errno.EBUSY: _TAKEN,
     errno.EAGAIN: _TAKEN,
 }
+_NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
+_REACH = (
+    "is the program that passes the port on running there, and does a firewall let it? "
+    "As a URL: socket://HOST:PORT"
+)
 
 
 class Port(Protocol):
@@ -88,8 +95,8 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
     except RigError:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
-        if _scheme(url) in NETWORK:
-            raise DeviceError(f"cannot open {url}: {why_unreachable(error)}", REACH) from error
+        if _scheme(url) in _NETWORK:
+            raise DeviceError(f"cannot open {url}: {_why_unreachable(error)}", _REACH) from error
         cause, hint = _CAUSES.get(error.errno or 0, (str(error), _LOOK))
         raise DeviceError(f"cannot open {url}: {cause}", hint) from error
     except ValueError as error:
@@ -143,3 +150,60 @@ def port_clock(port: object) -> Clock:
     """
     clock: Clock | None = getattr(port, "clock", None)
     return SystemClock() if clock is None else clock
+
+
+class NetworkPort:
+    """A ``socket://`` port that says how much has really arrived.
+
+    Pyserial's own says 1 when anything has: everything would be read byte by byte, each a record
+    of its own in the session.
+
+    Parameters
+    ----------
+    port
+        Pyserial's.
+    """
+
+    def __init__(self, port: Any) -> None:
+        self._port = port
+        self._socket = port._socket
+        self.read = port.read
+        self.write = port.write
+
+    def close(self) -> None:
+        """Hang up."""
+        self._port.close()
+        self._socket.close()  # pyserial forgets to, where the other end has hung up already
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+        if not self._port.in_waiting:  # also says when the port is closed
+            return 0
+        import fcntl  # noqa: PLC0415 - not on Windows
+        import termios  # noqa: PLC0415
+
+        count = array.array("i", [0])
+        fcntl.ioctl(self._port.fileno(), termios.FIONREAD, count)
+        return count[0]
+
+
+def _why_unreachable(error: OSError) -> str:
+    """Say in words why a connection could not be made.
+
+    Parameters
+    ----------
+    error
+        Pyserial's, which has the cause in its text and its context only.
+    """
+    cause = error.__context__
+    match cause:
+        case socket.gaierror():
+            return "there is no computer of that name"
+        case TimeoutError():
+            return "nobody answers"
+        case OSError(errno=errno.ECONNREFUSED):
+            return "nothing listens there"
+        case OSError(errno=int(number)) if number:
+            return os.strerror(number)
+    return str(error)

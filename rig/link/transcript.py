@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.frames import DELIMITER, Decoder, Frame
-from rig.records import Drop, Ping, Pulse
+from rig.records import ClockSample, Drop, Pulse
 
 if TYPE_CHECKING:
     from rig.link.messages import Identity, Message
@@ -31,7 +31,7 @@ class Received:
     message: Message
 
 
-Record: TypeAlias = Received | Ping | Pulse | Drop
+Record: TypeAlias = Received | ClockSample | Pulse | Drop
 
 
 class Transcript:
@@ -180,7 +180,7 @@ class Transcript:
             case wire.Identity():
                 self.identity = message
             case wire.Pong(tick=tick) if self._sample_sent and self._sample_sent[0] == frame.ack:
-                records.append(Ping(self._sample_sent[1], host_ns, tick))
+                records.append(ClockSample(self._sample_sent[1], host_ns, tick))
                 self._sample_sent = None
             case wire.ReferencePulse(count=count, tick=tick) if (
                 count and self._sample_sent and self._sample_sent[0] == frame.ack

@@ -4,20 +4,128 @@ from __future__ import annotations
 
 import struct
 import typing
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from itertools import takewhile
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, overload
 
 from rig.errors import DeviceError
-from rig.link.records import Event, Events, Scalar, Tail, layout
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import SupportsIndex
 
 
 class MessageError(DeviceError, ValueError):
     """A payload that does not fit its message, or a value that does not fit its field."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unsigned:
+    """An unsigned little-endian integer: its `struct` code and its C type."""
+
+    code: str
+    c_type: str
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return struct.calcsize("<" + self.code)
+
+
+def layout(scalars: Iterable[Unsigned]) -> struct.Struct:
+    """Put numbers behind each other, without padding."""
+    return struct.Struct("<" + "".join(scalar.code for scalar in scalars))
+
+
+class Event(NamedTuple):
+    """One snapshot: the device's tick (u32) and the gates' state after the change (1 = blocked)."""
+
+    tick: int
+    state: int
+
+
+@dataclass(frozen=True)
+class Tail:
+    """Events up to the end of the payload; only ever the last field."""
+
+    scalars: tuple[Unsigned, ...]
+
+    @cached_property
+    def layout(self) -> struct.Struct:
+        """One record as a `struct`."""
+        return layout(self.scalars)
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes of one record."""
+        return self.layout.size
+
+    def pack(self, events: Iterable[tuple[int, int]]) -> bytes:
+        """Write events.
+
+        Raises
+        ------
+        struct.error
+            When a value does not fit.
+        """
+        if isinstance(events, Events):
+            return events.raw
+        return b"".join([self.layout.pack(*event) for event in events])
+
+    def rows(self, events: Sequence[Event]) -> Iterable[tuple[int, int]]:
+        """Give ticks and states, which is much faster than single `Event`."""
+        return self.layout.iter_unpack(events.raw) if isinstance(events, Events) else events
+
+
+class Events(Sequence[Event]):
+    """Events that are read when somebody looks at them; a record is made of many and needs none.
+
+    Parameters
+    ----------
+    tail
+        How they are on the wire.
+    raw
+        Whole records.
+
+    Raises
+    ------
+    ValueError
+        The last record is cut short.
+    """
+
+    __slots__ = ("_tail", "raw")
+
+    def __init__(self, tail: Tail, raw: bytes) -> None:
+        if len(raw) % tail.size:
+            raise ValueError(f"the last of the {tail.size}-byte records is cut short")
+        self._tail = tail
+        self.raw = raw
+
+    def __len__(self) -> int:
+        return len(self.raw) // self._tail.size
+
+    def __iter__(self) -> Iterator[Event]:
+        return map(Event._make, self._tail.layout.iter_unpack(self.raw))
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> Event: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Event, ...]: ...
+    def __getitem__(self, index: Any) -> Any:
+        return tuple(self)[index]
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Events):
+            return self.raw == other.raw
+        return tuple(self) == other
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +142,12 @@ class Raw:
     size: int
 
 
-Wire: TypeAlias = Scalar | Chars | Raw | Tail
+Wire: TypeAlias = Unsigned | Chars | Raw | Tail
 
 
-_BYTE = Scalar("B", "uint8_t")
-_WORD = Scalar("H", "uint16_t")
-_LONG = Scalar("I", "uint32_t")
+_BYTE = Unsigned("B", "uint8_t")
+_WORD = Unsigned("H", "uint16_t")
+_LONG = Unsigned("I", "uint32_t")
 
 U8: TypeAlias = Annotated[int, _BYTE]
 U16: TypeAlias = Annotated[int, _WORD]
@@ -106,7 +214,7 @@ def write_field(field: Field, value: Any) -> bytes:
     """
     try:
         match field.wire:
-            case Scalar(code=code):
+            case Unsigned(code=code):
                 return struct.pack("<" + code, value)
             case Raw(size=size) if len(value) == size:
                 return bytes(value)
@@ -144,7 +252,7 @@ def read_field(field: Field, payload: bytes, at: int) -> tuple[Any, int]:
     """
     try:
         match field.wire:
-            case Scalar(code=code, size=size):
+            case Unsigned(code=code, size=size):
                 (number,) = struct.unpack_from("<" + code, payload, at)
                 return (field.python(number) if field.python is not int else number), at + size
             case Raw(size=size):
@@ -177,8 +285,8 @@ def payload_reader(fields: Sequence[Field]) -> Callable[[bytes], list[Any]]:
         From a payload to the fields' values; raises `MessageError` where `read_field` does, and
         when bytes are left over.
     """
-    scalars = [f.wire for f in takewhile(lambda f: isinstance(f.wire, Scalar), fields)]
-    head = layout([wire for wire in scalars if isinstance(wire, Scalar)])
+    scalars = [f.wire for f in takewhile(lambda f: isinstance(f.wire, Unsigned), fields)]
+    head = layout([wire for wire in scalars if isinstance(wire, Unsigned)])
     names = [(n, f.python) for n, f in enumerate(fields[: len(scalars)]) if f.python is not int]
     rest = fields[len(scalars) :]
 

@@ -15,7 +15,7 @@ from rig.protocol.scene import AT_REST, SIDES
 from rig.protocol.yamltree import load, place_of
 
 if TYPE_CHECKING:
-    from rig.boards import Board
+    from rig.boards import Capabilities
     from rig.protocol.scene import Protocol
 
 LEAST_RECORD_MS = 1500
@@ -96,7 +96,7 @@ def too_long(protocol: Protocol) -> Problem | None:
     return Problem(protocol.source, place.line, place.column, "drop", message)
 
 
-def lacking(protocol: Protocol, board: Board) -> list[Problem]:
+def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     """Say what a protocol wants of a board that it does not have, in the order of the file."""
     found = []
 
@@ -122,7 +122,7 @@ def lacking(protocol: Protocol, board: Board) -> list[Problem]:
     return sorted(found)
 
 
-def check_board(protocol: Protocol, board: Board) -> None:
+def check_board(protocol: Protocol, board: Capabilities) -> None:
     """Refuse a protocol that wants more than a board has.
 
     Raises

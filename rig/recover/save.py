@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from rig.errors import SessionError
 from rig.ports import is_simulated
-from rig.records import HostBreak, Ping, Pulse
+from rig.records import ClockSample, HostBreak, Pulse
 from rig.recover.examine import protocol_sound
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -92,7 +92,7 @@ def _simulated(rows: Rows) -> tuple[bool, list[str]]:
 
 
 def _clock(session: Session, rows: Rows) -> None:
-    session.add_pings(Ping(*cast("Any", row)[1:]) for _, row in sorted(rows.ping.items()))
+    session.add_pings(ClockSample(*cast("Any", row)[1:]) for _, row in sorted(rows.ping.items()))
     for _, row in sorted(rows.reference.items()):
         session.add_pulse(Pulse(*cast("Any", row)[1:]))
     for _, row in sorted(rows.host_break.items()):

@@ -1,7 +1,8 @@
 """Everything that is derived from a session file, and can be derived again at any time."""
 
-from rig.calibration import Calibration, calibration
+from rig.clock.calibration import Calibration
 from rig.results.whole import (
+    calibration,
     detailed,
     protocol_of,
     rejected,

@@ -17,7 +17,7 @@ from rig.analysis.gravity import free_gravity
 from rig.analysis.learn import FEWEST
 from rig.analysis.result import GOOD
 from rig.analysis.session import gather, overruled, sum_up
-from rig.calibration import Calibrator
+from rig.clock.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
 from rig.results.whole import protocol_of, rejected
@@ -28,10 +28,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from rig.analysis.drop import TimeScale
     from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult, Measured
-    from rig.calibration import Calibration
+    from rig.clock.calibration import Calibration, TimeScale
     from rig.protocol.scene import Protocol, Run
     from rig.records import Drop
     from rig.session.reading import Reader, StateEntry
@@ -142,7 +141,8 @@ class LiveAnalysis:
 
     def clock(self, session: Reader) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now."""
-        return self._calibrator.look(session)
+        protocol, _ = self._planned(session)
+        return self._calibrator.look(session, protocol.reference_u)
 
     def judge(self, session: Reader, drop: Drop) -> DropResult:
         """Find out what one drop says by itself, as `read` does, and keep nothing of it.

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
-from rig.calibration import calibration
+from rig.clock.calibration import Calibrator
 from rig.protocol import reader
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
-    from rig.calibration import Calibration
+    from rig.clock.calibration import Calibration
     from rig.protocol.scene import Protocol
     from rig.records import Drop
     from rig.session.reading import Reader
@@ -31,6 +31,11 @@ def protocol_of(session: Reader) -> Protocol:
         return protocol
     gates = tuple(gate for gate in protocol.gates.gates if gate.channel in had)
     return replace(protocol, gates=replace(protocol.gates, gates=gates))
+
+
+def calibration(session: Reader) -> Calibration:
+    """Calibrate a session's clock from everything it recorded."""
+    return Calibrator().look(session, protocol_of(session).reference_u)
 
 
 def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]:
@@ -85,7 +90,8 @@ def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysi
 def _analysed(
     session: Reader, protocol: Protocol, progress: Progress | None
 ) -> tuple[Analysis, Calibration, list[Drop]]:
-    clock, drops = calibration(session), list(session.drops())
+    clock = Calibrator().look(session, protocol.reference_u)
+    drops = list(session.drops())
     found = analyze(protocol, drops, clock.scale, rejected(session), progress)
     return found, clock, drops
 

@@ -17,7 +17,7 @@ from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.clock import Clock
+    from rig.clock.host import Clock
     from rig.link.gatewatch import GateStates
     from rig.link.port import Port
 

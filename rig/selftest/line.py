@@ -11,7 +11,7 @@ from rig.link.frames import Decoder, Frame, encode
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rig.link.clock import Clock
+    from rig.clock.host import Clock
     from rig.link.port import Port
 
 

@@ -14,7 +14,7 @@ from rig.selftest.verdicts import CheckFailedError, NotPossibleError, Outcome, V
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rig.link.clock import Clock
+    from rig.clock.host import Clock
     from rig.link.port import Port
     from rig.selftest.board import Options
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from statistics import median
 from typing import TYPE_CHECKING
 
+from rig.clock.epochs import RESONATOR_TOLERANCE
+from rig.clock.rate import tick_rate
 from rig.link import messages as wire
-from rig.link.epochs import RESONATOR_TOLERANCE
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, Reason
-from rig.link.rate import tick_rate
-from rig.records import Ping
+from rig.records import ClockSample
 from rig.selftest.verdicts import CheckFailedError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def round_trips(board: BoardUnderTest) -> str:
     for n in range(_PINGS):
         sent = board.clock.now_ns()
         pong = board.answer(wire.Ping(), wire.Pong)
-        pings.append(Ping(sent, board.clock.now_ns(), pong.tick))
+        pings.append(ClockSample(sent, board.clock.now_ns(), pong.tick))
         board.clock.sleep(0.013 + 0.0071 * (n % 5))
     trips = sorted((p.host_recv_ns - p.host_send_ns) * 1e-9 for p in pings)
     board.slowest_s = trips[-1]

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.errors import SessionError
-from rig.records import Certificate, Drop, Edge, HostBreak, Ping, Pulse
+from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.session.faults import translated
 from rig.session.schema import RunState
 
@@ -86,13 +86,13 @@ class Reader:
         for row in self._rows("SELECT host_ns, direction, data FROM bytes ORDER BY id"):
             yield ByteChunk(*row)
 
-    def pings(self, after: int = 0) -> list[Ping]:
+    def pings(self, after: int = 0) -> list[ClockSample]:
         """Clock samples in order, all but the first so many."""
         # Nothing is ever deleted, so rows are numbered from 1 without gaps.
         rows = self._rows(
             "SELECT host_send_ns, host_recv_ns, tick FROM ping WHERE id > ? ORDER BY id", after
         )
-        return [Ping(*row) for row in rows]
+        return [ClockSample(*row) for row in rows]
 
     def pulses(self) -> list[Pulse]:
         """All pulses of the 1 Hz reference that were asked for, in order."""

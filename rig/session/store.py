@@ -22,7 +22,7 @@ from rig.session.reading import Direction, Reader
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from rig.records import Drop, HostBreak, Ping, Pulse
+    from rig.records import ClockSample, Drop, HostBreak, Pulse
     from rig.session.schema import RunState
 
 
@@ -186,11 +186,11 @@ class Session(Reader):
             (host_ns, json.dumps(dict(identity))),
         )
 
-    def add_ping(self, ping: Ping) -> None:
+    def add_ping(self, ping: ClockSample) -> None:
         """Add one clock sample."""
         self.add_pings([ping])
 
-    def add_pings(self, pings: Iterable[Ping]) -> None:
+    def add_pings(self, pings: Iterable[ClockSample]) -> None:
         """Add clock samples, all or none."""
         self._add(
             "INSERT INTO ping (host_send_ns, host_recv_ns, tick) VALUES (?, ?, ?)",

@@ -9,12 +9,13 @@ import numpy as np
 
 from rig.analysis.align import align
 from rig.analysis.components import STATED, Components
-from rig.analysis.drop import TimeScale, analyze_drop
+from rig.analysis.drop import analyze_drop
 from rig.analysis.drop_model import DropModel
 from rig.analysis.pattern import Guess
 from rig.analysis.result import DropResult
 from rig.analysis.sides import guesses_of
 from rig.analysis.trains import Edges, Side, train
+from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
 from rig.model.chain import Chain
 from rig.protocol import reader

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.drop import TimeScale
 from rig.analysis.gravity import check_gravity, free_gravity
+from rig.clock.calibration import TimeScale
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import FENCE, HZ, SINGLE, UNIFORM, Case, case, first_run, with_dials

@@ -8,13 +8,14 @@ from itertools import pairwise
 
 import pytest
 
-from rig.calibration import Calibrator, calibration
+from rig.clock.calibration import Calibrator
+from rig.clock.host import HostClocks, HostWatch, SystemClock
 from rig.daemon.station import Station
 from rig.link import messages as wire
-from rig.link.clock import SystemClock
 from rig.link.frames import Decoder
-from rig.link.hostwatch import HostWatch, Reading
 from rig.protocol import reader
+from rig.protocol.scene import PPS_U
+from rig.results import calibration
 from rig.session.store import Session
 from tests.cli.test_replay import tamper
 
@@ -71,9 +72,9 @@ def test_looking_again_and_again_gives_what_looking_once_gives(measure, tmp_path
                 for pulse in pulses:
                     grows.add_pulse(pulse)
             if n % 5 == 0:
-                seen, afresh = calibrator.look(grows), calibration(grows)
+                seen, afresh = calibrator.look(grows, PPS_U), calibration(grows)
                 assert (seen.said, seen.device) == (afresh.said, afresh.device)
-        assert calibrator.look(grows).said == calibration(grows).said
+        assert calibrator.look(grows, PPS_U).said == calibration(grows).said
         assert len(pings) > 8
 
 
@@ -116,7 +117,7 @@ def test_a_drifting_clock_gives_each_run_its_own_rate(measure, tmp_path, fence):
     with Session.open(session, readonly=True) as opened:
         clock = calibration(opened)
         *_, last = drops = list(opened.drops())
-    fired = [clock.falls.when(drop) for drop in drops]
+    fired = [clock.fired.when(drop) for drop in drops]
     for run, when in zip(found["runs"], fired, strict=True):
         true = -1300.0 + 600.0 * when / 3600.0
         used = run["calibration"]
@@ -190,7 +191,7 @@ class Sleepy(SystemClock):
 
     def read(self):
         true = self.true.now_ns()
-        return Reading(true - self.slept_ns, true, 10**18 + true)
+        return HostClocks(true - self.slept_ns, true, 10**18 + true)
 
     def suspend(self, seconds):
         self.true.sleep(seconds)

@@ -165,6 +165,10 @@ def test_check_says_what_predict_notes(call, tmp_path):
     path.write_text(short("[0 deg, 20 deg, 40 deg]"), "utf-8")
     (note,) = [line for line in call("check", path).out.splitlines() if "°: " in line]
     assert note.startswith("  note: 0°, 20°: rods gather on a pile")
+    unlike = short("[0 deg]").replace("{like: A}", "{like: A, rods: 20}")
+    path.write_text(unlike, "utf-8")
+    assert "  note: 0° A, 0° B: rods gather on a pile" in call("check", path).out
+    path.write_text(short("[0 deg, 20 deg, 40 deg]"), "utf-8")
     noted = {one.partition(": ")[2] for one in call("predict", path).out.splitlines()[4:]}
     assert noted == {note.partition("°: ")[2]}
 

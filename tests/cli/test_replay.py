@@ -30,8 +30,9 @@ def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, m
     connect = Station.connect
 
     def wired(station, port):
-        connect(station, port)
+        identity = connect(station, port)
         station._port.board.sense(0.0125)
+        return identity
 
     monkeypatch.setattr(Station, "connect", wired)
     assert call("run", fence, "--port", "sim://", "--session", tmp_path / "s").code == 0

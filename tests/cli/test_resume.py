@@ -13,7 +13,6 @@ from itertools import count
 
 import pytest
 
-from rig.calibration import calibration
 from rig.daemon.interrupts import Interrupts
 from rig.daemon.station import Station
 from rig.errors import DeviceError, SessionError
@@ -22,7 +21,7 @@ from rig.link.port import open_port
 from rig.ports import completed
 from rig.protocol import reader
 from rig.replay import replay
-from rig.results import results
+from rig.results import calibration, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import (

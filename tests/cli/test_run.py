@@ -12,7 +12,7 @@ import pytest
 from serial import SerialException
 
 from rig.commands import analyze
-from rig.records import Ping
+from rig.records import ClockSample
 from rig.replay import replay
 from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
@@ -421,7 +421,7 @@ def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
     def slowly(opened, progress):
         found = compute(opened, progress)
         with Session.open(session) as writer:
-            writer.add_ping(Ping(1, 2, 3))
+            writer.add_ping(ClockSample(1, 2, 3))
             writer.put_results([], "a later one")
         return found
 

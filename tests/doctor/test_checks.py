@@ -11,7 +11,7 @@ from rig.doctor import board_checks, file_checks, port_checks
 from rig.doctor.board_checks import mains_ripple
 from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFacts
 from rig.link.gatewatch import GateStates
-from rig.records import Edge, Ping
+from rig.records import ClockSample, Edge
 from sim.board import VirtualBoard
 from tests.link.bench import ScriptedLab
 
@@ -22,7 +22,9 @@ HZ = 16_000_000
 def pings(ppm=0.0, trip_ns=1_000_000, count=30):
     tick_ns = 1e9 / (HZ * (1 + ppm * 1e-6))
     starts = [50_000_000 * n + 7_000_000 * (n % 5) for n in range(count)]
-    return tuple(Ping(at, at + trip_ns, round((at + trip_ns / 2) / tick_ns)) for at in starts)
+    return tuple(
+        ClockSample(at, at + trip_ns, round((at + trip_ns / 2) / tick_ns)) for at in starts
+    )
 
 
 BOARD = BoardFacts(

@@ -14,13 +14,13 @@ import pytest
 
 import rig.boards
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.clock.rate import tick_rate
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
-from rig.link.rate import tick_rate
 from rig_emulator import pty
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make
@@ -181,7 +181,7 @@ def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
 @pytest.mark.parametrize("word", rig.boards.BOARDS)
 def test_the_table_of_boards_says_what_the_firmware_says(word):
     port = open_port(url(board=word))
-    assert Device(port, port_clock(port)).connect().as_board() == rig.boards.BOARDS[word]
+    assert Device(port, port_clock(port)).connect().capabilities() == rig.boards.BOARDS[word]
 
 
 def test_every_board_of_the_table_can_be_emulated():

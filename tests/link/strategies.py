@@ -5,17 +5,16 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.records import Event, Scalar, Tail
-from rig.link.wiretypes import Chars, Raw
+from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 
 
 def values(field) -> st.SearchStrategy:
     match field.wire:
-        case Scalar() if field.python is not int:
+        case Unsigned() if field.python is not int:
             return st.sampled_from(list(field.python))
-        case Scalar(size=size):
+        case Unsigned(size=size):
             return st.integers(0, 2 ** (8 * size) - 1)
         case Raw(size=size):
             return st.binary(min_size=size, max_size=size)

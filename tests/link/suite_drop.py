@@ -6,9 +6,9 @@ import zlib
 
 import pytest
 
+from rig.clock.rate import tick_rate
 from rig.link import messages as wire
 from rig.link.messages import Phase, Reason, pack_label
-from rig.link.rate import tick_rate
 from tests.link.bench import GATES, LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm, order

@@ -11,7 +11,7 @@ from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.link.transcript import Transcript
-from rig.records import Drop, Edge, Ping
+from rig.records import ClockSample, Drop, Edge
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import LossyPort, NoisyPort, Wire, arm, order
@@ -138,6 +138,6 @@ class LineSuite(Suite):
         records = [record for chunk in chunks for record in offline.feed(*chunk)]
         assert records == live
         assert [r for r in records if isinstance(r, Drop)] == [pending]
-        assert any(isinstance(r, Ping) for r in records)
+        assert any(isinstance(r, ClockSample) for r in records)
         assert isinstance(pending.edges[0], Edge)
         assert offline.unfinished() == []

@@ -12,15 +12,15 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.clock.host import SystemClock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.clock import SystemClock
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received, Transcript
-from rig.records import Drop, Ping
+from rig.records import ClockSample, Drop
 from tests.link.strategies import MESSAGES
 
 SMALL = st.integers(0, 3)
@@ -143,7 +143,7 @@ def test_the_tap_comes_before_everything(clock):
         seen.append((direction, host_ns, data))
 
     ping = Device(port, clock, tap).ping()
-    assert ping == Ping(seen[0][1], seen[-1][1], 5)
+    assert ping == ClockSample(seen[0][1], seen[-1][1], 5)
     assert b"".join(data for direction, _, data in seen if direction == "tx") == port.written[0]
 
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from rig import boards
 from rig.link import messages as wire
 from rig.link.frames import PAYLOAD_LIMIT
-from rig.link.records import Event, Tail
 from rig.link.refusals import ADVICE, DeviceRefusedError
+from rig.link.wiretypes import Event, Tail
 from tests.link.strategies import MESSAGES
 
 

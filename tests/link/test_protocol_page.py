@@ -12,9 +12,8 @@ from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import BAUDRATE
-from rig.link.records import Event, Scalar, Tail
 from rig.link.transcript import Transcript
-from rig.link.wiretypes import Chars, Raw
+from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
 from rig.records import Drop
 
 PAGE = (Path(__file__).parents[2] / "firmware/PROTOCOL.md").read_text("utf-8")
@@ -61,7 +60,7 @@ def expected_rows(kind: type) -> list[list[str]]:
     for field in wire.FIELDS[kind]:
         size = None
         match field.wire:
-            case Scalar(size=size):
+            case Unsigned(size=size):
                 name = f"u{8 * size}"
             case Raw(size=size):
                 name = f"{size} bytes"

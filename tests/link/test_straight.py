@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.frames import PAYLOAD_LIMIT, FrameError, cobs_decode
-from rig.link.records import Event, Events
-from rig.link.wiretypes import EVENTS, read_field
+from rig.link.wiretypes import EVENTS, Event, Events, read_field
 from tests.examples import examples
 from tests.link.strategies import LONG, MESSAGES
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rig.errors import InputError
-from rig.records import Drop, Edge, Ping
+from rig.records import ClockSample, Drop, Edge
 from rig.session.edges_csv import read_edges
 from rig.session.export import export_csv, flatten
 from rig.session.schema import RunState
@@ -40,7 +40,7 @@ def session(tmp_path: Path):
         session.add_drop(Drop(run=1, attempt=1, tick_hz=1000, edges=()))
         session.add_drop(Drop(run=1, attempt=2, tick_hz=1000, edges=edges, fire_tick=5))
         session.add_state(1, 1, RunState.VOID, 10, ["lost edges", "twice"])
-        session.add_ping(Ping(1, 2, 3))
+        session.add_ping(ClockSample(1, 2, 3))
         yield session
 
 

@@ -14,7 +14,7 @@ import pytest
 
 import rig
 from rig.errors import SessionError
-from rig.records import Certificate, Drop, Edge, HostBreak, Ping, Pulse
+from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 from rig.session.store import Session
 from tests.waiting import PATIENCE_S
@@ -58,7 +58,7 @@ def fill(session: Session) -> None:
     session.log_bytes("tx", 1, b"\x00\xff")
     session.log_bytes("rx", 2, b"")
     session.add_identity({"serial": "A1", "tick_hz": 2_000_000}, 3)
-    session.add_pings([Ping(1, 2, 3), Ping(4, 5, 2**32 - 1)])
+    session.add_pings([ClockSample(1, 2, 3), ClockSample(4, 5, 2**32 - 1)])
     session.add_pulse(PULSE)
     session.add_host_break(BREAK)
     session.add_drop(DEVICE_DROP, host_ns=99, provenance="device")
@@ -95,7 +95,7 @@ def test_everything_comes_back_as_it_went_in(path: Path) -> None:
             (2, "rx", b""),
         ]
         assert session.identities() == [(3, {"serial": "A1", "tick_hz": 2_000_000})]
-        assert session.pings() == [Ping(1, 2, 3), Ping(4, 5, 2**32 - 1)]
+        assert session.pings() == [ClockSample(1, 2, 3), ClockSample(4, 5, 2**32 - 1)]
         assert session.pulses() == [PULSE]
         assert session.host_breaks() == [BREAK]
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]

@@ -10,12 +10,12 @@ from urllib.parse import quote
 
 import pytest
 
+from rig.clock.rate import tick_rate
 from rig.errors import InputError
 from rig.link.client import Device
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
-from rig.link.rate import tick_rate
-from rig.records import Drop, Ping
+from rig.records import ClockSample, Drop
 from sim.protocol_sim import Serial
 from tests.sim.falls import PROTOCOLS
 
@@ -37,7 +37,7 @@ class Talk:
 
     chunks: list[tuple] = field(default_factory=list)
     drops: list[Drop] = field(default_factory=list)
-    pings: list[Ping] = field(default_factory=list)
+    pings: list[ClockSample] = field(default_factory=list)
 
 
 def talk(where: str, gates: int = 0b11, runs=((1, 1),), pings: int = 3) -> Talk:

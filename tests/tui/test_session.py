@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from rig.campaign.machine import Stage
+from rig.predictions import notes
 from rig.session.schema import RunState
 from rig.session.store import Session
+from rig.tui.screens import protocol as screen
 from tests.cli.lab import assert_whole, log_of, short
 from tests.tui.lab import run
 from tests.tui.screen import text_of
@@ -31,6 +33,22 @@ def test_a_whole_session_takes_two_keys_a_run(lab):
 
     run(work())
     assert_whole(lab.session, 4)
+
+
+def test_a_chosen_protocol_is_described_once_with_what_the_model_notes(lab, monkeypatch):
+    lab.protocol.write_text(short("[0 deg, 40 deg]"), "utf-8")
+    asked = []
+    monkeypatch.setattr(screen, "notes", lambda protocol: asked.append(protocol) or notes(protocol))
+
+    async def work():
+        async with lab.operator(size=(100, 50)) as op:
+            await op.at(Stage.PROTOCOL)
+            await op.sees("note: 0°: rods gather on a pile", "recorded for 1.5 s")
+            for _ in range(3):
+                op.app.draw()
+
+    run(work())
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize("key", ["f9", "escape", "k"])

@@ -46,6 +46,7 @@ class ProtocolPage(Page):
         self._read: tuple[Path, int] | None = None
         self._protocol: Protocol | None = None
         self._problem = ""
+        self._described: tuple[Protocol, Content] | None = None
 
     def compose(self) -> ComposeResult:
         with Horizontal():
@@ -79,7 +80,7 @@ class ProtocolPage(Page):
         self.query_one("#files", Words).display = not running
         if running:
             assert model.protocol is not None
-            self.query_one("#scene", Words).say_content(_described(model.protocol))
+            self.query_one("#scene", Words).say_content(self._description(model.protocol))
             return
         self._look()
         rows = []
@@ -99,8 +100,14 @@ class ProtocolPage(Page):
         session = plain(self.session) if self.session else ""
         into = Content.assemble(("→ ", "$primary"), f"session file: {session}\n\n")
         self.query_one("#scene", Words).say_content(
-            Content.assemble(into if session else "", _described(self._protocol))
+            Content.assemble(into if session else "", self._description(self._protocol))
         )
+
+    def _description(self, protocol: Protocol) -> Content:
+        """Describe a protocol, once: this is drawn many times a second, and predicts."""
+        if self._described is None or self._described[0] is not protocol:
+            self._described = protocol, _described(protocol)
+        return self._described[1]
 
     def _look(self) -> None:
         """Read the chosen file again when it changed: it may be open in an editor beside this."""

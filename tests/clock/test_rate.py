@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from rig.link.rate import tick_rate
-from rig.records import Ping
+from rig.clock.rate import tick_rate
+from rig.records import ClockSample
+from tests.clock.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
 from tests.examples import examples
-from tests.link.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
 
 TRIALS = 300
 FEWEST = int(binom.ppf(0.001, TRIALS, 0.95))  # of intervals that hold 95 %
@@ -71,7 +71,7 @@ def test_a_straight_line_is_numpys_and_scipys():
     at = np.sort(np.random.default_rng(5).uniform(0.0, 60.0, 80))
     noise = np.random.default_rng(6).uniform(-2e-4, 2e-4, 80)
     pings = [
-        Ping(round(t * 1e9), round(t * 1e9) + 1_000_000, board.tick(t + 5e-4 + e))
+        ClockSample(round(t * 1e9), round(t * 1e9) + 1_000_000, board.tick(t + 5e-4 + e))
         for t, e in zip(at, noise, strict=True)
     ]
     middles = np.array([(p.host_send_ns + p.host_recv_ns) / 2e9 for p in pings])
@@ -121,7 +121,7 @@ RATE = tick_rate(SAMPLES, HZ)
 def test_neither_hour_nor_count_nor_order_matters(shift, offset, order):
     """Host clocks begin anywhere, counters too, and a file may be sorted as it likes."""
     moved = [
-        Ping(p.host_send_ns + shift, p.host_recv_ns + shift, (p.tick + offset) % 2**32)
+        ClockSample(p.host_send_ns + shift, p.host_recv_ns + shift, (p.tick + offset) % 2**32)
         for p in SAMPLES
     ]
     order.shuffle(moved)

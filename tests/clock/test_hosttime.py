@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from rig.link.epochs import epochs
-from rig.link.hosttime import one_axis
-from rig.link.hostwatch import TOLERANCE_NS, HostWatch, Reading, read_clocks
-from rig.link.rate import ping_rate
-from rig.link.samples import SEND, samples
+from rig.clock.epochs import epochs
+from rig.clock.host import TOLERANCE_NS, HostClocks, HostWatch, read_clocks
+from rig.clock.rate import ping_rate
+from rig.clock.samples import SEND, one_axis, samples
 from rig.records import HostBreak
-from tests.link.clocks import HZ, Clock, compared, ppm
+from tests.clock.clocks import HZ, Clock, compared, ppm
 
 S = 10**9
 
@@ -69,7 +68,7 @@ class Clocks:
     """Clocks of a host that are moved by hand."""
 
     def __init__(self, boottime=True):
-        self.now = Reading(5 * S, 7 * S if boottime else None, 10**18)
+        self.now = HostClocks(5 * S, 7 * S if boottime else None, 10**18)
 
     def __call__(self):
         return self.now
@@ -77,7 +76,7 @@ class Clocks:
     def go(self, awake=0.0, slept=0.0, stepped=0.0):
         mono, boot, wall = self.now
         both = round((awake + slept) * S)
-        self.now = Reading(
+        self.now = HostClocks(
             mono + round(awake * S),
             None if boot is None else boot + both,
             wall + both + round(stepped * S),

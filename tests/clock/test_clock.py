@@ -5,15 +5,15 @@ import statistics
 
 import pytest
 
-from rig.link.clock import SystemClock
-from rig.link.rate import tick_rate
-from rig.records import Ping
+from rig.clock.host import SystemClock
+from rig.clock.rate import tick_rate
+from rig.records import ClockSample
 
 HZ = 16_000_000
 BASE_S = 0.4e-3
 
 
-def pings(rng, times, ppm, *, jitter=1e-3, offset=None, start=0.0) -> list[Ping]:
+def pings(rng, times, ppm, *, jitter=1e-3, offset=None, start=0.0) -> list[ClockSample]:
     hz = HZ * (1 + ppm * 1e-6)
     offset = rng.randrange(2**32) if offset is None else offset
     found = []
@@ -21,7 +21,7 @@ def pings(rng, times, ppm, *, jitter=1e-3, offset=None, start=0.0) -> list[Ping]
         late = [rng.expovariate(1 / jitter) if jitter else 0.0 for _ in range(2)]
         tick = offset + (t - start + late[0] * 0.3 + BASE_S / 2) * hz
         done = t + BASE_S + late[0] * 0.3 + late[1]
-        found.append(Ping(round(t * 1e9), round(done * 1e9), int(tick) % 2**32))
+        found.append(ClockSample(round(t * 1e9), round(done * 1e9), int(tick) % 2**32))
     return found
 
 

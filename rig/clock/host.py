@@ -1,9 +1,9 @@
-"""Whether the host's clocks go on as one: sleep and set clocks, noticed by comparing them."""
+"""The host's clock, which can be replaced, and whether the host's clocks go on as one."""
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from rig.records import HostBreak
 
@@ -17,7 +17,31 @@ _TRIES = 5
 _BOOTTIME: int | None = getattr(time, "CLOCK_BOOTTIME", None)
 
 
-class Reading(NamedTuple):
+class Clock(Protocol):
+    """Where time comes from; a simulated port brings its own."""
+
+    def now_ns(self) -> int:
+        """Monotonic host time."""
+        ...
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        ...
+
+
+class SystemClock:
+    """The computer's monotonic clock."""
+
+    def now_ns(self) -> int:
+        """Monotonic host time."""
+        return time.monotonic_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        time.sleep(seconds)
+
+
+class HostClocks(NamedTuple):
     """The host's clocks at one moment, ns.
 
     Attributes
@@ -35,16 +59,16 @@ class Reading(NamedTuple):
     wall: int
 
 
-def read_clocks() -> Reading:
+def read_clocks() -> HostClocks:
     """Read them as close together as the system allows."""
-    best: tuple[int, Reading] | None = None
+    best: tuple[int, HostClocks] | None = None
     for _ in range(_TRIES):
         before = time.monotonic_ns()
         boottime = None if _BOOTTIME is None else time.clock_gettime_ns(_BOOTTIME)
         wall = time.time_ns()
         took = time.monotonic_ns() - before
         if best is None or took < best[0]:
-            best = took, Reading(before + took // 2, boottime, wall)
+            best = took, HostClocks(before + took // 2, boottime, wall)
         if took < _QUICK_NS:
             break
     assert best is not None
@@ -65,7 +89,7 @@ class HostWatch:
         Where the clocks are read.
     """
 
-    def __init__(self, read: Callable[[], Reading] = read_clocks) -> None:
+    def __init__(self, read: Callable[[], HostClocks] = read_clocks) -> None:
         self._read = read
         self._last = read()
 

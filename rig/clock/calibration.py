@@ -4,30 +4,45 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from rig.analysis.drop import TimeScale
-from rig.link.epochs import RESONATOR_TOLERANCE, Epochs, epochs
-from rig.link.hosttime import HostTime, one_axis
-from rig.link.rate import ping_rate, pulse_rate
-from rig.link.samples import samples
-from rig.protocol import reader
+from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
+from rig.clock.rate import ping_rate, pulse_rate
+from rig.clock.samples import HostTime, one_axis, samples
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from rig.link.rate import TickRate
-    from rig.link.samples import Samples
-    from rig.records import Drop
-    from rig.session.reading import Reader
+    from rig.clock.rate import TickRate
+    from rig.clock.samples import Samples
+    from rig.records import ClockSample, Drop, HostBreak, Pulse
 
 HOST_U = 50e-6 / sqrt(3)
 """Of a computer's clock, relative: ±50 ppm for its quartz with temperature and age; a steered one
 (NTP) is better, but nothing here knows. Virtual time is exact."""
 _UNKNOWN = RESONATOR_TOLERANCE / sqrt(3)
 _FIRED_S = 1.0  # FIRED is logged before the request leaves; the device waits 0.25 s at most
+
+
+class TimeScale(NamedTuple):
+    """Seconds from ticks: the rate in Hz and its relative standard uncertainty."""
+
+    hz: float
+    u: float
+
+
+class ClockLog(Protocol):
+    """What a session has of clocks; `rig.session.reading.Reader` says what each of these is."""
+
+    @property
+    def simulated(self) -> bool: ...  # noqa: D102
+    def identities(self) -> Sequence[tuple[int, Mapping[str, Any]]]: ...  # noqa: D102
+    def pings(self, after: int = 0) -> Sequence[ClockSample]: ...  # noqa: D102
+    def pulses(self) -> Sequence[Pulse]: ...  # noqa: D102
+    def host_breaks(self) -> Sequence[HostBreak]: ...  # noqa: D102
+    def fired_ns(self) -> Mapping[tuple[int, int], int]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +81,8 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Falls:
-    """When drops fell.
+class FireTimes:
+    """When drops were fired.
 
     Attributes
     ----------
@@ -117,8 +132,8 @@ class Calibration:
         Relative standard uncertainty of the time scale of imported edges.
     sources
         Clocks the board was compared with, the best one first.
-    falls
-        When drops fell.
+    fired
+        When drops were fired.
     """
 
     device: TimeScale | None
@@ -127,7 +142,7 @@ class Calibration:
     said: dict[str, Any]
     timer_u: float = _UNKNOWN
     sources: tuple[Source, ...] = ()
-    falls: Falls | None = None
+    fired: FireTimes | None = None
 
     def scale(self, drop: Drop) -> TimeScale:
         """Time scale of one drop; edges from another timer keep that timer's."""
@@ -143,7 +158,7 @@ class Calibration:
             return "stated", TimeScale(drop.tick_hz, self.timer_u)
         if not self.sources:
             return "stated", self.device
-        when = self.falls.when(drop) if self.falls else None
+        when = self.fired.when(drop) if self.fired else None
         choice = [
             (source.name, source.sometime() if when is None else source.at(when))
             for source in self.sources
@@ -157,25 +172,22 @@ class Calibrator:
     def __init__(self) -> None:
         self._pings = samples(())
 
-    def look(self, session: Reader) -> Calibration:
+    def look(self, session: ClockLog, reference_u: float) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now.
 
         Parameters
         ----------
         session
             Always the same one, however it was opened.
+        reference_u
+            Relative standard uncertainty of the 1 Hz reference, as the protocol has it.
         """
         more = samples(session.pings(after=len(self._pings)))
         self._pings = np.concatenate([self._pings, more])
-        return _calibration(session, self._pings)
+        return _calibration(session, self._pings, reference_u)
 
 
-def calibration(session: Reader) -> Calibration:
-    """Calibrate a session's clock from everything it recorded."""
-    return Calibrator().look(session)
-
-
-def _calibration(session: Reader, pings: Samples) -> Calibration:
+def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calibration:
     identities = session.identities()
     nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
     u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
@@ -190,9 +202,6 @@ def _calibration(session: Reader, pings: Samples) -> Calibration:
     by_host = Source("pings", ping_rate(found), 0.0 if session.simulated else HOST_U)
     sources = [by_host] if by_host.rate.n else []
     if pulses := session.pulses():
-        reference_u = reader.parse(
-            session.protocol_text, session.protocol_source, kept=True
-        ).reference_u
         shifted = [
             pulse._replace(
                 host_send_ns=pulse.host_send_ns + shift, host_recv_ns=pulse.host_recv_ns + shift
@@ -227,7 +236,7 @@ def _calibration(session: Reader, pings: Samples) -> Calibration:
         said,
         u,
         tuple(sources),
-        Falls(found, scale.hz, axis, session.fired_ns()),
+        FireTimes(found, scale.hz, axis, session.fired_ns()),
     )
 
 

@@ -1,21 +1,38 @@
-"""One axis of host time for a session, over sleep and restarts of the host."""
+"""Clock samples as columns of integers, on one axis of host time over its sleep and restarts.
+
+A night has a hundred thousand of them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
-
-from rig.link.samples import RECV, SEND, samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from rig.link.samples import Samples
-    from rig.records import HostBreak, Ping
+    from numpy.typing import NDArray
 
+    from rig.records import ClockSample, HostBreak
+
+Samples: TypeAlias = "NDArray[np.int64]"
+"""Shape (n, 3): `rig.records.ClockSample`'s host time before and after, ns, and tick."""
+SEND, RECV, TICK = range(3)
 _APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
+
+
+def samples(pings: Iterable[ClockSample] | Samples) -> Samples:
+    """Turn clock samples into columns; columns stay what they are."""
+    rows = pings if isinstance(pings, np.ndarray) else list(pings)
+    return np.asarray(rows, np.int64).reshape(-1, 3)
+
+
+def middles_ns(given: Samples) -> NDArray[np.int64]:
+    """Host time in the middle of each round trip."""
+    middle: NDArray[np.int64] = (given[:, SEND] + given[:, RECV]) // 2
+    return middle
 
 
 class Stretch(NamedTuple):
@@ -53,7 +70,7 @@ class HostTime:
 
 
 def one_axis(
-    pings: Iterable[Ping] | Samples,
+    pings: Iterable[ClockSample] | Samples,
     boots_ns: Sequence[int] = (),
     breaks: Sequence[HostBreak] = (),
 ) -> HostTime:

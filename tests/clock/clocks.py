@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rig.records import Ping, Pulse
+from rig.records import ClockSample, Pulse
 
 HZ = 16_000_000
 TRIP_S = 0.4e-3
@@ -63,7 +63,7 @@ class Clock:
 
 def compared(
     clock: Clock, seed: int, span: float, every: float = 0.4, delay: Delay | None = None, begin=0.0
-) -> list[Ping]:
+) -> list[ClockSample]:
     """Pings at uneven distances, delayed on both ways."""
     rng = random.Random(seed)
     wait = delay or exponential()
@@ -71,7 +71,7 @@ def compared(
     while at < begin + span:
         there = at + TRIP_S / 2 + wait(rng) * 0.3
         back = there + TRIP_S / 2 + wait(rng)
-        found.append(Ping(round(at * 1e9), round(back * 1e9), clock.tick(there)))
+        found.append(ClockSample(round(at * 1e9), round(back * 1e9), clock.tick(there)))
         at += every * rng.uniform(0.5, 1.5)
     return found
 

@@ -7,12 +7,11 @@ from bisect import bisect_left
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.link.epochs import epochs
-from rig.link.hosttime import one_axis
-from rig.link.samples import samples
-from rig.records import HostBreak, Ping
+from rig.clock.epochs import epochs
+from rig.clock.samples import one_axis, samples
+from rig.records import ClockSample, HostBreak
+from tests.clock.clocks import HZ
 from tests.examples import examples
-from tests.link.clocks import HZ
 
 WRAP = 2**32
 S = 10**9
@@ -33,7 +32,9 @@ def conversations(draw):
         if draw(st.integers(0, 7)) == 0:
             count = draw(st.integers(0, WRAP - 1))
         trip_ns = draw(st.integers(0, 3_000_000))
-        pings.append(Ping(now_ns, now_ns + trip_ns, (count + trip_ns * HZ // (2 * S)) % WRAP))
+        pings.append(
+            ClockSample(now_ns, now_ns + trip_ns, (count + trip_ns * HZ // (2 * S)) % WRAP)
+        )
     moments = [p.host_send_ns + d for p in pings for d in (-1, 0, S)] or [0]
     chosen = st.lists(st.sampled_from(moments), max_size=4)
     breaks = [HostBreak(at, draw(st.integers(0, 9 * S)), 0) for at in draw(chosen)]
@@ -81,7 +82,7 @@ def axis_one_by_one(pings, breaks):
                     shift += one.slept_ns
                     lives[-1].append((one.host_ns, shift))
         before_ns = ping.host_recv_ns
-        found.append(Ping(ping.host_send_ns + shift, before_ns + shift, ping.tick))
+        found.append(ClockSample(ping.host_send_ns + shift, before_ns + shift, ping.tick))
     return found, lives
 
 
@@ -89,7 +90,9 @@ def axis_one_by_one(pings, breaks):
 @given(conversations())
 def test_epochs_are_those_of_one_sample_after_the_other(drawn):
     pings, cuts, _ = drawn
-    found = [[Ping(*row) for row in piece.tolist()] for piece in epochs(pings, HZ, cuts).pings]
+    found = [
+        [ClockSample(*row) for row in piece.tolist()] for piece in epochs(pings, HZ, cuts).pings
+    ]
     assert found == epochs_one_by_one(pings, cuts)
 
 
@@ -100,6 +103,6 @@ def test_the_axis_is_that_of_one_sample_after_the_other(drawn):
     given_samples = samples(pings)
     axis = one_axis(given_samples, boots, breaks)
     found, lives = axis_one_by_one(pings, breaks)
-    assert [Ping(*row) for row in axis.pings.tolist()] == found
+    assert [ClockSample(*row) for row in axis.pings.tolist()] == found
     assert [[tuple(stretch) for stretch in life] for life in axis.lives] == lives
     assert (given_samples == samples(pings)).all(), "what was given stays as it is"

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.link.epochs import epochs
-from rig.link.samples import TICK
-from rig.records import Ping
+from rig.clock.epochs import epochs
+from rig.clock.samples import TICK
+from rig.records import ClockSample
+from tests.clock.clocks import HZ, Clock, compared
 from tests.examples import examples
-from tests.link.clocks import HZ, Clock, compared
 
 WRAP_S = 2**32 / HZ
 
 
-def at(tick: int, seconds: float) -> Ping:
-    return Ping(round(seconds * 1e9), round(seconds * 1e9) + 800_000, tick % 2**32)
+def at(tick: int, seconds: float) -> ClockSample:
+    return ClockSample(round(seconds * 1e9), round(seconds * 1e9) + 800_000, tick % 2**32)
 
 
 def test_two_hours_are_27_wraps_and_no_epoch():

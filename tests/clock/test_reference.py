@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from rig.clock.epochs import epochs
+from rig.clock.rate import ping_rate, pulse_rate
 from rig.link import messages as wire
-from rig.link.epochs import epochs
 from rig.link.frames import Frame, encode
-from rig.link.rate import ping_rate, pulse_rate
 from rig.link.transcript import Transcript
-from rig.records import Ping, Pulse
-from tests.link.clocks import HZ, Clock, compared, ppm, seconds
+from rig.records import ClockSample, Pulse
+from tests.clock.clocks import HZ, Clock, compared, ppm, seconds
 
 
 def measured(clock, pulses, pings=None):
@@ -98,7 +98,7 @@ def talk(*parts):
         numbers = (seq, 0) if direction == "tx" else (n + 1, seq)
         frame = Frame(code, *numbers, payload)
         records = transcript.feed(direction, 1000 * n, encode(frame))
-        found += [record for record in records if isinstance(record, Ping | Pulse)]
+        found += [record for record in records if isinstance(record, ClockSample | Pulse)]
     return found
 
 
@@ -110,4 +110,4 @@ def test_pulses_come_out_of_the_bytes_and_repeats_do_not():
     assert talk(("tx", ask, True), ("rx", wire.ReferencePulse(0, 0), True)) == []
     ping, pong = wire.Ping(), wire.Pong(77)
     both = talk(("tx", ping, True), ("rx", pong, True), ("tx", ask, True), ("rx", answer, True))
-    assert both == [Ping(0, 1000, 77), Pulse(2000, 3000, 12, 6_500_000)]
+    assert both == [ClockSample(0, 1000, 77), Pulse(2000, 3000, 12, 6_500_000)]

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.link.epochs import RESONATOR_TOLERANCE, epochs
-from rig.link.samples import RECV, SEND, TICK
-from rig.link.wander import Readings, Track
+from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
+from rig.clock.samples import RECV, SEND, TICK
+from rig.clock.wander import Readings, Track
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.link.epochs import Epochs
-    from rig.link.samples import Samples
-    from rig.records import Ping, Pulse
+    from rig.clock.epochs import Epochs
+    from rig.clock.samples import Samples
+    from rig.records import ClockSample, Pulse
 
     Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ class TickRate:
 
 
 def tick_rate(
-    pings: Iterable[Ping] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
+    pings: Iterable[ClockSample] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
 ) -> TickRate:
     """Measure the device's tick rate from clock samples in any order, see `ping_rate`.
 
@@ -89,7 +89,7 @@ def tick_rate(
     nominal_hz
         What the device says its rate is.
     cuts_ns
-        See `rig.link.epochs.epochs`.
+        See `rig.clock.epochs.epochs`.
     """
     return ping_rate(epochs(pings, nominal_hz, cuts_ns))
 

@@ -6,9 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from rig.link.rate import tick_rate
-from rig.link.wander import STEADY, Readings, Track
-from tests.link.clocks import HZ, Clock, compared, ppm
+from rig.clock.rate import tick_rate
+from rig.clock.wander import STEADY, Readings, Track
+from tests.clock.clocks import HZ, Clock, compared, ppm
 
 
 def readings(seed: int, n: int, span: float, walk: float = 0.0, epochs: int = 1) -> Readings:

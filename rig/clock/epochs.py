@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.link.samples import RECV, SEND, TICK, middles_ns, samples
+from rig.clock.samples import RECV, SEND, TICK, middles_ns, samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.link.samples import Samples
-    from rig.records import Ping
+    from rig.clock.samples import Samples
+    from rig.records import ClockSample
 
 RESONATOR_TOLERANCE = 0.005
 """Genuine Uno and Mega boards clock the AVR from a ceramic resonator, ±0.5 % (Murata CSTCE16M0)."""
@@ -99,7 +99,9 @@ class Epochs:
         return Moment(number, expected + off, host_ns + round(off / hz * 1e9))
 
 
-def epochs(pings: Iterable[Ping] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()) -> Epochs:
+def epochs(
+    pings: Iterable[ClockSample] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
+) -> Epochs:
     """Split samples where the board's counter did not go on, and count its wraps in between.
 
     Parameters
