@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Namespace) -> int:
-    """Own a port and serve clients, in the foreground, until SIGTERM or Ctrl-C."""
+    """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
     check_url(arguments.port)
     path = Path(arguments.socket).absolute() if arguments.socket else default_socket()
 
@@ -25,6 +25,13 @@ def main(arguments: Namespace) -> int:
         say(f"rig daemon: {arguments.port} at {path}")
         notify_systemd()
 
-    serve(arguments.port, path, tcp=arguments.tcp, ready=ready, tell=Teller().tell)
+    serve(
+        arguments.port,
+        path,
+        tcp=arguments.tcp,
+        idle_s=arguments.idle_timeout,
+        ready=ready,
+        tell=Teller().tell,
+    )
     say("rig daemon: ended")
     return 0

@@ -259,6 +259,32 @@ class Desk:
 
     # ------------------------------------------------------------------ drops
 
+    def unsaved(self) -> bool:
+        """Ask whether a drop is armed or falls, or fell and is in no file yet.
+
+        Raises
+        ------
+        RigError
+            The device or the disk does not answer, so it is not known.
+        """
+        if self._session is not None:
+            self._session.commit()
+            latest = {entry.run: entry for entry in self._session.states()}
+            if any(
+                entry.state is RunState.FIRED
+                and self._session.drop(entry.run, entry.attempt) is None
+                for entry in latest.values()
+            ):
+                return True  # on a board that may be away at the moment
+        if self.station is None:
+            return False
+        if self.station.armed is not None:
+            return True
+        held = self.station.held()
+        if held is None or held[0] == TEST_RUN:
+            return False
+        return self._session is None or self._session.drop(*held) is None
+
     def wait(self, seconds: float) -> None:
         """Let time pass, see `Station.wait`."""
         self._connected().wait(seconds)

@@ -19,6 +19,7 @@ from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.narration import Narration
 from rig.daemon.place import peer_uid
 from rig.daemon.worker import Worker
+from rig.errors import RigError
 from rig.ports import is_simulated
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ class Server:
         The Unix socket.
     tcp
         Whether to listen on a TCP port of 127.0.0.1 instead.
+    idle_s
+        End when for so long no client was there, as soon as nothing is armed, falling or unsaved;
+        `None` to wait for a signal.
     tell
         Is given a line for whoever started it; must return at once.
     """
@@ -54,6 +58,7 @@ class Server:
         path: Path,
         *,
         tcp: bool = False,
+        idle_s: float | None = None,
         tell: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.url = url
@@ -63,6 +68,8 @@ class Server:
         self.lease = Lease()
         self.worker = Worker(url, self.hub, self.lease)
         self.connections: set[Connection] = set()
+        self._idle_s = idle_s
+        self._left_at = 0.0  # when the last client went
         self._tell = tell
         self._narration = Narration()
         self._serving: set[asyncio.Task[None]] = set()
@@ -70,7 +77,7 @@ class Server:
         self._dirty = asyncio.Event()
 
     async def run(self, ready: Callable[[], None]) -> None:
-        """Serve until a signal comes.
+        """Serve until a signal comes, or until nobody needs it.
 
         Parameters
         ----------
@@ -100,6 +107,8 @@ class Server:
         )
         self.worker.start()
         tasks = [loop.create_task(self._spread()), loop.create_task(self._watch_lease())]
+        if self._idle_s is not None:
+            tasks.append(loop.create_task(self._watch_clients(self._idle_s)))
         try:
             ready()
             await self._over.wait()
@@ -135,6 +144,7 @@ class Server:
             await connection.serve()
         finally:
             self.connections.discard(connection)
+            self._left_at = asyncio.get_running_loop().time()
             self.watch()
             if self.lease.release(connection):
                 self.worker.lost()
@@ -191,14 +201,38 @@ class Server:
                 self.worker.lost()
             self.show_control()
 
+    async def _watch_clients(self, idle_s: float) -> None:
+        """End when no client was there for so long and nothing would be lost."""
+        now = asyncio.get_running_loop().time
+        self._left_at = now()
+        while not self._over.is_set():
+            await asyncio.sleep(idle_s / 10)
+            if self.connections or now() - self._left_at < idle_s:
+                continue
+            try:
+                rests = await asyncio.wrap_future(self.worker.at_rest())
+            except RigError:
+                rests = False
+            if not rests:
+                self._left_at = now()
+            elif not self.connections:
+                self._tell(f"no client for {idle_s:g} s, and nothing armed, falling or unsaved")
+                self.end()
+
 
 def serve(
-    url: str, path: Path, *, tcp: bool, ready: Callable[[], None], tell: Callable[[str], None]
+    url: str,
+    path: Path,
+    *,
+    tcp: bool,
+    idle_s: float | None,
+    ready: Callable[[], None],
+    tell: Callable[[str], None],
 ) -> None:
-    """Run a daemon until a signal ends it; see `Server`."""
+    """Run a daemon to its end; see `Server`."""
 
     async def run() -> None:
-        await Server(url, path, tcp=tcp, tell=tell).run(ready)
+        await Server(url, path, tcp=tcp, idle_s=idle_s, tell=tell).run(ready)
 
     with suppress(KeyboardInterrupt):
         asyncio.run(run())

@@ -120,6 +120,16 @@ class Worker:
         """Note that the client in control is gone: look at once whether a drop is armed."""
         self._jobs.put(None)
 
+    def at_rest(self) -> Future[bool]:
+        """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
+        outcome: Future[bool] = Future()
+
+        def rests() -> bool:
+            return not isinstance(self._trouble, SessionError) and not self.desk.unsaved()
+
+        self._jobs.put(_Job(rests, outcome))
+        return outcome
+
     def end(self) -> None:
         """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""
         self._ending = True

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _AGAIN_S = 0.5
 _START_S = 5.0  # a daemon that was started has this long before another one is
+_IDLE_S = 300.0  # nobody asked for that daemon by name, so it ends when it is left alone
 
 
 class Wire:
@@ -175,7 +176,7 @@ class Wire:
             )
 
     def _start(self, error: DeviceError) -> None:
-        """Start a daemon that outlives this screen."""
+        """Start a daemon that outlives this screen, as long as it has something to do."""
         if not self.url:
             raise error
         now = asyncio.get_running_loop().time()
@@ -188,6 +189,7 @@ class Wire:
         # What it has to say about its own end would otherwise be lost with the terminal.
         with self.path.with_suffix(".log").open("ab") as log:
             command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
+            command += ["--idle-timeout", str(_IDLE_S)]
             self.daemon = subprocess.Popen(  # noqa: S603 - our own program
                 [*command, "--socket", str(self.path)],
                 stdin=subprocess.DEVNULL,
