@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.output import say
-from rig.daemon.doorway import notify_systemd
+from rig.daemon.listener import notify_systemd
 from rig.daemon.narration import Teller
-from rig.daemon.place import default_socket
 from rig.daemon.server import serve
+from rig.daemon.socket_path import default_socket
 from rig.link.port import check_url
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ class Narration:
         self._board = ""
 
     def lines(self, change: Mapping[str, Any]) -> Iterator[str]:
-        """Say what a change of `rig.daemon.hub.Hub.take` is about.
+        """Say what a change of `rig.recorder.published.PublishedState.take` is about.
 
         Yields
         ------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.lease import LEASE_S
-from rig.daemon.place import default_socket, prepare_folder
+from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
 from rig.tui.state import State, typed
 
@@ -75,15 +75,15 @@ class Wire:
         """What the daemon said last."""
         if self._client is None:
             return State()
-        mirror = self._client.mirror
-        return typed(mirror.n, mirror.state) if mirror.state else State()
+        replica = self._client.replica
+        return typed(replica.n, replica.state) if replica.state else State()
 
     @property
     def driving(self) -> bool:
         """Whether this client has control."""
         if not self.up or self._client is None:
             return False
-        control = self._client.mirror.state.get("control")
+        control = self._client.replica.state.get("control")
         if control is None:
             # On a busy machine control may lapse; if nobody takes it, it is ours when we speak.
             return self._had_control
@@ -146,7 +146,7 @@ class Wire:
             client.changed = self._note
             await client.subscribe()
             self._client, self.silence = client, ""
-            if self._wants_control and client.mirror.state.get("control") is None:
+            if self._wants_control and client.replica.state.get("control") is None:
                 with suppress(RigError):
                     await self.take_control()
             # Beside the signs of life: to open a session may take longer than control lasts.
@@ -168,7 +168,7 @@ class Wire:
     async def _check(self, client: AsyncClient) -> None:
         """See that it is the daemon of the port that was asked for."""
         await client.subscribe()
-        self._port = str(client.mirror.state["port"]["url"])
+        self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
             raise DeviceError(
                 f"the daemon has {self._port}, not {self.url};",

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig.daemon import rpc
-from rig.daemon.place import prepare_folder, token_file
+from rig.daemon.socket_path import prepare_folder, token_file
 from rig.errors import InputError
 from rig.files import write_atomic
 
