@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.output import say
 from rig.daemon.listener import notify_systemd
-from rig.daemon.narration import Teller
+from rig.daemon.log import logged_to_stderr
 from rig.daemon.server import serve
 from rig.daemon.socket_path import default_socket
 from rig.link.port import check_url
@@ -25,13 +25,7 @@ def main(arguments: Namespace) -> int:
         say(f"rig daemon: {arguments.port} at {path}")
         notify_systemd()
 
-    serve(
-        arguments.port,
-        path,
-        tcp=arguments.tcp,
-        idle_s=arguments.idle_timeout,
-        ready=ready,
-        tell=Teller().tell,
-    )
+    with logged_to_stderr():
+        serve(arguments.port, path, tcp=arguments.tcp, idle_s=arguments.idle_timeout, ready=ready)
     say("rig daemon: ended")
     return 0

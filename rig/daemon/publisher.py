@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 from rig.daemon import rpc
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from rig.daemon.connection import Connection
     from rig.recorder.published import PublishedState
 
@@ -27,8 +25,6 @@ class Publisher:
     ----------
     published
         The state.
-    told
-        Called with each change, also when nobody subscribed.
 
     Attributes
     ----------
@@ -36,12 +32,9 @@ class Publisher:
         All clients.
     """
 
-    def __init__(
-        self, published: PublishedState, told: Callable[[Mapping[str, Any]], None]
-    ) -> None:
+    def __init__(self, published: PublishedState) -> None:
         self.published = published
         self.connections: set[Connection] = set()
-        self._told = told
         self._dirty = asyncio.Event()
 
     def add(self, connection: Connection) -> None:
@@ -70,10 +63,7 @@ class Publisher:
     def spread(self) -> None:
         """Send what changed."""
         change = self.published.take()
-        line = None
-        if change is not None:
-            line = rpc.request("change", change, None)
-            self._told(change)
+        line = None if change is None else rpc.request("change", change, None)
         snapshot = None
         for connection in self.connections:
             if not connection.subscribed:

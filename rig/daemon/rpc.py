@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from rig.link.messages import DisarmReason, Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.interrupts import StoppedError
 
+log = logging.getLogger(__name__)
 API = 1
 """Version of the interface that API.md describes."""
 REQUEST_LIMIT = 1 << 16
@@ -128,6 +130,7 @@ def known(error: Exception) -> RigError:
     """Put any failure into words."""
     if isinstance(error, RigError):
         return error
+    log.error("unexpected", exc_info=error)
     return RigError(f"unexpected: {error!r}", "a fault of this program: please report it")
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import secrets
 import signal
 import sys
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.daemon import rpc
 from rig.daemon.connection import Connection
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import leave, listen
-from rig.daemon.narration import Narration
 from rig.daemon.publisher import Publisher
 from rig.daemon.service import Service
 from rig.daemon.socket_path import peer_uid
@@ -25,9 +25,10 @@ from rig.ports import is_simulated
 from rig.recorder.published import PublishedState
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
     from pathlib import Path
 
+log = logging.getLogger(__name__)
 _SWITCH_S = 1e-3
 
 
@@ -45,8 +46,6 @@ class Server:
     idle_s
         End when for so long no client was there, as soon as nothing is armed, falling or unsaved;
         `None` to wait for a signal.
-    tell
-        Is given a line for whoever started it; must return at once.
     """
 
     def __init__(
@@ -56,20 +55,17 @@ class Server:
         *,
         tcp: bool = False,
         idle_s: float | None = None,
-        tell: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.url = url
         self.path = path
         self.published = PublishedState()
-        self.publisher = Publisher(self.published, self._narrate)
+        self.publisher = Publisher(self.published)
         self._token = secrets.token_hex(32) if tcp else ""
         self._lease = Lease()
         self._worker = Worker(url, self.published, self._lease)
         self._service = Service(url, self._token, self._worker, self._lease, self.publisher)
         self._idle_s = idle_s
         self._left_at = 0.0  # when the last client went
-        self._tell = tell
-        self._narration = Narration()
         self._serving: set[asyncio.Task[None]] = set()
         self._over = asyncio.Event()
 
@@ -100,9 +96,9 @@ class Server:
         tasks = [loop.create_task(self.publisher.run()), loop.create_task(self._watch_lease())]
         if self._idle_s is not None:
             tasks.append(loop.create_task(self._watch_clients(self._idle_s)))
+        ready()  # said before whatever the worker has to say
         self._worker.start()
         try:
-            ready()
             await self._over.wait()
         finally:
             listener.close()
@@ -139,10 +135,6 @@ class Server:
             connection.close()
             self._serving.discard(task)
 
-    def _narrate(self, change: Mapping[str, Any]) -> None:
-        for words in self._narration.lines(change):
-            self._tell(words)
-
     async def _watch_lease(self) -> None:
         """See that control lapses also when its holder says nothing."""
         while True:
@@ -166,7 +158,7 @@ class Server:
             if not rests:
                 self._left_at = now()
             elif not self.publisher.connections:
-                self._tell(f"no client for {idle_s:g} s, and nothing armed, falling or unsaved")
+                log.info("no client for %g s, and nothing armed, falling or unsaved", idle_s)
                 self.end()
 
 
@@ -177,12 +169,11 @@ def serve(
     tcp: bool,
     idle_s: float | None,
     ready: Callable[[], None],
-    tell: Callable[[str], None],
 ) -> None:
     """Run a daemon to its end; see `Server`."""
 
     async def run() -> None:
-        await Server(url, path, tcp=tcp, idle_s=idle_s, tell=tell).run(ready)
+        await Server(url, path, tcp=tcp, idle_s=idle_s).run(ready)
 
     with suppress(KeyboardInterrupt):
         asyncio.run(run())

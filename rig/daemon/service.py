@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from rig.daemon.worker import Worker
     from rig.recorder.controller import Controller
 
+log = logging.getLogger(__name__)
 _ANY_NUMBER = (int, float)
 
 
@@ -94,8 +96,10 @@ class Service:
 
     def show_control(self) -> None:
         """Show who is in control now."""
-        holder = self._lease.holder
-        self._published.set(control=None if holder is None else {"client": self._lease.name})
+        control = None if self._lease.holder is None else {"client": self._lease.name}
+        if control != self._published.get("control"):
+            log.info("in control: %s", control["client"] if control else "nobody")
+        self._published.set(control=control)
 
     def _release(self, who: Connection) -> None:
         if self._lease.release(who):

@@ -7,6 +7,7 @@ worker connects again, with growing pauses, and settles what was under way.
 
 from __future__ import annotations
 
+import logging
 import queue
 import random
 import threading
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from rig.daemon.lease import Lease
     from rig.recorder.published import PublishedState
 
+log = logging.getLogger(__name__)
 _ARMED_S = 0.08  # between two requests while armed: the device gives the host 250 ms
 _WATCHED_S = 0.15  # between two looks at the gates
 _ALONE_S = 1.0  # when nobody looks: often enough to see that the cable is out
@@ -181,11 +183,12 @@ class Worker:
         try:
             result = job.work()
         except Exception as error:
+            failure = known(error)
             # First what follows for the link, so that a client sees it before its answer.
             if self._trouble is None:
-                self._weigh(known(error))
+                self._weigh(failure)
             stopped = isinstance(error, StoppedError) and self._stop
-            job.outcome.set_exception(StoppedError(self._stop) if stopped else known(error))
+            job.outcome.set_exception(StoppedError(self._stop) if stopped else failure)
         else:
             if self._trouble is not None and self._over():
                 self._well()
@@ -314,6 +317,9 @@ class Worker:
                 return  # there is no scene, so there is no port to come back to
         if self._trouble is None:
             self._pause_s = _FIRST_PAUSE_S
+        if str(self._trouble) != str(error):  # said once, however often it is tried again
+            what = "trouble" if isinstance(error, SessionError) else "down"
+            log.warning("%s: %s%s", what, error.message, f" ({error.hint})" if error.hint else "")
         self._trouble, self._troubled = error, self._open_session
         self._retry_at = time.monotonic() + self._pause_s
         up = self.controller.recorder is not None

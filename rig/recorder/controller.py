@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from rig.records import Drop
     from rig.session.store import Session
 
+log = logging.getLogger(__name__)
 _OPEN = (RunState.ARMED, RunState.FIRED)
 _VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
 
@@ -152,6 +154,7 @@ class Controller:
             self._part_with(opened)
             raise
         about, plan = shown(opened, scene)
+        log.info("session: %s", path)
         self.published.plan(plan)
         self.published.set(session=about, drop=None, release_test=None)
         return fetched
@@ -159,6 +162,7 @@ class Controller:
     def close_session(self) -> None:
         """Make safe and close the file, whole; nothing when none is open."""
         if self._session is not None:
+            log.info("closed: %s", self._session.path)
             self._part_with(self._session)
 
     def _part_with(self, session: Session) -> None:
@@ -214,6 +218,8 @@ class Controller:
         )
         self.recorder = recorder
         self.published.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+        if port is None:
+            log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
         return identity
 
     def disconnect(self) -> None:
@@ -240,9 +246,9 @@ class Controller:
         if held is not None and held[0] == TEST_RUN:
             release_test.forget(recorder)
             held = None
-        log = self.session.states()
+        entries = self.session.states()
         if held is not None:
-            if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in log):
+            if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in entries):
                 run, attempt = held
                 raise DeviceError(
                     f"the device holds a drop (run {run}, attempt {attempt}) of another session",
@@ -250,7 +256,7 @@ class Controller:
                 )
             recorder.fetch(*held)
             self._lost.pop(held, None)
-        for entry in {entry.run: entry for entry in log}.values():
+        for entry in {entry.run: entry for entry in entries}.values():
             if entry.state not in _OPEN or (entry.run, entry.attempt) == held:
                 continue
             if self.session.drop(entry.run, entry.attempt) is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import random
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from rig.recorder.sink import SessionSink
     from rig.records import Drop
 
+log = logging.getLogger(__name__)
 ARM_TIMEOUT_MS = 10_000
 DISCARD = "taking the power from the board discards the drop, a reset does not"
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
@@ -318,6 +320,8 @@ class Recorder:
         with self.interrupts.held():
             self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
             self.session.commit()
+            if state is RunState.INTERRUPTED:
+                log.info("run %d, attempt %d: interrupted: %s", run, attempt, "; ".join(reasons))
             if self._feed is not None:
                 self._feed.state(run, attempt, state, reasons)
 
@@ -341,6 +345,7 @@ class Recorder:
     def _keep(self, drop: Drop) -> Drop:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
+        log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
         if self._feed is not None:
             self._feed.recorded(drop)
         self._acknowledge(drop)

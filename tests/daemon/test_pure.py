@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from rig.daemon import rpc
 from rig.daemon.client_protocol import Replica
 from rig.daemon.lease import LEASE_S, ControlError, Lease
-from rig.daemon.narration import Narration
 from rig.errors import (
     DeviceError,
     DeviceTimeoutError,
@@ -189,33 +188,3 @@ def test_a_replica_does_not_swallow_a_gap():
     replica.snapshot({"n": 3, "state": {"edges": []}})
     with pytest.raises(ValueError, match="change 5 behind 3"):
         replica.change({"n": 5})
-
-
-def test_whoever_started_a_daemon_is_told_each_thing_once():
-    narration = Narration()
-    down = {"state": "down", "error": {"message": "gone", "hint": "plug it in"}, "retry_s": 1.0}
-    up = {"state": "up", "error": None, "retry_s": None}
-    device = {"board": "Mega", "unique_id": "07"}
-    said = [
-        list(narration.lines({"n": 1, "set": news}))
-        for news in (
-            {"device": device, "link": up},
-            {"link": {"state": "opening", "error": None, "retry_s": None}},
-            {"link": down, "error": {"kind": "DeviceError", "message": "gone", "hint": ""}},
-            {"link": down | {"retry_s": 2.0}},
-            {"link": up, "gates": {"blocked": 1}},
-            {"drop": {"run": 3, "attempt": 1, "state": "armed", "events": 0}},
-            {"drop": {"run": 3, "attempt": 1, "state": "recorded", "events": 8}},
-            {"error": {"kind": "SessionError", "message": "the disk is full", "hint": ""}},
-        )
-    ]
-    assert said == [
-        ["up: Mega, id 07"],
-        [],
-        ["down: gone (plug it in)"],
-        [],
-        ["up: Mega, id 07"],
-        [],
-        ["run 3, attempt 1: recorded, 8 events"],
-        ["trouble: the disk is full"],
-    ]
