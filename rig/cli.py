@@ -122,7 +122,9 @@ def _parser() -> argparse.ArgumentParser:
     daemon.add_argument("--port", required=True, help="device path or URL")
     daemon.add_argument("--socket", metavar="PATH", help="where clients come, if elsewhere")
     daemon.add_argument(
-        "--tcp", action="store_true", help="listen on a port of 127.0.0.1, as on Windows"
+        "--tcp",
+        action="store_true",
+        help="listen on a port of 127.0.0.1, for programs that know no Unix sockets",
     )
     daemon.add_argument(
         "--idle-timeout",

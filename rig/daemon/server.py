@@ -8,7 +8,6 @@ import os
 import secrets
 import signal
 import sys
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig import __version__
@@ -86,8 +85,7 @@ class Server:
         sys.setswitchinterval(_SWITCH_S)
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
-            with suppress(NotImplementedError):  # Windows: there KeyboardInterrupt ends the loop
-                loop.add_signal_handler(number, self.end)
+            loop.add_signal_handler(number, self.end)
         listener = await listen(self.path, self._serve, self._token)
         self.published.set(
             daemon={"version": __version__, "pid": os.getpid(), "api": rpc.API},
@@ -118,8 +116,7 @@ class Server:
         self._over.set()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        uid = peer_uid(writer.get_extra_info("socket"))
-        if uid not in {None, os.getuid() if hasattr(os, "getuid") else None}:
+        if peer_uid(writer.get_extra_info("socket")) not in {None, os.getuid()}:
             writer.close()
             return
         connection = Connection(reader, writer, self._service.do, self._lease.heard)
@@ -175,5 +172,4 @@ def serve(
     async def run() -> None:
         await Server(url, path, tcp=tcp, idle_s=idle_s).run(ready)
 
-    with suppress(KeyboardInterrupt):
-        asyncio.run(run())
+    asyncio.run(run())
