@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from contextlib import suppress
@@ -121,7 +122,16 @@ def _parser() -> argparse.ArgumentParser:
     daemon.add_argument("--port", required=True, help="device path or URL")
     daemon.add_argument("--socket", metavar="PATH", help="where clients come, if elsewhere")
     daemon.add_argument(
-        "--tcp", action="store_true", help="listen on a port of 127.0.0.1, as on Windows"
+        "--tcp",
+        action="store_true",
+        help="listen on a port of 127.0.0.1, for programs that know no Unix sockets",
+    )
+    daemon.add_argument(
+        "--idle-timeout",
+        type=_seconds,
+        metavar="S",
+        help="end after so many seconds without a client, once nothing is armed, falling or "
+        "unsaved (default: stay until a signal comes)",
     )
 
     _tui(command("tui", "the lab session in the terminal: protocol, gates, runs, results"))
@@ -419,6 +429,16 @@ def _count(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text} is too few: at least 1 is needed")
     return number
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time in seconds, more than 0")
+    return seconds
 
 
 def _protocol(parser: argparse.ArgumentParser) -> None:

@@ -29,13 +29,13 @@ from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, next_job, rest_s, what_to_hang
 from rig.campaign.voids import voids_of
 from rig.daemon.connecting import connect
-from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, InputError
 from rig.link.refusals import DeviceRefusedError
 from rig.measurands import told
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
+from rig.recorder.interrupts import Interrupts
 from rig.records import Job
 from rig.report.numbers import plus_minus
 from rig.results import results
@@ -94,7 +94,7 @@ def run_protocol(
     seed
         Of a simulation.
     interrupts
-        What stops the campaign: see `rig.daemon.station.Station`.
+        What stops the campaign: see `rig.recorder.recorder.Recorder`.
     socket
         Of the daemon to go through: see `rig.daemon.connecting.connect`.
 

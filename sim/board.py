@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Decoder, crc16
 from rig.link.messages import Phase
-from sim.controller import Controller
+from sim.controller import Microcontroller
 from sim.counter import Counter
 from sim.inputs import Inputs
 from sim.transmitter import Transmitter
@@ -194,7 +194,7 @@ class VirtualBoard:
         self._inbox: deque[tuple[int, bytes]] = deque()
         self._last: tuple[int, int, int] | None = None  # type, seq and CRC of the last request
         self._answer = b""
-        self._controller = Controller(
+        self._controller = Microcontroller(
             self.lab, self.counter, self.identity, self._inputs, self._random
         )
         self._oldest_ns = 0

@@ -30,7 +30,7 @@ class Coming(NamedTuple):
     state: int
 
 
-class Controller:
+class Microcontroller:
     """The board's state between requests.
 
     Parameters

@@ -9,9 +9,9 @@ from urllib.parse import quote
 
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
-from rig.daemon.record import Unrecorded
-from rig.daemon.station import Station
 from rig.protocol.scene import PPS_U
+from rig.recorder.recorder import Recorder
+from rig.recorder.sink import NullSink
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,7 +28,7 @@ SOURCES = {"pings": 0.0, "reference": PPS_U}
 
 
 @dataclass(slots=True)
-class _Kept(Unrecorded):
+class _Kept(NullSink):
     """A record of clock samples only."""
 
     pings: list[ClockSample] = field(default_factory=list)
@@ -99,12 +99,12 @@ def clock(
 
 
 def _compared(protocol: str, seed: int, seconds: float) -> _Kept:
-    """Let a station compare clocks, as in any session."""
+    """Let a recorder compare clocks, as in any session."""
     dials = f"quiet=1&clock={CLOCK_PPM}ppm&latency={LATENCY_S}s&reference={REFERENCE_PPM}ppm"
     url = f"sim://?protocol={quote(protocol)}&seed={seed}&{dials}"
     kept = _Kept()
-    with Station(kept, url) as station:
-        station.wait(seconds + 5.0)
+    with Recorder(kept, url) as recorder:
+        recorder.wait(seconds + 5.0)
     return kept
 
 

@@ -24,11 +24,11 @@ from rig.bench.stand import Stand
 from rig.bench.terminal import Terminal
 from rig.clock.host import SystemClock
 from rig.daemon.server import Server
-from rig.daemon.view import View
 from rig.link.exchange import Exchange
 from rig.link.messages import EVENTS_PER_FRAME, Fired
 from rig.link.port import open_port
 from rig.link.transcript import Received
+from rig.recorder.feed import StateFeed
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -55,7 +55,7 @@ async def watch(path, wanted):
     client, seen = await AsyncClient.connect(path, "bench"), []
     done = asyncio.Event()
     def changed():
-        count = len(client.mirror.state.get("edges", ()))
+        count = len(client.replica.state.get("edges", ()))
         if not seen or seen[-1][0] != count:
             seen.append((count, time.monotonic()))
         if count >= wanted:
@@ -103,7 +103,7 @@ def _latencies(
 
 
 def delivered(count: int, every_s: float) -> tuple[float, list[float]]:
-    """Send frames through terminal, reader, session file, hub and socket to another process.
+    """Send frames through terminal, reader, session file, state and socket to another process.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _read(folder: Path, server: Server, terminal: Terminal, count: int) -> None:
     with Session.create(
         folder / "session", "protocol: 1\n", "bench", simulated=True, origin="bench"
     ) as session:
-        view = View(server.hub)
+        view = StateFeed(server.published)
         view.state(1, 1, RunState.ARMED, ())
         view.know(Received(0, 1, Fired(0)))
         port = open_port(terminal.path)

@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING, Any, Self
 from rig.bench.link import cpu_s
 from rig.daemon.client import Client
 from rig.daemon.server import Server
-from rig.daemon.view import View
 from rig.link.messages import Fired
 from rig.link.transcript import Received
+from rig.recorder.feed import StateFeed
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -177,13 +177,13 @@ def _share(terminal: Terminal, work: Callable[[], object]) -> float:
 
 def _feed(server: Server, sent: list[tuple[float, int]]) -> None:
     """Let a drop's edges come as a stream; note how many there were when, s (monotonic)."""
-    view = View(server.hub)
+    view = StateFeed(server.published)
     view.state(1, 1, RunState.ARMED, ())
     view.know(Received(0, 1, Fired(0)))
     begun, count = time.monotonic(), 0
     while (now := time.monotonic() - begun) < _LASTING_S:
         wanted = int(now * RATE)
-        server.hub.edges(
+        server.published.edges(
             (round(n / RATE * _TICK_HZ), n % _GATES, n // _GATES % 2) for n in range(count, wanted)
         )
         count = wanted

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.output import print_results, say
-from rig.daemon.interrupts import Interrupts
+from rig.recorder.interrupts import Interrupts
 from rig.runner import Operator, run_protocol
 
 if TYPE_CHECKING:

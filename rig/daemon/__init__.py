@@ -1,1 +1,1 @@
-"""The station: the one owner of the port and of the session."""
+"""The daemon: it serves clients on a local socket, in front of the owner of port and session."""

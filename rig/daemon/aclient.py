@@ -6,9 +6,8 @@ import asyncio
 from typing import TYPE_CHECKING, Any, Self
 
 from rig.daemon import rpc
-from rig.daemon.dialogue import Dialogue, gone, hello
-from rig.daemon.mirror import Mirror
-from rig.daemon.place import reach
+from rig.daemon.client_protocol import ClientProtocol, Replica, gone, hello
+from rig.daemon.socket_path import reach
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ _HUNG_UP = "it hung up"
 
 
 class AsyncClient:
-    """One connection; `mirror` follows the daemon's state once it is subscribed.
+    """One connection; `replica` follows the daemon's state once it is subscribed.
 
     Parameters
     ----------
@@ -30,7 +29,7 @@ class AsyncClient:
 
     Attributes
     ----------
-    mirror
+    replica
         The state.
     changed
         Called whenever it has changed. It should only take a note: it is called often.
@@ -39,11 +38,11 @@ class AsyncClient:
     """
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.mirror = Mirror()
+        self.replica = Replica()
         self.changed: Callable[[], None] = lambda: None
         self.lost = asyncio.Event()
         self._writer = writer
-        self._dialogue = Dialogue()
+        self._protocol = ClientProtocol()
         self._open: dict[int, asyncio.Future[Any]] = {}
         self._listening = asyncio.get_running_loop().create_task(self._listen(reader))
 
@@ -85,7 +84,7 @@ class AsyncClient:
         """
         if self.lost.is_set():
             raise gone(_HUNG_UP)
-        number, line = self._dialogue.ask(method, params)
+        number, line = self._protocol.ask(method, params)
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._open[number] = answer
         self._writer.write(line)
@@ -110,9 +109,9 @@ class AsyncClient:
     async def _listen(self, reader: asyncio.StreamReader) -> None:
         try:
             while True:
-                for message in self._dialogue.feed(await reader.read(_CHUNK)):
+                for message in self._protocol.feed(await reader.read(_CHUNK)):
                     if "method" in message:
-                        self.mirror.notified(message["method"], message["params"])
+                        self.replica.notified(message["method"], message["params"])
                         self.changed()
                     else:
                         self._answered(message)
@@ -125,7 +124,7 @@ class AsyncClient:
         answer = self._open.pop(message["id"], None)
         result = message.get("result")
         if isinstance(result, dict) and "state" in result:
-            self.mirror.snapshot(result)
+            self.replica.snapshot(result)
             self.changed()
         if answer is None or answer.done():
             return

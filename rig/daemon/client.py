@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon import rpc
-from rig.daemon.dialogue import Dialogue, gone, hello
-from rig.daemon.faults import ControlError
-from rig.daemon.interrupts import Interrupts
-from rig.daemon.lease import LEASE_S
-from rig.daemon.place import reach
+from rig.daemon.client_protocol import ClientProtocol, gone, hello
+from rig.daemon.lease import LEASE_S, ControlError
+from rig.daemon.socket_path import reach
 from rig.errors import DeviceError, DeviceTimeoutError
+from rig.recorder.interrupts import Interrupts
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ class Client:
 
     def __init__(self, path: Path, name: str, interrupts: Interrupts | None = None) -> None:
         self._interrupts = Interrupts() if interrupts is None else interrupts
-        self._dialogue = Dialogue()
+        self._protocol = ClientProtocol()
         self._writing = threading.Lock()
         self._session: Session | None = None
         self._armed = False
@@ -77,7 +76,7 @@ class Client:
         RigError
             As the daemon raised it, or it is gone.
         """
-        number, line = self._dialogue.ask(method, params)
+        number, line = self._protocol.ask(method, params)
         with self._interrupts.held():
             self._send(line)
         until = time.monotonic() + patience
@@ -208,4 +207,4 @@ class Client:
             return []
         except OSError as error:
             raise gone(error) from error
-        return self._dialogue.feed(data)
+        return self._protocol.feed(data)

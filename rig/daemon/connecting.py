@@ -6,21 +6,21 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, Protocol
 
-from rig.daemon.desk import Desk
-from rig.daemon.place import default_socket, token_file
+from rig.daemon.socket_path import default_socket, token_file
 from rig.errors import DeviceError, RigError
+from rig.recorder.controller import Controller
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.daemon.interrupts import Interrupts
+    from rig.recorder.interrupts import Interrupts
     from rig.records import Drop
     from rig.session.reading import Reader
     from rig.session.schema import RunState
 
 
 class Rig(Protocol):
-    """What a client can do. `rig.daemon.desk.Desk` says what each of these is and raises."""
+    """What a client can do; `rig.recorder.controller.Controller` says what each is and raises."""
 
     @property
     def session(self) -> Reader: ...  # noqa: D102
@@ -60,7 +60,7 @@ def connect(
     say
         Is told when a daemon does the work.
     interrupts
-        As for `rig.daemon.station.Station`.
+        As for `rig.recorder.recorder.Recorder`.
     socket
         Of the daemon to ask, which must then be there; else the usual one, if there is one.
 
@@ -76,7 +76,7 @@ def connect(
     """
     place = default_socket() if socket is None else socket
     if socket is None and not place.exists() and not token_file(place).exists():
-        return Desk(url, interrupts)
+        return Controller(url, interrupts)
     from rig.daemon.client import Client  # noqa: PLC0415 - most runs have no daemon
 
     try:
@@ -84,13 +84,13 @@ def connect(
     except RigError:
         if socket is not None:
             raise
-        return Desk(url, interrupts)  # what a killed daemon left, or one of another version
+        return Controller(url, interrupts)  # what a killed daemon left, or one of another version
     try:
         # A board that was plugged in again may have another path than the daemon was told.
         if not any(_same(client.daemon.get(name, ""), url) for name in ("port", "path")):
             if socket is None:
                 client.close()
-                return Desk(url, interrupts)
+                return Controller(url, interrupts)
             _refuse(f"the daemon has {client.daemon['port']}, not {url}")
         client.take_control()
     except BaseException:

@@ -6,15 +6,22 @@ import asyncio
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon import rpc
-from rig.daemon.service import Service
-from rig.daemon.worker import known
 
 if TYPE_CHECKING:
-    from rig.daemon.server import Server
+    from collections.abc import Awaitable, Callable
 
 
 class Connection:
     """One client.
+
+    Parameters
+    ----------
+    reader, writer
+        Its line.
+    do
+        Carries out one of its requests.
+    heard
+        Called with each line it sends.
 
     Attributes
     ----------
@@ -27,14 +34,18 @@ class Connection:
     """
 
     def __init__(
-        self, server: Server, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        do: Callable[[Connection, rpc.Request], Awaitable[Any]],
+        heard: Callable[[Connection], None],
     ) -> None:
-        self.server = server
         self.name = ""
         self.subscribed = self.behind = False
         self._reader = reader
         self._writer = writer
-        self._service = Service(server, self)
+        self._do = do
+        self._heard = heard
         self._stops: set[asyncio.Task[None]] = set()
 
     def send(self, line: bytes) -> None:
@@ -69,7 +80,7 @@ class Connection:
 
     async def _read(self, lines: asyncio.Queue[rpc.Request | rpc.RpcError]) -> None:
         while line := await self._reader.readline():
-            self.server.lease.heard(self)
+            self._heard(self)
             try:
                 request = rpc.read_request(line)
             except rpc.RpcError as error:
@@ -95,13 +106,9 @@ class Connection:
                 return
 
     async def _answer(self, request: rpc.Request) -> None:
-        result: Any = None
         try:
-            result = await self._service.do(request)
-            line = rpc.answer(request.id, result)
-        except rpc.RpcError as error:
-            line = rpc.failure(request.id, error)
+            line = rpc.answer(request.id, await self._do(self, request))
         except Exception as error:
-            line = rpc.failure(request.id, known(error))
+            line = rpc.failure(request.id, error)
         if request.id is not None:
             self.send(line)

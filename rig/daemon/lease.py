@@ -6,13 +6,17 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from rig.daemon.faults import ControlError
+from rig.errors import DeviceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 LEASE_S = 2.0
 """Control lapses when its holder was not heard for so long."""
+
+
+class ControlError(DeviceError):
+    """Another client holds what this one asked for."""
 
 
 class Lease:

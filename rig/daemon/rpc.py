@@ -1,14 +1,19 @@
-"""JSON-RPC 2.0, one message a line; without any I/O."""
+"""JSON-RPC 2.0, one message a line, and errors as data: a client shows what the daemon raised."""
 
 from __future__ import annotations
 
 import json
+import logging
 from dataclasses import dataclass
 from typing import Any
 
-from rig.daemon.faults import from_data, to_data
-from rig.errors import RigError
+from rig.daemon.lease import ControlError
+from rig.errors import DeviceError, DeviceTimeoutError, InputError, RigError, SessionError
+from rig.link.messages import DisarmReason, Reason
+from rig.link.refusals import DeviceRefusedError
+from rig.recorder.interrupts import StoppedError
 
+log = logging.getLogger(__name__)
 API = 1
 """Version of the interface that API.md describes."""
 REQUEST_LIMIT = 1 << 16
@@ -19,6 +24,12 @@ PARSE, INVALID, NO_METHOD, BAD_PARAMS = -32700, -32600, -32601, -32602
 FAILURE = -32000
 
 
+class VersionError(RigError):
+    """Client and daemon do not speak the same interface."""
+
+    exit_code = 4
+
+
 class RpcError(Exception):
     """A line that is no proper request, with JSON-RPC's own code."""
 
@@ -26,6 +37,21 @@ class RpcError(Exception):
         super().__init__(message)
         self.code = code
         self.request_id = request_id
+
+
+_KINDS: dict[str, type[RigError]] = {
+    kind.__name__: kind
+    for kind in (
+        RigError,
+        InputError,
+        SessionError,
+        DeviceError,
+        DeviceTimeoutError,
+        ControlError,
+        StoppedError,
+        VersionError,
+    )
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +98,13 @@ def answer(number: object, result: object) -> bytes:
     return _line({"jsonrpc": "2.0", "id": number, "result": result})
 
 
-def failure(number: object, error: RigError | RpcError) -> bytes:
-    """Write that a request failed."""
+def failure(number: object, error: Exception) -> bytes:
+    """Write that a request failed, whatever the reason."""
     if isinstance(error, RpcError):
         told: dict[str, Any] = {"code": error.code, "message": str(error)}
     else:
-        told = {"code": FAILURE, "message": error.message, "data": to_data(error)}
+        failed = known(error)
+        told = {"code": FAILURE, "message": failed.message, "data": error_to_data(failed)}
     return _line({"jsonrpc": "2.0", "id": number, "error": told})
 
 
@@ -93,10 +120,46 @@ def result_of(message: dict[str, Any]) -> Any:
     if error is None:
         return message.get("result")
     if isinstance(error.get("data"), dict):
-        raise from_data(error["data"])
+        raise error_from_data(error["data"])
     raise RigError(
         f"the daemon does not understand: {error.get('message')}", "are both of one version?"
     )
+
+
+def known(error: Exception) -> RigError:
+    """Put any failure into words."""
+    if isinstance(error, RigError):
+        return error
+    log.error("unexpected", exc_info=error)
+    return RigError(f"unexpected: {error!r}", "a fault of this program: please report it")
+
+
+def error_to_data(error: RigError) -> dict[str, Any]:
+    """Write an error as API.md says; an unknown kind becomes the nearest listed one above it."""
+    refused = error if isinstance(error, DeviceRefusedError) else None
+    listed = (kind.__name__ for kind in type(error).__mro__ if kind.__name__ in _KINDS)
+    return {
+        "kind": "DeviceRefusedError" if refused else next(listed),
+        "message": error.message,
+        "hint": error.hint,
+        "exit_code": error.exit_code,
+        "reason": refused.reason.name if refused else None,
+        "detail": refused.detail if refused else None,
+        "disarmed": refused.disarmed.name if refused and refused.disarmed else None,
+    }
+
+
+def error_from_data(data: dict[str, Any]) -> RigError:
+    """Make the error again; one of a kind this program does not know is a `RigError`."""
+    if data.get("kind") == "DeviceRefusedError":
+        disarmed = data.get("disarmed")
+        return DeviceRefusedError(
+            Reason[data["reason"]], data["detail"], DisarmReason[disarmed] if disarmed else None
+        )
+    kind = _KINDS.get(str(data.get("kind")), RigError)
+    error = kind(str(data.get("message", "")), str(data.get("hint", "")))
+    error.exit_code = int(data.get("exit_code", kind.exit_code))
+    return error
 
 
 def _line(message: dict[str, Any]) -> bytes:

@@ -3,36 +3,53 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.daemon import rpc
-from rig.daemon.faults import VersionError
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
     from rig.daemon.connection import Connection
-    from rig.daemon.desk import Desk
-    from rig.daemon.server import Server
+    from rig.daemon.lease import Lease
+    from rig.daemon.publisher import Publisher
+    from rig.daemon.worker import Worker
+    from rig.recorder.controller import Controller
 
+log = logging.getLogger(__name__)
 _ANY_NUMBER = (int, float)
 
 
 class Service:
-    """Carries out one connection's requests.
+    """Carries out what clients ask for.
 
     Parameters
     ----------
-    server, client
-        Whose.
+    url
+        The port, as the user named it.
+    token
+        What a client must know; empty for nothing.
+    worker
+        Does what needs the port or the session.
+    lease
+        Who is in control.
+    publisher
+        Shows everything.
     """
 
-    def __init__(self, server: Server, client: Connection) -> None:
-        self._server = server
-        self._client = client
+    def __init__(
+        self, url: str, token: str, worker: Worker, lease: Lease, publisher: Publisher
+    ) -> None:
+        self._url = url
+        self._token = token
+        self._worker = worker
+        self._lease = lease
+        self._publisher = publisher
+        self._published = publisher.published
         self._methods: dict[str, Callable[..., Awaitable[Any]]] = {
             "hello": self._hello,
             "subscribe": self._subscribe,
@@ -51,8 +68,8 @@ class Service:
             "log_state": self._log_state,
         }
 
-    async def do(self, request: rpc.Request) -> Any:
-        """Carry out one request.
+    async def do(self, client: Connection, request: rpc.Request) -> Any:
+        """Carry out one request of a client.
 
         Raises
         ------
@@ -64,103 +81,116 @@ class Service:
         method = self._methods.get(request.method)
         if method is None:
             raise rpc.RpcError(rpc.NO_METHOD, f"no method {request.method}")
-        if not self._client.name and request.method != "hello":
+        if not client.name and request.method != "hello":
             raise rpc.RpcError(rpc.INVALID, "hello comes first")
         try:
-            work = method(**request.params)
+            work = method(client, **request.params)
         except TypeError as error:
             raise rpc.RpcError(rpc.BAD_PARAMS, f"{request.method}: {error}") from None
         return await work
 
-    async def _hello(self, api: object, client: object, token: object = "") -> dict[str, Any]:
+    def left(self, client: Connection) -> None:
+        """Note that a client is gone: what it had armed is disarmed."""
+        self._publisher.discard(client)
+        self._release(client)
+
+    def show_control(self) -> None:
+        """Show who is in control now."""
+        control = None if self._lease.holder is None else {"client": self._lease.name}
+        if control != self._published.get("control"):
+            log.info("in control: %s", control["client"] if control else "nobody")
+        self._published.set(control=control)
+
+    def _release(self, who: Connection) -> None:
+        if self._lease.release(who):
+            self._worker.lost()
+            self.show_control()
+
+    async def _hello(
+        self, who: Connection, /, api: object, client: object, token: object = ""
+    ) -> dict[str, Any]:
         if api != rpc.API:
-            raise VersionError(
+            raise rpc.VersionError(
                 f"this client speaks version {api} of the daemon's interface, rig {__version__}'s "
                 f"daemon version {rpc.API}",
                 "stop the daemon and start it again after an update; update the client",
             )
-        if self._server.token and token != self._server.token:
+        if self._token and token != self._token:
             raise rpc.RpcError(rpc.INVALID, "wrong token")
-        self._client.name = _text(client, "client")[:80] or "a client"
+        who.name = _text(client, "client")[:80] or "a client"
         return {
             "api": rpc.API,
             "version": __version__,
             "pid": os.getpid(),
-            "port": self._server.url,
-            "path": self._server.hub.get("port")["path"],
+            "port": self._url,
+            "path": self._published.get("port")["path"],
         }
 
-    async def _subscribe(self) -> dict[str, Any]:
-        self._server.spread()  # what the others are told first is in the snapshot
-        self._client.subscribed = True
-        self._server.watch()
-        return self._server.hub.snapshot()
+    async def _subscribe(self, who: Connection, /) -> dict[str, Any]:
+        return self._publisher.subscribe(who)
 
-    async def _unsubscribe(self) -> dict[str, Any]:
-        self._client.subscribed = self._client.behind = False
-        self._server.watch()
+    async def _unsubscribe(self, who: Connection, /) -> dict[str, Any]:
+        self._publisher.unsubscribe(who)
         return {}
 
-    async def _take_control(self) -> dict[str, Any]:
-        self._server.lease.take(self._client, self._client.name)
-        self._server.show_control()
+    async def _take_control(self, who: Connection, /) -> dict[str, Any]:
+        self._lease.take(who, who.name)
+        self.show_control()
         return {}
 
-    async def _release_control(self) -> dict[str, Any]:
-        if self._server.lease.release(self._client):
-            self._server.worker.lost()
-            self._server.show_control()
+    async def _release_control(self, who: Connection, /) -> dict[str, Any]:
+        self._release(who)
         return {}
 
-    async def _renew(self) -> dict[str, Any]:
+    async def _renew(self, _who: Connection, /) -> dict[str, Any]:
         return {}  # every line is a sign of life
 
-    async def _stop(self, reason: object = "") -> dict[str, Any]:
-        said = _text(reason, "reason")[:200] or f"stopped by {self._client.name}"
-        await asyncio.wrap_future(self._server.worker.stop(said))
+    async def _stop(self, who: Connection, /, reason: object = "") -> dict[str, Any]:
+        said = _text(reason, "reason")[:200] or f"stopped by {who.name}"
+        await asyncio.wrap_future(self._worker.stop(said))
         return {}
 
     async def _open_session(
-        self, protocol: object, session: object, seed: object = None
+        self, who: Connection, /, protocol: object, session: object, seed: object = None
     ) -> dict[str, Any]:
         names = _text(protocol, "protocol"), _text(session, "session")
         chosen = None if seed is None else _whole(seed, "seed")
 
-        def work(desk: Desk) -> dict[str, Any]:
-            fetched = desk.open_session(*names, chosen)
-            return {"session": self._server.hub.get("session"), "fetched": fetched}
+        def work(controller: Controller) -> dict[str, Any]:
+            fetched = controller.open_session(*names, chosen)
+            return {"session": self._published.get("session"), "fetched": fetched}
 
-        return await self._ask(work, writes=False)
+        return await self._ask(who, work, writes=False)
 
-    async def _close_session(self) -> dict[str, Any]:
-        return await self._ask(lambda desk: desk.close_session(), writes=False)
+    async def _close_session(self, who: Connection, /) -> dict[str, Any]:
+        return await self._ask(who, lambda controller: controller.close_session(), writes=False)
 
-    async def _wait(self, seconds: object) -> dict[str, Any]:
+    async def _wait(self, who: Connection, /, seconds: object) -> dict[str, Any]:
         if not isinstance(seconds, _ANY_NUMBER) or not 0.0 <= seconds <= 3600.0:
             raise rpc.RpcError(rpc.BAD_PARAMS, "seconds: from 0 to 3600")
-        return await self._ask(lambda desk: desk.wait(float(seconds)))
+        return await self._ask(who, lambda controller: controller.wait(float(seconds)))
 
-    async def _arm(self, run: object, attempt: object) -> dict[str, Any]:
+    async def _arm(self, who: Connection, /, run: object, attempt: object) -> dict[str, Any]:
         which = _whole(run, "run"), _whole(attempt, "attempt")
-        return await self._ask(lambda desk: {"token": desk.arm(*which)})
+        return await self._ask(who, lambda controller: {"token": controller.arm(*which)})
 
-    async def _fire(self, token: object) -> dict[str, Any]:
+    async def _fire(self, who: Connection, /, token: object) -> dict[str, Any]:
         number = _whole(token, "token")
-        return await self._ask(lambda desk: desk.fire(number))
+        return await self._ask(who, lambda controller: controller.fire(number))
 
-    async def _collect(self, run: object, attempt: object) -> dict[str, Any]:
+    async def _collect(self, who: Connection, /, run: object, attempt: object) -> dict[str, Any]:
         which = _whole(run, "run"), _whole(attempt, "attempt")
 
-        def work(desk: Desk) -> None:
-            desk.collect(*which)
+        def work(controller: Controller) -> None:
+            controller.collect(*which)
 
-        return await self._ask(work, writes=False)
+        return await self._ask(who, work, writes=False)
 
-    async def _test_release(self) -> dict[str, Any]:
-        return await self._ask(lambda desk: desk.test_release())
+    async def _test_release(self, who: Connection, /) -> dict[str, Any]:
+        return await self._ask(who, lambda controller: controller.test_release())
 
     async def _log_state(
-        self, run: object, attempt: object, state: object, reasons: object
+        self, who: Connection, /, run: object, attempt: object, state: object, reasons: object
     ) -> dict[str, Any]:
         which = _whole(run, "run"), _whole(attempt, "attempt")
         if not isinstance(reasons, list):
@@ -170,11 +200,13 @@ class Service:
             new = RunState(_text(state, "state"))
         except ValueError:
             raise rpc.RpcError(rpc.BAD_PARAMS, f"state: {state} is none") from None
-        return await self._ask(lambda desk: desk.log_state(*which, new, why))
+        return await self._ask(who, lambda controller: controller.log_state(*which, new, why))
 
-    async def _ask(self, work: Callable[[Desk], Any], *, writes: bool = True) -> dict[str, Any]:
-        self._server.lease.require(self._client)
-        done = self._server.worker.submit(work, self._client, writes=writes)
+    async def _ask(
+        self, who: Connection, work: Callable[[Controller], Any], *, writes: bool = True
+    ) -> dict[str, Any]:
+        self._lease.require(who)
+        done = self._worker.submit(work, who, writes=writes)
         result = await asyncio.wrap_future(done)
         found: dict[str, Any] = {} if result is None else result
         return found

@@ -7,6 +7,7 @@ worker connects again, with growing pauses, and settles what was under way.
 
 from __future__ import annotations
 
+import logging
 import queue
 import random
 import threading
@@ -15,18 +16,21 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.daemon.desk import Desk
-from rig.daemon.faults import ControlError, StoppedError, to_data
+from rig.daemon.lease import ControlError
+from rig.daemon.rpc import error_to_data, known
 from rig.errors import InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
+from rig.recorder.controller import Controller
+from rig.recorder.interrupts import StoppedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.daemon.hub import Hub
     from rig.daemon.lease import Lease
+    from rig.recorder.published import PublishedState
 
+log = logging.getLogger(__name__)
 _ARMED_S = 0.08  # between two requests while armed: the device gives the host 250 ms
 _WATCHED_S = 0.15  # between two looks at the gates
 _ALONE_S = 1.0  # when nobody looks: often enough to see that the cable is out
@@ -49,14 +53,14 @@ class Worker:
     ----------
     url
         The port.
-    hub
+    published
         Where everything is shown.
     lease
         Who may keep a drop armed.
     """
 
-    def __init__(self, url: str, hub: Hub, lease: Lease) -> None:
-        self.hub = hub
+    def __init__(self, url: str, published: PublishedState, lease: Lease) -> None:
+        self.published = published
         self._url = url
         self._lease = lease
         self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
@@ -72,7 +76,7 @@ class Worker:
         self._troubled: object = None  # the session that was open then
         self._retry_at = 0.0
         self._looked_at = self._next_ping = self._next_commit = self._next_statistics = 0.0
-        self.desk = Desk(url, hub=hub, halted=self._halted, keep_port=True)
+        self.controller = Controller(url, published=published, halted=self._halted, keep_port=True)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
     # ------------------------------------------------------------------ from other threads
@@ -82,14 +86,14 @@ class Worker:
         self._thread.start()
 
     def submit(
-        self, work: Callable[[Desk], Any], holder: object, *, writes: bool = True
+        self, work: Callable[[Controller], Any], holder: object, *, writes: bool = True
     ) -> Future[Any]:
         """Have something done, when what was asked for before is done.
 
         Parameters
         ----------
         work
-            Called with the desk, in the worker's thread.
+            Called with the controller, in the worker's thread.
         holder
             The client that must be in control at that moment.
         writes
@@ -102,7 +106,7 @@ class Worker:
             self._holder = holder
             if writes and isinstance(self._trouble, SessionError):
                 raise self._trouble
-            return work(self.desk)
+            return work(self.controller)
 
         self._jobs.put(_Job(controlled, outcome))
         return outcome
@@ -120,6 +124,16 @@ class Worker:
         """Note that the client in control is gone: look at once whether a drop is armed."""
         self._jobs.put(None)
 
+    def at_rest(self) -> Future[bool]:
+        """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
+        outcome: Future[bool] = Future()
+
+        def rests() -> bool:
+            return not isinstance(self._trouble, SessionError) and not self.controller.unsaved()
+
+        self._jobs.put(_Job(rests, outcome))
+        return outcome
+
     def end(self) -> None:
         """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""
         self._ending = True
@@ -132,12 +146,12 @@ class Worker:
     # ------------------------------------------------------------------ the thread
 
     def _halted(self) -> bool:
-        """Whether what is under way shall end: asked by the station, many times a second."""
+        """Whether what is under way shall end: asked by the recorder, many times a second."""
         if self._stop:
             return True
-        station = self.desk.station
-        armed = station is not None and station.armed is not None
-        asked = self._at_work and not self.desk.due
+        recorder = self.controller.recorder
+        armed = recorder is not None and recorder.armed is not None
+        asked = self._at_work and not self.controller.due
         return (self._ending or not self._held) and (armed or asked)
 
     @property
@@ -146,18 +160,18 @@ class Worker:
 
     def _run(self) -> None:
         if not is_simulated(self._url):
-            self._trying(self.desk.connect)
+            self._trying(self.controller.connect)
         while not self._ending:
             with suppress(queue.Empty):
                 self._do(self._jobs.get(timeout=self._patience()))
             self._attend()
-            self._trying(self.desk.finish)
-            self._trying(self.desk.notice)
+            self._trying(self.controller.finish)
+            self._trying(self.controller.notice)
             self._idle()
         self._stop = self._stop or "the daemon ended"
         self._attend()
         self._drain(StoppedError("the daemon ends", "start it again: rig daemon"))
-        self._trying(self.desk.close)
+        self._trying(self.controller.close)
 
     def _do(self, job: _Job | None) -> None:
         if job is None or not job.outcome.set_running_or_notify_cancel():
@@ -169,11 +183,12 @@ class Worker:
         try:
             result = job.work()
         except Exception as error:
+            failure = known(error)
             # First what follows for the link, so that a client sees it before its answer.
             if self._trouble is None:
-                self._weigh(known(error))
+                self._weigh(failure)
             stopped = isinstance(error, StoppedError) and self._stop
-            job.outcome.set_exception(StoppedError(self._stop) if stopped else known(error))
+            job.outcome.set_exception(StoppedError(self._stop) if stopped else failure)
         else:
             if self._trouble is not None and self._over():
                 self._well()
@@ -184,12 +199,12 @@ class Worker:
     def _over(self) -> bool:
         """Whether what was asked for has ended the trouble, by the way."""
         if isinstance(self._trouble, SessionError):
-            return self._troubled is not self._book
-        return self.desk.station is not None
+            return self._troubled is not self._open_session
+        return self.controller.recorder is not None
 
     @property
-    def _book(self) -> object:
-        return self.desk.session if self.desk.recording else None
+    def _open_session(self) -> object:
+        return self.controller.session if self.controller.recording else None
 
     def _drain(self, error: RigError) -> None:
         with suppress(queue.Empty):
@@ -200,8 +215,8 @@ class Worker:
 
     def _attend(self) -> None:
         """Switch off what must not stay on."""
-        station = self.desk.station
-        armed = station is not None and station.armed is not None
+        recorder = self.controller.recorder
+        armed = recorder is not None and recorder.armed is not None
         with self._guard:
             reason, stops = self._stop, [*self._stops]  # one that comes from here on is not lost
         if reason:
@@ -209,7 +224,7 @@ class Worker:
         elif armed and not self._held:
             reason = _LOST
         if reason:
-            self._trying(lambda: self.desk.stop(reason))
+            self._trying(lambda: self.controller.stop(reason))
         with self._guard:
             self._stops = [one for one in self._stops if one not in stops]
             if not self._stops:
@@ -226,52 +241,52 @@ class Worker:
         moments = [time.monotonic() + _ALONE_S]
         if self._trouble is not None:
             moments.append(self._retry_at)
-        elif self.desk.station is not None:
+        elif self.controller.recorder is not None:
             moments.append(self._looked_at + self._look_s)
-            if self.desk.recording:
+            if self.controller.recording:
                 moments.append(self._next_ping)
-            if self.hub.watched:
+            if self.published.watched:
                 moments.append(self._next_statistics)
         return max(0.0, min(moments) - time.monotonic())
 
     def _idle(self) -> None:
         now = time.monotonic()
-        station = self.desk.station
+        recorder = self.controller.recorder
         if self._trouble is not None:
             if now >= self._retry_at:
                 self._trying(self._recover)
             return
-        if station is None:
+        if recorder is None:
             if not is_simulated(self._url):
-                self._trying(self.desk.connect)
+                self._trying(self.controller.connect)
             return
         if now >= self._looked_at + self._look_s:
             self._looked_at = now
-            self._trying(station.look)
-        if self.desk.recording and station.armed is None and now >= self._next_ping:
+            self._trying(recorder.look)
+        if self.controller.recording and recorder.armed is None and now >= self._next_ping:
             self._next_ping = now + _PING_S * self._uneven.uniform(0.5, 1.5)
-            self._trying(station.ping)
-        if self.desk.recording and station.armed is None and now >= self._next_commit:
+            self._trying(recorder.ping)
+        if self.controller.recording and recorder.armed is None and now >= self._next_commit:
             self._next_commit = now + _COMMIT_S
-            self._trying(self.desk.session.commit)
-        if self.hub.watched and now >= self._next_statistics:
+            self._trying(self.controller.session.commit)
+        if self.published.watched and now >= self._next_statistics:
             self._next_statistics = now + _STATISTICS_S
             self._trying(self._statistics)
 
     @property
     def _look_s(self) -> float:
         """Time between two looks at the device."""
-        if self.desk.station is not None and self.desk.station.armed is not None:
+        if self.controller.recorder is not None and self.controller.recorder.armed is not None:
             return _ARMED_S
-        return _WATCHED_S if self.hub.watched else _ALONE_S
+        return _WATCHED_S if self.published.watched else _ALONE_S
 
     def _statistics(self) -> None:
-        station = self.desk.station
-        if station is None:
+        recorder = self.controller.recorder
+        if recorder is None:
             return
-        pending = self.desk.session.pending if self.desk.recording else 0
-        self.hub.set(
-            statistics=station.statistics()
+        pending = self.controller.session.pending if self.controller.recording else 0
+        self.published.set(
+            statistics=recorder.statistics()
             | {"uncommitted": pending, "commands_waiting": self._jobs.qsize()}
         )
 
@@ -289,49 +304,45 @@ class Worker:
         if isinstance(error, DeviceRefusedError | StoppedError | ControlError | InputError):
             return
         if isinstance(error, SessionError):
-            if not self.desk.recording:
+            if not self.controller.recording:
                 return  # of a file that is not, or no longer, open
-            station = self.desk.station
-            if station is not None and station.armed is not None:
+            recorder = self.controller.recorder
+            if recorder is not None and recorder.armed is not None:
                 with suppress(RigError):
-                    station.abort()
+                    recorder.abort()
         else:
             with suppress(RigError):
-                self.desk.disconnect()
-            if is_simulated(self._url) and not self.desk.recording:
+                self.controller.disconnect()
+            if is_simulated(self._url) and not self.controller.recording:
                 return  # there is no scene, so there is no port to come back to
         if self._trouble is None:
             self._pause_s = _FIRST_PAUSE_S
-        self._trouble, self._troubled = error, self._book
+        if str(self._trouble) != str(error):  # said once, however often it is tried again
+            what = "trouble" if isinstance(error, SessionError) else "down"
+            log.warning("%s: %s%s", what, error.message, f" ({error.hint})" if error.hint else "")
+        self._trouble, self._troubled = error, self._open_session
         self._retry_at = time.monotonic() + self._pause_s
-        up = self.desk.station is not None
-        self.hub.set(
+        up = self.controller.recorder is not None
+        self.published.set(
             link={
                 "state": "up" if up else "down",
-                "error": None if up else to_data(error),
+                "error": None if up else error_to_data(error),
                 "retry_s": self._pause_s,
             },
             phase="trouble",
-            error=to_data(error),
+            error=error_to_data(error),
             statistics=None,
         )
         self._pause_s = min(self._pause_s * _GROWTH, _LONGEST_PAUSE_S)
 
     def _recover(self) -> None:
-        if self.desk.recording:
-            self.desk.session.commit()  # what waits in memory since the disk was full
-        self.desk.connect()
-        if self.desk.recording:
-            self.desk.settle()
+        if self.controller.recording:
+            self.controller.session.commit()  # what waits in memory since the disk was full
+        self.controller.connect()
+        if self.controller.recording:
+            self.controller.settle()
         self._well()
 
     def _well(self) -> None:
         self._trouble = self._troubled = None
-        self.hub.set(error=None, phase="idle")
-
-
-def known(error: Exception) -> RigError:
-    """Put any failure into words."""
-    if isinstance(error, RigError):
-        return error
-    return RigError(f"unexpected: {error!r}", "a fault of this program: please report it")
+        self.published.set(error=None, phase="idle")

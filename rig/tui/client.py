@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.lease import LEASE_S
-from rig.daemon.place import default_socket, prepare_folder
+from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
 from rig.tui.state import State, typed
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _AGAIN_S = 0.5
 _START_S = 5.0  # a daemon that was started has this long before another one is
+_IDLE_S = 300.0  # nobody asked for that daemon by name, so it ends when it is left alone
 
 
 class ReconnectingClient:
@@ -74,15 +75,15 @@ class ReconnectingClient:
         """What the daemon said last."""
         if self._client is None:
             return State()
-        mirror = self._client.mirror
-        return typed(mirror.n, mirror.state) if mirror.state else State()
+        replica = self._client.replica
+        return typed(replica.n, replica.state) if replica.state else State()
 
     @property
     def driving(self) -> bool:
         """Whether this client has control."""
         if not self.up or self._client is None:
             return False
-        control = self._client.mirror.state.get("control")
+        control = self._client.replica.state.get("control")
         if control is None:
             # On a busy machine control may lapse; if nobody takes it, it is ours when we speak.
             return self._had_control
@@ -145,7 +146,7 @@ class ReconnectingClient:
             client.changed = self._note
             await client.subscribe()
             self._client, self.silence = client, ""
-            if self._wants_control and client.mirror.state.get("control") is None:
+            if self._wants_control and client.replica.state.get("control") is None:
                 with suppress(RigError):
                     await self.take_control()
             # Beside the signs of life: to open a session may take longer than control lasts.
@@ -167,7 +168,7 @@ class ReconnectingClient:
     async def _check(self, client: AsyncClient) -> None:
         """See that it is the daemon of the port that was asked for."""
         await client.subscribe()
-        self._port = str(client.mirror.state["port"]["url"])
+        self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
             raise DeviceError(
                 f"the daemon has {self._port}, not {self.url};",
@@ -175,7 +176,7 @@ class ReconnectingClient:
             )
 
     def _start(self, error: DeviceError) -> None:
-        """Start a daemon that outlives this screen."""
+        """Start a daemon that outlives this screen, as long as it has something to do."""
         if not self.url:
             raise error
         now = asyncio.get_running_loop().time()
@@ -188,6 +189,7 @@ class ReconnectingClient:
         # What it has to say about its own end would otherwise be lost with the terminal.
         with self.path.with_suffix(".log").open("ab") as log:
             command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
+            command += ["--idle-timeout", str(_IDLE_S)]
             self.daemon = subprocess.Popen(  # noqa: S603 - our own program
                 [*command, "--socket", str(self.path)],
                 stdin=subprocess.DEVNULL,

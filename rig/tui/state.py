@@ -1,6 +1,6 @@
 """The daemon's state as the screens see it: typed, and never changed under them.
 
-See rig/daemon/API.md for the sections; `rig.daemon.mirror` applies the changes.
+See rig/daemon/API.md for the sections; `rig.daemon.client_protocol` applies the changes.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def typed(n: int, state: Mapping[str, Any]) -> State:
     n
         Number of the last change in them.
     state
-        Sections by name. Entries of its lists are replaced by the mirror, never changed.
+        Sections by name. Entries of its lists are replaced by the replica, never changed.
     """
     sections = {name: value for name, value in state.items() if name not in {"runs", "edges"}}
     return State(

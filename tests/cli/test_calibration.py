@@ -10,11 +10,11 @@ import pytest
 
 from rig.clock.calibration import Calibrator
 from rig.clock.host import HostClocks, HostWatch, SystemClock
-from rig.daemon.station import Station
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.protocol import reader
 from rig.protocol.scene import PPS_U
+from rig.recorder.recorder import Recorder
 from rig.results import calibration
 from rig.session.store import Session
 from tests.cli.test_replay import tamper
@@ -164,7 +164,7 @@ def test_a_waiting_station_keeps_the_device_armed_without_clock_samples(tmp_path
         Session.create(
             tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
         ) as session,
-        Station(session, f"sim://?protocol={fence}") as station,
+        Recorder(session, f"sim://?protocol={fence}") as station,
     ):
         station.wait(2.0)
         token = station.arm(1, 1, protocol)
@@ -206,12 +206,12 @@ def test_a_host_that_sleeps_between_samples_is_noticed(tmp_path, fence, monkeypa
         hosts.append(Sleepy(port))
         return hosts[0]
 
-    monkeypatch.setattr("rig.daemon.station.port_clock", port_clock)
-    monkeypatch.setattr("rig.daemon.station.HostWatch", lambda: HostWatch(hosts[0].read))
+    monkeypatch.setattr("rig.recorder.recorder.port_clock", port_clock)
+    monkeypatch.setattr("rig.recorder.recorder.HostWatch", lambda: HostWatch(hosts[0].read))
     with Session.create(
         tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
     ) as session:
-        with Station(session, f"sim://?protocol={fence}") as station:
+        with Recorder(session, f"sim://?protocol={fence}") as station:
             station.wait(60.0)
             hosts[0].suspend(seconds)
             station.wait(60.0)
@@ -231,7 +231,7 @@ def test_a_real_host_is_believed_no_further_than_its_quartz(tmp_path, fence):
         with Session.create(
             tmp_path / f"{simulated}", protocol.text, "f", simulated=simulated, origin="x"
         ) as session:
-            with Station(session, f"sim://?protocol={fence}") as station:
+            with Recorder(session, f"sim://?protocol={fence}") as station:
                 station.wait(60.0)
             scales[simulated] = calibration(session).device
     assert scales[True].u < 2e-6

@@ -8,9 +8,9 @@ from contextlib import closing
 
 import pytest
 
-from rig.daemon.station import Station
 from rig.link import messages as wire
 from rig.link.frames import Decoder
+from rig.recorder.recorder import Recorder
 from rig.session.store import Session
 from sim.board import VirtualBoard
 
@@ -27,14 +27,14 @@ def tamper(session, sql, *values):
 
 
 def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
-    connect = Station.connect
+    connect = Recorder.connect
 
     def wired(station, port):
         identity = connect(station, port)
         station._port.board.sense(0.0125)
         return identity
 
-    monkeypatch.setattr(Station, "connect", wired)
+    monkeypatch.setattr(Recorder, "connect", wired)
     assert call("run", fence, "--port", "sim://", "--session", tmp_path / "s").code == 0
     with Session.open(tmp_path / "s", readonly=True) as session:
         senses = [drop.certificate.release_sense for drop in session.drops()]

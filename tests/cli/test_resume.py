@@ -13,13 +13,13 @@ from itertools import count
 
 import pytest
 
-from rig.daemon.interrupts import Interrupts
-from rig.daemon.station import Station
 from rig.errors import DeviceError, SessionError
 from rig.link.messages import Phase
 from rig.link.port import open_port
 from rig.ports import completed
 from rig.protocol import reader
+from rig.recorder.interrupts import Interrupts
+from rig.recorder.recorder import Recorder
 from rig.replay import replay
 from rig.results import calibration, results
 from rig.session.schema import RunState
@@ -337,7 +337,7 @@ def controller(station):
 def test_an_armed_release_is_disarmed_by_closing(new):
     session, url, scene = new()
     with session:
-        station = Station(session, url)
+        station = Recorder(session, url)
         station.connect()
         inside = controller(station)
         station.arm(1, 1, scene)
@@ -349,7 +349,7 @@ def test_an_armed_release_is_disarmed_by_closing(new):
 def test_a_recording_is_left_alone_by_closing(new):
     session, url, scene = new()
     with session:
-        station = Station(session, url)
+        station = Recorder(session, url)
         station.connect()
         inside = controller(station)
         station.fire(station.arm(1, 1, scene))
@@ -362,7 +362,7 @@ def test_a_disk_that_fails_neither_fires_nor_keeps_the_release_armed(new, tmp_pa
     session, url, scene = new()
     with session, closing(sqlite3.connect(session.path, isolation_level=None)) as other:
         session._connection.execute("PRAGMA busy_timeout = 0")
-        station = Station(session, url)
+        station = Recorder(session, url)
         station.connect()
         inside = controller(station)
         token = station.arm(1, 1, scene)
@@ -382,10 +382,10 @@ def test_a_disk_that_fails_neither_fires_nor_keeps_the_release_armed(new, tmp_pa
 def test_a_port_where_nobody_answers_is_closed_again(new, monkeypatch):
     session, url, _ = new()
     with session:
-        station = Station(session, url + "&lose=1")
+        station = Recorder(session, url + "&lose=1")
         opened = []
         monkeypatch.setattr(
-            "rig.daemon.station.port_clock", lambda port: opened.append(port) or port.clock
+            "rig.recorder.recorder.port_clock", lambda port: opened.append(port) or port.clock
         )
         with pytest.raises(DeviceError):
             station.connect()
@@ -410,7 +410,7 @@ def one_board(request, monkeypatch):
             made[0].open()
         return made[0]
 
-    monkeypatch.setattr("rig.daemon.station.open_port", reopen)
+    monkeypatch.setattr("rig.recorder.recorder.open_port", reopen)
     return lambda seconds: made[0].clock.sleep(seconds)  # noqa: PLW0108 - none is made yet
 
 
@@ -422,7 +422,7 @@ def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
         raise DeviceError("connection lost: somebody stumbled")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Station, fail, broken)
+        patch.setattr(Recorder, fail, broken)
         done = run()
     assert done.code == 4
     return done

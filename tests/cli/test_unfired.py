@@ -6,7 +6,7 @@ from itertools import count
 
 import pytest
 
-from rig.daemon.station import Station
+from rig.recorder.recorder import Recorder
 from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -27,7 +27,7 @@ def once_armed(monkeypatch):
     """Have something happen to the board right behind each of the first so many armings."""
 
     def have(happen, times):
-        arm, number = Station.arm, count(1)
+        arm, number = Recorder.arm, count(1)
 
         def armed(station, *what):
             token = arm(station, *what)
@@ -37,7 +37,7 @@ def once_armed(monkeypatch):
                 happen(port)
             return token
 
-        monkeypatch.setattr(Station, "arm", armed)
+        monkeypatch.setattr(Recorder, "arm", armed)
 
     return have
 
@@ -100,14 +100,14 @@ def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_a
 def test_a_slow_disk_does_not_disarm(run, tmp_path, monkeypatch):
     """Between arming and firing the disk is waited for twice."""
     commit, stations = Session.commit, []
-    connect = Station.connect
+    connect = Recorder.connect
 
     def slow(session):
         commit(session)
         if stations and stations[0]._port is not None:
             stations[0].clock.sleep(0.2)
 
-    monkeypatch.setattr(Station, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
+    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
     monkeypatch.setattr(Session, "commit", slow)
     done = run()
     assert done.code == 0
@@ -115,21 +115,21 @@ def test_a_slow_disk_does_not_disarm(run, tmp_path, monkeypatch):
 
 
 def test_a_station_that_waits_while_armed_stays_armed(run, monkeypatch):
-    arm = Station.arm
+    arm = Recorder.arm
 
     def patient(station, *what):
         token = arm(station, *what)
         station.wait(3.0)
         return token
 
-    monkeypatch.setattr(Station, "arm", patient)
+    monkeypatch.setattr(Recorder, "arm", patient)
     done = run()
     assert done.code == 0
     assert "not fired" not in done.err
 
 
 def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
-    arm, waited = Station.arm, []
+    arm, waited = Recorder.arm, []
 
     def armed(station, *what):
         if len(waited) % 2 == 0:
@@ -140,7 +140,7 @@ def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
         waited.append(station.clock.now_ns())
         return token
 
-    monkeypatch.setattr(Station, "arm", armed)
+    monkeypatch.setattr(Recorder, "arm", armed)
     assert run().code == 0
     for warmed, at in zip(waited[::2], waited[1::2], strict=True):
         assert 2.0e9 < at - warmed < 2.1e9
@@ -149,7 +149,7 @@ def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("looks", "code"), [(3, 0), (9, 4)])
 def test_an_open_stop_is_waited_for_a_little(run, tmp_path, monkeypatch, looks, code):
-    wait, number = Station.wait, count(1)
+    wait, number = Recorder.wait, count(1)
 
     def waited(station, seconds, *more):
         wait(station, seconds, *more)
@@ -157,7 +157,7 @@ def test_an_open_stop_is_waited_for_a_little(run, tmp_path, monkeypatch, looks, 
         if step in {1, looks}:
             station._port.board.stop(step == 1)
 
-    monkeypatch.setattr(Station, "wait", waited)
+    monkeypatch.setattr(Recorder, "wait", waited)
     done = run()
     assert done.code == code
     assert ("the emergency stop is open" in done.err) == (code == 4)
@@ -171,8 +171,8 @@ def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fenc
         asked.append(what)
         stations[0]._port.board.stop(len(asked) == 1)
 
-    stations, connect = [], Station.connect
-    monkeypatch.setattr(Station, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
+    stations, connect = [], Recorder.connect
+    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
     operator = Operator(say=lambda _: None, ask=ask)
     run_protocol(str(fence), "sim://", str(tmp_path / "s"), operator, 1)
     assert asked[1].startswith("not armed: the emergency stop is open; ")

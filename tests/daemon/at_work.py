@@ -5,9 +5,9 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from rig.daemon.hub import Hub
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
+from rig.recorder.published import PublishedState
 from tests.waiting import PATIENCE_S
 
 if TYPE_CHECKING:
@@ -21,14 +21,14 @@ def working(stand: Stand) -> Iterator[tuple[Worker, Callable[..., Any]]]:
     """Have a worker at a board, with a session open, and a way to ask it; control never lapses."""
     lease = Lease(lambda: 0.0)
     lease.take("me", "a test")
-    worker = Worker(str(stand.port), Hub(), lease)
+    worker = Worker(str(stand.port), PublishedState(), lease)
     worker.start()
 
     def ask(work: Callable[..., Any]) -> Any:
         return worker.submit(work, "me").result(PATIENCE_S)
 
     try:
-        ask(lambda desk: desk.open_session(str(stand.protocol), str(stand.session)))
+        ask(lambda controller: controller.open_session(str(stand.protocol), str(stand.session)))
         yield worker, ask
     finally:
         worker.end()

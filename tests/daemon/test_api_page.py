@@ -7,10 +7,9 @@ from pathlib import Path
 from unittest.mock import Mock
 
 from rig.daemon import rpc
-from rig.daemon.faults import from_data
-from rig.daemon.hub import Hub
 from rig.daemon.lease import LEASE_S
 from rig.daemon.service import Service
+from rig.recorder.published import PublishedState
 
 PAGE = (Path(__file__).parents[2] / "rig/daemon/API.md").read_text("utf-8")
 
@@ -21,18 +20,18 @@ def rows(heading):
 
 
 def test_every_method_is_on_the_page():
-    assert rows("Methods") == list(Service(Mock(), Mock())._methods)
+    assert rows("Methods") == list(Service("sim://", "", Mock(), Mock(), Mock())._methods)
 
 
 def test_every_section_is_on_the_page():
-    assert sorted(rows("State")) == sorted(Hub().snapshot()["state"])
+    assert sorted(rows("State")) == sorted(PublishedState().snapshot()["state"])
 
 
 def test_every_kind_of_error_is_on_the_page():
     kinds = re.search(r"^\| `kind` \| (.*) \|$", PAGE, re.MULTILINE).group(1)
     for kind in re.findall(r"`(\w+)`", kinds):
         data = {"kind": kind, "message": "m", "reason": "BUSY", "detail": 0}
-        assert type(from_data(data)).__name__ == kind
+        assert type(rpc.error_from_data(data)).__name__ == kind
 
 
 def test_the_page_has_the_numbers():

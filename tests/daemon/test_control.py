@@ -9,12 +9,13 @@ import pytest
 
 from rig.bench.invariants import broken, longest_on
 from rig.bench.stand import Stand
-from rig.daemon.faults import ControlError, StoppedError
+from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import TABLE, Abort, DropCertificate, Fire, Phase, Reason
 from rig.link.refusals import DeviceRefusedError
+from rig.recorder.interrupts import StoppedError
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.daemon.at_work import working
@@ -144,14 +145,14 @@ def test_any_client_stops_a_recording_and_what_there_is_is_kept(stand, armed, cl
 @pytest.fixture
 def unheard(monkeypatch):
     """Have a board and a worker that, unless stopped, repeats a request for ever."""
-    monkeypatch.setattr("rig.daemon.station.Device", partial(Device, tries=10**9))
+    monkeypatch.setattr("rig.recorder.recorder.Device", partial(Device, tries=10**9))
     with Stand(runs=2, seed=3) as stand, working(stand) as (worker, ask):
-        token = ask(lambda desk: desk.arm(1, 1))
+        token = ask(lambda controller: controller.arm(1, 1))
         yield stand, worker, token
 
 
 def repeated(worker, times=3):
-    until(lambda: worker.desk.station.device.statistics()["repeats"] >= times)
+    until(lambda: worker.controller.recorder.device.statistics()["repeats"] >= times)
 
 
 def test_a_stop_does_not_wait_for_answers_that_are_lost(unheard):
@@ -169,7 +170,7 @@ def test_a_stop_does_not_wait_for_answers_that_are_lost(unheard):
 def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
     stand, worker, token = unheard
     stand.hand("mute fall")
-    fired = worker.submit(lambda desk: desk.fire(token), "me")
+    fired = worker.submit(lambda controller: controller.fire(token), "me")
     repeated(worker, 1)
     stand.await_phase(Phase.RECORDING)
     worker.stop("no answer")

@@ -1,4 +1,4 @@
-"""Framing, errors as data, control, the hub and its mirror: what needs neither port nor clock."""
+"""Framing, errors as data, control, the state and its replica: what needs no port and no clock."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.daemon import rpc
-from rig.daemon.faults import ControlError, StoppedError, VersionError, from_data, to_data
-from rig.daemon.hub import EDGES_LIMIT, Hub
-from rig.daemon.lease import LEASE_S, Lease
-from rig.daemon.mirror import Mirror
-from rig.daemon.narration import Narration
+from rig.daemon.client_protocol import Replica
+from rig.daemon.lease import LEASE_S, ControlError, Lease
 from rig.errors import (
     DeviceError,
     DeviceTimeoutError,
@@ -26,6 +23,8 @@ from rig.errors import (
 )
 from rig.link.messages import DisarmReason, Reason
 from rig.link.refusals import DeviceRefusedError
+from rig.recorder.interrupts import StoppedError
+from rig.recorder.published import EDGES_LIMIT, PublishedState
 
 ERRORS = [
     RigError("something"),
@@ -37,7 +36,7 @@ ERRORS = [
     DeviceRefusedError(Reason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
     ControlError("taken"),
     StoppedError("stopped"),
-    VersionError("old"),
+    rpc.VersionError("old"),
 ]
 
 
@@ -54,12 +53,12 @@ def test_an_error_comes_out_as_it_went_in(error):
 
 
 def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():
-    again = from_data(to_data(DomainError("Eq. 13 is singular")))
+    again = rpc.error_from_data(rpc.error_to_data(DomainError("Eq. 13 is singular")))
     assert type(again) is InputError
 
 
 def test_an_error_of_a_kind_only_the_daemon_knows_is_an_error_all_the_same():
-    again = from_data({"kind": "NewerError", "message": "m", "hint": "h", "exit_code": 3})
+    again = rpc.error_from_data({"kind": "NewerError", "message": "m", "hint": "h", "exit_code": 3})
     assert (type(again), str(again), again.exit_code) == (RigError, "m\n  hint: h", 3)
 
 
@@ -129,87 +128,63 @@ def test_one_client_has_control_until_it_is_not_heard():
     assert lease.holder is None
 
 
-def test_a_mirror_shows_what_the_hub_shows_whenever_it_is_looked_at():
+def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
     """Random changes, taken at random moments, by one who joins at a random moment."""
     for seed in range(20):
-        chance, hub, mirror = random.Random(seed), Hub(), None
-        hub.plan({"run": n, "state": "planned"} for n in range(5))
+        chance, published, replica = random.Random(seed), PublishedState(), None
+        published.plan({"run": n, "state": "planned"} for n in range(5))
         for _ in range(200):
             match chance.randrange(6):
                 case 0:
-                    hub.set(gates={"blocked": chance.randrange(3)}, clients=chance.randrange(3))
+                    published.set(
+                        gates={"blocked": chance.randrange(3)}, clients=chance.randrange(3)
+                    )
                 case 1:
-                    hub.run(chance.randrange(7), state=chance.choice(["armed", "fired"]))
+                    published.run(chance.randrange(7), state=chance.choice(["armed", "fired"]))
                 case 2:
-                    hub.edges((chance.randrange(99), 1, 0) for _ in range(chance.randrange(3)))
+                    published.edges(
+                        (chance.randrange(99), 1, 0) for _ in range(chance.randrange(3))
+                    )
                 case 3 if chance.random() < 0.3:
-                    hub.replace_edges([(chance.randrange(9), 0, 1)])
+                    published.replace_edges([(chance.randrange(9), 0, 1)])
                 case 4 if chance.random() < 0.1:
-                    hub.plan({"run": n, "state": "planned"} for n in range(chance.randrange(5)))
+                    published.plan(
+                        {"run": n, "state": "planned"} for n in range(chance.randrange(5))
+                    )
                 case _:
-                    change = hub.take()
-                    if mirror is None:
-                        mirror = Mirror()
-                        mirror.snapshot(json.loads(json.dumps(hub.snapshot())))
+                    change = published.take()
+                    if replica is None:
+                        replica = Replica()
+                        replica.snapshot(json.loads(json.dumps(published.snapshot())))
                     elif change is not None:
-                        mirror.change(json.loads(json.dumps(change)))
-                    assert mirror.n == hub.snapshot()["n"]
-                    assert json.loads(json.dumps(hub.snapshot()["state"])) == mirror.state
+                        replica.change(json.loads(json.dumps(change)))
+                    assert replica.n == published.snapshot()["n"]
+                    assert json.loads(json.dumps(published.snapshot()["state"])) == replica.state
 
 
 def test_a_change_that_changes_nothing_is_none():
-    hub, told = Hub(), []
-    hub.changed = lambda: told.append(1)
-    hub.set(clients=0)
-    hub.edges(())
-    hub.run(7, state="armed")
-    assert hub.take() is None
+    published, told = PublishedState(), []
+    published.changed = lambda: told.append(1)
+    published.set(clients=0)
+    published.edges(())
+    published.run(7, state="armed")
+    assert published.take() is None
     assert not told
-    hub.set(clients=1)
-    hub.set(clients=2)
+    published.set(clients=1)
+    published.set(clients=2)
     assert told == [1], "once is enough until somebody has taken it"
-    assert hub.take() == {"n": 1, "set": {"clients": 2}}
+    assert published.take() == {"n": 1, "set": {"clients": 2}}
 
 
 def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
-    hub = Hub()
+    published = PublishedState()
     for first in range(0, 2 * EDGES_LIMIT, 1 << 12):
-        hub.edges((tick, 0, 1) for tick in range(first, first + (1 << 12)))
-    assert len(hub.snapshot()["state"]["edges"]) == EDGES_LIMIT
+        published.edges((tick, 0, 1) for tick in range(first, first + (1 << 12)))
+    assert len(published.snapshot()["state"]["edges"]) == EDGES_LIMIT
 
 
-def test_a_mirror_does_not_swallow_a_gap():
-    mirror = Mirror()
-    mirror.snapshot({"n": 3, "state": {"edges": []}})
+def test_a_replica_does_not_swallow_a_gap():
+    replica = Replica()
+    replica.snapshot({"n": 3, "state": {"edges": []}})
     with pytest.raises(ValueError, match="change 5 behind 3"):
-        mirror.change({"n": 5})
-
-
-def test_whoever_started_a_daemon_is_told_each_thing_once():
-    narration = Narration()
-    down = {"state": "down", "error": {"message": "gone", "hint": "plug it in"}, "retry_s": 1.0}
-    up = {"state": "up", "error": None, "retry_s": None}
-    device = {"board": "Mega", "unique_id": "07"}
-    said = [
-        list(narration.lines({"n": 1, "set": news}))
-        for news in (
-            {"device": device, "link": up},
-            {"link": {"state": "opening", "error": None, "retry_s": None}},
-            {"link": down, "error": {"kind": "DeviceError", "message": "gone", "hint": ""}},
-            {"link": down | {"retry_s": 2.0}},
-            {"link": up, "gates": {"blocked": 1}},
-            {"drop": {"run": 3, "attempt": 1, "state": "armed", "events": 0}},
-            {"drop": {"run": 3, "attempt": 1, "state": "recorded", "events": 8}},
-            {"error": {"kind": "SessionError", "message": "the disk is full", "hint": ""}},
-        )
-    ]
-    assert said == [
-        ["up: Mega, id 07"],
-        [],
-        ["down: gone (plug it in)"],
-        [],
-        ["up: Mega, id 07"],
-        [],
-        ["run 3, attempt 1: recorded, 8 events"],
-        ["trouble: the disk is full"],
-    ]
+        replica.change({"n": 5})

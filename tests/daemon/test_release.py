@@ -6,10 +6,11 @@ import threading
 
 import pytest
 
-from rig.daemon.faults import ControlError, StoppedError
+from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, InputError
 from rig.link.messages import Phase, Reason
 from rig.link.refusals import DeviceRefusedError
+from rig.recorder.interrupts import StoppedError
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session

@@ -9,8 +9,8 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from rig.bench.stand import Stand
-from rig.daemon.desk import Desk
 from rig.errors import DeviceError
+from rig.recorder.controller import Controller
 from rig.session.store import Session
 from tests.daemon.at_work import working
 from tests.waiting import until
@@ -19,7 +19,7 @@ from tests.waiting import until
 @pytest.fixture
 def usb(monkeypatch):
     """Say which serial numbers are at these links, as /sys would say it."""
-    monkeypatch.setattr("rig.daemon.station.BOOT_WAIT_S", 0.1)  # a terminal restarts no board
+    monkeypatch.setattr("rig.recorder.recorder.BOOT_WAIT_S", 0.1)  # a terminal restarts no board
     links = {}
 
     def comports():
@@ -39,11 +39,11 @@ def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
         elsewhere = stand.folder / "elsewhere"
         usb |= {stand.port: "85430", elsewhere: "85430"}
         with working(stand) as (worker, ask):
-            assert worker.hub.get("port")["path"] == str(stand.port)
-            ask(lambda desk: desk.fire(desk.arm(1, 1)))
+            assert worker.published.get("port")["path"] == str(stand.port)
+            ask(lambda controller: controller.fire(controller.arm(1, 1)))
             stand.hand(f"pull 0.3 {elsewhere}")
-            until(lambda: worker.hub.get("port")["path"] == os.path.realpath(elsewhere))
-            drop = ask(lambda desk: desk.collect(1, 1))
+            until(lambda: worker.published.get("port")["path"] == os.path.realpath(elsewhere))
+            drop = ask(lambda controller: controller.collect(1, 1))
         assert drop.faults == ()
         assert drop.edges
         with Session.open(stand.session, readonly=True) as session:
@@ -56,19 +56,19 @@ def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
     with Stand(1, seed=1) as stand, Stand(1, seed=2) as other:
         usb |= {stand.port: numbers[0]}
         with working(stand) as (worker, ask):
-            ask(lambda desk: desk.fire(desk.arm(1, 1)))
-            until(lambda: worker.hub.get("drop")["state"] == "recorded")
+            ask(lambda controller: controller.fire(controller.arm(1, 1)))
+            until(lambda: worker.published.get("drop")["state"] == "recorded")
             stand.hand("pull 60")
-            until(lambda: worker.hub.get("link")["state"] == "down")
+            until(lambda: worker.published.get("link")["state"] == "down")
             usb[stand.port] = numbers[1]
             stand.port.symlink_to(other.port)
-            until(lambda: "another board" in str(worker.hub.get("error")))
-            assert "give the same rig run command again" in worker.hub.get("error")["hint"]
+            until(lambda: "another board" in str(worker.published.get("error")))
+            assert "give the same rig run command again" in worker.published.get("error")["hint"]
             with pytest.raises(DeviceError, match="no connection"):
-                ask(lambda desk: desk.arm(2, 1))
+                ask(lambda controller: controller.arm(2, 1))
             # Whoever means it says so by giving the command again.
-            ask(lambda desk: desk.open_session(str(other.protocol), str(other.session)))
-            assert worker.hub.get("link")["state"] == "up"
+            ask(lambda controller: controller.open_session(str(other.protocol), str(other.session)))
+            assert worker.published.get("link")["state"] == "up"
         assert [seen["phase"] for seen in other.happened() if "phase" in seen] == []
 
 
@@ -76,13 +76,16 @@ def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
     with Stand(1) as stand:
         elsewhere = stand.folder / "elsewhere"
         usb |= {stand.port: "85430", elsewhere: "85430"}
-        with closing(Desk(str(stand.port))) as desk:
-            desk.open_session(str(stand.protocol), str(stand.session))
+        with closing(Controller(str(stand.port))) as controller:
+            controller.open_session(str(stand.protocol), str(stand.session))
         stand.hand(f"pull 0 {elsewhere}")
         until(elsewhere.exists)
-        with closing(Desk(str(stand.port))) as desk:
-            desk.open_session(str(stand.protocol), str(stand.session))
-            assert desk.hub.get("port")["path"] == os.path.realpath(elsewhere)
+        with closing(Controller(str(stand.port))) as controller:
+            controller.open_session(str(stand.protocol), str(stand.session))
+            assert controller.published.get("port")["path"] == os.path.realpath(elsewhere)
         usb[elsewhere] = "999"
-        with closing(Desk(str(stand.port))) as desk, pytest.raises(DeviceError, match="no such"):
-            desk.open_session(str(stand.protocol), str(stand.session))
+        with (
+            closing(Controller(str(stand.port))) as controller,
+            pytest.raises(DeviceError, match="no such"),
+        ):
+            controller.open_session(str(stand.protocol), str(stand.session))

@@ -17,10 +17,9 @@ from rig.bench.stand import Stand
 from rig.daemon import rpc
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
-from rig.daemon.doorway import notify_systemd
-from rig.daemon.faults import VersionError
-from rig.daemon.place import default_socket, prepare_folder
+from rig.daemon.listener import notify_systemd
 from rig.daemon.server import Server
+from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, InputError, RigError
 from tests.waiting import PATIENCE_S
 
@@ -104,7 +103,7 @@ def test_a_client_of_another_version_is_told_so_and_sent_away(door):
     async def test(server, path):
         skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
         answer, end = await told(path, skewed, HELLO)
-        with pytest.raises(VersionError, match="version 2 of the daemon's interface"):
+        with pytest.raises(rpc.VersionError, match="version 2 of the daemon's interface"):
             rpc.result_of(answer)
         assert end is None
 
@@ -159,31 +158,31 @@ def test_a_snapshot_has_every_section_that_is_promised(door):
     async def test(server, path):
         client = await AsyncClient.connect(path, "tui")
         await client.subscribe()
-        assert set(client.mirror.state) == _SECTIONS
-        assert client.mirror.state["port"] == {
+        assert set(client.replica.state) == _SECTIONS
+        assert client.replica.state["port"] == {
             "url": "sim://", "simulated": True, "path": "sim://",
         }  # fmt: skip
-        assert client.mirror.state["clients"] == 1
+        assert client.replica.state["clients"] == 1
         await client.close()
 
     door(test)
 
 
-def test_two_mirrors_follow_what_happens(door):
+def test_two_replicas_follow_what_happens(door):
     async def test(server, path):
         clients = [await AsyncClient.connect(path, f"tui {n}") for n in range(2)]
         await clients[0].subscribe()
-        server.hub.edges([(1, 0, 1)])
+        server.published.edges([(1, 0, 1)])
         await clients[1].subscribe()
-        server.hub.edges([(2, 0, 0)])
+        server.published.edges([(2, 0, 0)])
         await clients[0].call("take_control")
         for client in clients:
-            while client.mirror.state["control"] is None:
+            while client.replica.state["control"] is None:
                 changed = asyncio.Event()
                 client.changed = changed.set
                 await changed.wait()
-            assert client.mirror.state["edges"] == [[1, 0, 1], [2, 0, 0]]
-            assert client.mirror.state["control"] == {"client": "tui 0"}
+            assert client.replica.state["edges"] == [[1, 0, 1], [2, 0, 0]]
+            assert client.replica.state["control"] == {"client": "tui 0"}
             await client.close()
 
     door(test)
@@ -195,16 +194,16 @@ def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_do
         slow.connect(str(path))
         slow.sendall(HELLO + rpc.request("subscribe", {}, 2))
         slow.setblocking(False)
-        while not any(one.subscribed for one in server.connections):
+        while not any(one.subscribed for one in server.publisher.connections):
             await asyncio.sleep(0)
-        (stuck,) = server.connections
+        (stuck,) = server.publisher.connections
         quick = await AsyncClient.connect(path, "quick")
         await quick.subscribe()
         for number in range(400):
-            server.hub.set(error={"message": f"{number} " + "x" * 2000})
-            server.spread()
+            server.published.set(error={"message": f"{number} " + "x" * 2000})
+            server.publisher.spread()
             assert stuck.waiting() < 100_000
-            while not str((quick.mirror.state["error"] or {}).get("message")).startswith(
+            while not str((quick.replica.state["error"] or {}).get("message")).startswith(
                 f"{number} "
             ):
                 await asyncio.sleep(0)  # the other one is not slowed down
@@ -300,7 +299,7 @@ def test_systemd_is_told_when_it_asks(monkeypatch, tmp_path):
 def test_a_run_without_a_daemon_does_not_load_asyncio(tmp_path):
     program = (
         "import sys; from rig.daemon.connecting import connect; "
-        "from rig.daemon.interrupts import Interrupts; "
+        "from rig.recorder.interrupts import Interrupts; "
         "connect('sim://', print, Interrupts()); print('asyncio' in sys.modules)"
     )
     done = subprocess.run(

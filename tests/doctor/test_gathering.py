@@ -16,7 +16,7 @@ from rig.doctor.facts import Owner
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.session.store import Session
-from sim.controller import Controller
+from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import LoopedBoard, Wire, port_of
 
@@ -125,12 +125,12 @@ def test_edges_of_a_flickering_gate_are_seen():
 
 
 def test_a_blocked_gate_is_left_out(monkeypatch):
-    class Stuck(Controller):
+    class Stuck(Microcontroller):
         def _status(self):
             self.gates |= 2
             return super()._status()
 
-    monkeypatch.setattr("sim.board.Controller", Stuck)
+    monkeypatch.setattr("sim.board.Microcontroller", Stuck)
     port = port_of(LoopedBoard(lab()))
     facts = look_at_board(port, port.clock)
     assert facts.states.stuck == 2

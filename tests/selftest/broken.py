@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rig.link import messages as wire
 from rig.link.messages import DisarmReason, Phase, Reason
-from sim.controller import Controller
+from sim.controller import Microcontroller
 from sim.recording import Recording
 from tests.selftest.benches import GATE, LoopedBoard, Wire
 
@@ -25,7 +25,7 @@ def caught_by(check):
 def also(answer, when):
     """Make a controller that answers some requests in its own way."""
 
-    class Odd(Controller):
+    class Odd(Microcontroller):
         def answer(self, frame, now_ns):
             usual = super().answer(frame, now_ns)
             request = wire.TABLE.get(frame.type)
@@ -51,7 +51,7 @@ class Nameless(LoopedBoard):
 
 
 @caught_by("VERSION")
-class AnyVersion(Controller):
+class AnyVersion(Microcontroller):
     def _identify(self, request):
         return self._identity
 
@@ -67,7 +67,7 @@ class Agreeable(also(wire.Done(), lambda asked, _: asked is None)):
 
 
 @caught_by("BAD_PARAMETER by length")
-class AnyLength(Controller):
+class AnyLength(Microcontroller):
     def answer(self, frame, now_ns):
         if frame.type == wire.CODES[wire.Ping]:
             frame = frame._replace(payload=b"")
@@ -89,7 +89,7 @@ class FastClock(LoopedBoard):
         super().__init__(*args, ppm=20_000, **kwargs)
 
 
-class Lapses(Controller):
+class Lapses(Microcontroller):
     deadline_ms = silence_ms = 0
 
     @property
@@ -113,7 +113,7 @@ class TimesOutEarly(Lapses):
 
 
 @caught_by("arming times out")
-class NamesTheWrongReason(Controller):
+class NamesTheWrongReason(Microcontroller):
     def lapse(self, now_ns):
         return self._disarm(DisarmReason.HOST_SILENT)
 
@@ -134,7 +134,7 @@ class Impatient(Lapses):
 
 
 @caught_by("a silent host disarms")
-class SaysSoAndStaysArmed(Controller):
+class SaysSoAndStaysArmed(Microcontroller):
     def lapse(self, now_ns):
         order = self.order
         said = super().lapse(now_ns)
@@ -147,7 +147,7 @@ class SaysSoAndStaysArmed(Controller):
 
 
 @caught_by("NOT_ARMED")
-class FiresAnyTime(Controller):
+class FiresAnyTime(Microcontroller):
     def _fire(self, request):
         if self.order is None and self.drop is None:
             return wire.Fired(1)
@@ -155,13 +155,13 @@ class FiresAnyTime(Controller):
 
 
 @caught_by("WRONG_TOKEN")
-class AnyToken(Controller):
+class AnyToken(Microcontroller):
     def _fire(self, request):
         return super()._fire(wire.Fire(self._token))
 
 
 @caught_by("WRONG_TOKEN")
-class OneToken(Controller):
+class OneToken(Microcontroller):
     def _arm(self, order):
         answer = super()._arm(order)
         self._token = 77
@@ -169,7 +169,7 @@ class OneToken(Controller):
 
 
 @caught_by("ARM and ABORT")
-class StaysArmed(Controller):
+class StaysArmed(Microcontroller):
     def _abort(self):
         order = self.order
         done = super()._abort()
@@ -179,13 +179,13 @@ class StaysArmed(Controller):
 
 
 @caught_by("ARM and ABORT")
-class ForgetsItsLabel(Controller):
+class ForgetsItsLabel(Microcontroller):
     def _status(self):
         return replace(super()._status(), label=0)
 
 
 @caught_by("BAD_PARAMETER")
-class ARefusalDisarms(Controller):
+class ARefusalDisarms(Microcontroller):
     def _arm(self, order):
         answer = super()._arm(order)
         if answer == wire.Refused(Reason.BAD_PARAMETER, 0):
@@ -194,7 +194,7 @@ class ARefusalDisarms(Controller):
 
 
 @caught_by("NO_SUCH_DROP")
-class AlwaysReads(Controller):
+class AlwaysReads(Microcontroller):
     def _not_held(self, label):
         return None if self.drop else wire.Refused(Reason.NOT_KEPT, 0)
 
@@ -203,14 +203,14 @@ class AlwaysReads(Controller):
 
 
 @caught_by("gates")
-class StuckGate(Controller):
+class StuckGate(Microcontroller):
     def _status(self):
         self.gates |= 1 << 6
         return super()._status()
 
 
 @caught_by("gates")
-class FlickeringGate(Controller):
+class FlickeringGate(Microcontroller):
     def _status(self):
         self.gates ^= 1 << 6
         return super()._status()
@@ -273,7 +273,7 @@ class Sensitive(LoopedBoard):
 
 
 @caught_by("certificate")
-class WrongSum(Controller):
+class WrongSum(Microcontroller):
     def _fire(self, request):
         answer = super()._fire(request)
         if isinstance(self.drop, Recording):
@@ -290,7 +290,7 @@ class NeverBusy(
 
 
 @caught_by("ABORT of a recording")
-class RecordsOn(Controller):
+class RecordsOn(Microcontroller):
     def _abort(self):
         end_ns = self.end_ns
         done = super()._abort()
@@ -300,7 +300,7 @@ class RecordsOn(Controller):
 
 
 @caught_by("HOLDING_A_DROP")
-class DropsTheDrop(Controller):
+class DropsTheDrop(Microcontroller):
     def _arm(self, order):
         if self.end_ns is None:
             self.drop = None
@@ -308,7 +308,7 @@ class DropsTheDrop(Controller):
 
 
 @caught_by("reading again")
-class ReadsAnything(Controller):
+class ReadsAnything(Microcontroller):
     def _read(self, request):
         if request.count and self.drop is not None and request.first >= len(self.drop):
             return self.drop.part(0, 0)
@@ -316,7 +316,7 @@ class ReadsAnything(Controller):
 
 
 @caught_by("reading again")
-class CertifiesAnew(Controller):
+class CertifiesAnew(Microcontroller):
     def _read(self, request):
         answer = super()._read(request)
         if isinstance(answer, wire.DropCertificate):
@@ -325,14 +325,14 @@ class CertifiesAnew(Controller):
 
 
 @caught_by("ACKNOWLEDGE and WRONG_CRC")
-class AnySum(Controller):
+class AnySum(Microcontroller):
     def _acknowledge(self, request):
         held = self.drop.certificate().crc32 if self.drop else 0
         return super()._acknowledge(replace(request, crc32=held))
 
 
 @caught_by("ACKNOWLEDGE and WRONG_CRC")
-class KeepsTheDrop(Controller):
+class KeepsTheDrop(Microcontroller):
     offended = False
 
     def _acknowledge(self, request):
@@ -346,7 +346,7 @@ class KeepsTheDrop(Controller):
 
 
 @caught_by("COOLING")
-class NeverCools(Controller):
+class NeverCools(Microcontroller):
     def _arm(self, order):
         self.release._off_ns = 0
         return super()._arm(order)
@@ -369,7 +369,7 @@ class BouncingOutput(LoopedBoard):
 
 
 @caught_by("sync output to gate")
-class WireToSupply(Controller):
+class WireToSupply(Microcontroller):
     def _status(self):
         self.gates |= 1 << GATE
         return super()._status()

@@ -13,7 +13,7 @@ from rig.selftest.requests import BAD_ORDERS
 from rig.selftest.run import CHECKS, selftest
 from rig.selftest.verdicts import Verdict
 from sim.board import VirtualBoard
-from sim.controller import Controller
+from sim.controller import Microcontroller
 from tests.selftest.benches import LoopedBoard, Wire, outcomes, port_of
 from tests.selftest.broken import BROKEN
 
@@ -24,7 +24,7 @@ HANDS = {"GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
 def board_of(kind, monkeypatch):
     if issubclass(kind, VirtualBoard):
         return kind(Wire())
-    monkeypatch.setattr("sim.board.Controller", kind)
+    monkeypatch.setattr("sim.board.Microcontroller", kind)
     return LoopedBoard(Wire())
 
 
@@ -42,7 +42,7 @@ def test_each_check_has_a_board_that_fails_it():
 
 @pytest.mark.parametrize("bad", BAD_ORDERS, ids=str)
 def test_each_bad_order_that_is_accepted_is_found_out(bad, monkeypatch):
-    class Lax(Controller):
+    class Lax(Microcontroller):
         def _arm(self, order):
             answer = super()._arm(order)
             like = all(getattr(order, name) == value for name, value in bad.items())
@@ -62,7 +62,7 @@ def test_what_a_board_accepts_wrongly_is_not_fired(monkeypatch):
     """Not even when it cannot be disarmed any more: a release might be driven."""
     fired = []
 
-    class Stubborn(Controller):
+    class Stubborn(Microcontroller):
         def _arm(self, order):
             if order.label == 0:  # a bad order, with a release
                 self.order, self._token, self._deadline_ns = order, 1, 2**62

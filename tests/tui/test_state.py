@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
-from rig.daemon.mirror import Mirror
+from rig.daemon.client_protocol import Replica
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model, alarm
 from rig.tui.state import State, typed
@@ -38,13 +38,13 @@ changes = st.fixed_dictionaries(
 
 @given(st.lists(changes, max_size=8))
 def test_a_state_once_taken_never_changes(steps):
-    mirror = Mirror()
-    mirror.snapshot(copy.deepcopy({"n": 7, "state": STATE}))
+    replica = Replica()
+    replica.snapshot(copy.deepcopy({"n": 7, "state": STATE}))
     taken = []
     for n, change in enumerate(steps, start=8):
-        state = typed(mirror.n, mirror.state)
+        state = typed(replica.n, replica.state)
         taken.append((state, copy.deepcopy(state)))
-        mirror.change({"n": n} | change)
+        replica.change({"n": n} | change)
     assert all(state == as_it_was for state, as_it_was in taken)
 
 

@@ -16,8 +16,8 @@ from rig.link.wiretypes import EVENTS
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from rig.daemon.hub import Hub
     from rig.link.transcript import Record
+    from rig.recorder.published import PublishedState
     from rig.records import Drop
 
 _PHASES = {
@@ -28,17 +28,17 @@ _PHASES = {
 }
 
 
-class View:
-    """Keeps a hub's device, gates, phase, drop and edges.
+class StateFeed:
+    """Keeps device, gates, phase, drop and edges of the published state.
 
     Parameters
     ----------
-    hub
+    published
         Where clients look.
     """
 
-    def __init__(self, hub: Hub) -> None:
-        self._hub = hub
+    def __init__(self, published: PublishedState) -> None:
+        self._published = published
         self._tick_hz = 0
         self._label = 0
         self._fire_tick: int | None = None
@@ -52,23 +52,25 @@ class View:
         match record.message:
             case wire.Identity() as identity:
                 self._tick_hz = identity.tick_hz
-                self._hub.set(device=asdict(identity) | {"unique_id": identity.unique_id.hex()})
+                self._published.set(
+                    device=asdict(identity) | {"unique_id": identity.unique_id.hex()}
+                )
             case wire.State(phase=phase, gates=gates):
-                self._hub.set(gates={"blocked": gates}, phase=_PHASES[phase])
+                self._published.set(gates={"blocked": gates}, phase=_PHASES[phase])
             case wire.Disarmed():
-                self._hub.set(phase="idle")
+                self._published.set(phase="idle")
             case wire.Fired(tick=tick) if self._label:
                 self._fire_tick = tick
                 self._drop("fired")
-                self._hub.set(phase="recording")
+                self._published.set(phase="recording")
             case wire.EventsFrame(label=label) as frame if label == self._label:
                 self._events(frame)
             case wire.DropCertificate():
-                self._hub.set(phase="storing")
+                self._published.set(phase="storing")
 
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...]) -> None:
         """Take a line of the log of run states."""
-        self._hub.run(run, attempt=attempt, state=str(state), reasons=list(reasons))
+        self._published.run(run, attempt=attempt, state=str(state), reasons=list(reasons))
         if state is RunState.ARMED:
             self._armed(run, attempt)
         elif state is RunState.INTERRUPTED and self._label == wire.pack_label(run, attempt):
@@ -78,23 +80,23 @@ class View:
     def _armed(self, run: int, attempt: int) -> None:
         self._label = wire.pack_label(run, attempt)
         self._fire_tick, self._state, self._next = None, 0, 0
-        self._hub.replace_edges(())
+        self._published.replace_edges(())
         self._drop("armed")
-        self._hub.set(phase="armed")
+        self._published.set(phase="armed")
 
     def recorded(self, drop: Drop) -> None:
         """Show a drop as it was stored."""
         self._label = wire.pack_label(drop.run, drop.attempt)
         self._fire_tick = drop.fire_tick
         self._next = drop.certificate.events if drop.certificate else len(drop.edges)
-        self._hub.replace_edges((e.tick, e.channel, int(e.blocked)) for e in drop.edges)
+        self._published.replace_edges((e.tick, e.channel, int(e.blocked)) for e in drop.edges)
         self._drop("recorded")
-        self._hub.set(phase="idle")
+        self._published.set(phase="idle")
         self._label = 0
 
     def _drop(self, state: str) -> None:
         run, attempt = wire.unpack_label(self._label)
-        self._hub.set(
+        self._published.set(
             drop={
                 "run": run,
                 "attempt": attempt,
@@ -115,6 +117,6 @@ class View:
         found = edges(events, state, ALL_GATES, self._fire_tick)
         self._state = events[-1][1] if events else state
         self._next = frame.first + len(events)
-        self._hub.edges([(tick, channel, int(blocked)) for tick, channel, blocked in found])
-        self._hub.set(gates={"blocked": self._state})
+        self._published.edges([(tick, channel, int(blocked)) for tick, channel, blocked in found])
+        self._published.set(gates={"blocked": self._state})
         self._drop("fired")

@@ -1,4 +1,4 @@
-"""What a station writes down, and the record that is none: for a device without a session."""
+"""Where a recorder writes: a session, or nowhere for a device without one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rig.session.schema import RunState
 
 
-class Record(Protocol):
-    """Where a station puts what happens; `rig.session.store.Session` is the one that keeps it."""
+class SessionSink(Protocol):
+    """Where a recorder puts what happens; `rig.session.store.Session` is the one that keeps it."""
 
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None: ...  # noqa: D102
 
@@ -36,8 +36,8 @@ class Record(Protocol):
     def commit(self) -> None: ...  # noqa: D102
 
 
-class Unrecorded:
-    """Nothing is kept. A station with this one watches, and never arms."""
+class NullSink:
+    """Nothing is kept. A recorder with this one watches, and never arms."""
 
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
         """Forget bytes."""

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, kept waiting while a record is half made."""
+"""Ctrl-C, SIGTERM and STOP: how what is under way is ended without tearing a record apart."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ import signal
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from rig.errors import DeviceError
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _PATIENCE = 3
+
+
+class StoppedError(DeviceError):
+    """A client pressed STOP, or the one in control was lost."""
 
 
 class Interrupts:

@@ -15,7 +15,7 @@ SERIAL_NUMBER = "usb_serial_number"
 """In a session's record of who was there."""
 
 
-class Home:
+class BoardLocator:
     """The port that was named, and the board that was met there.
 
     Parameters

@@ -6,12 +6,11 @@ import asyncio
 import json
 import os
 import socket
-import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig.daemon import rpc
-from rig.daemon.place import prepare_folder, token_file
+from rig.daemon.socket_path import prepare_folder, token_file
 from rig.errors import InputError
 from rig.files import write_atomic
 
@@ -68,8 +67,6 @@ def leave(path: Path, token: str) -> None:
 
 
 def _answers_at_socket(path: Path) -> bool:
-    if sys.platform == "win32":
-        return False
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.settimeout(_PROBE_S)
         try:
@@ -98,7 +95,7 @@ def _answers_at_port(file: Path) -> bool:
 def notify_systemd() -> None:
     """Tell systemd that clients can come, where it asked to be told (sd_notify(3))."""
     address = os.environ.get("NOTIFY_SOCKET", "")
-    if not address or sys.platform == "win32":
+    if not address:
         return
     with (
         suppress(OSError),

@@ -1,30 +1,30 @@
-"""What clients can ask for, carried out on one station and one session by one thread.
+"""What clients can ask for, carried out on one port and one session file by one thread.
 
-`rig run` without a daemon calls a desk of its own; the daemon's worker calls one for its clients.
+`rig run` without a daemon calls a controller of its own, the daemon's worker one for its clients.
 """
 
 from __future__ import annotations
 
+import logging
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
-from rig.daemon import release
-from rig.daemon.faults import StoppedError
-from rig.daemon.home import SERIAL_NUMBER, Home
-from rig.daemon.hub import Hub
-from rig.daemon.interrupts import Interrupts
-from rig.daemon.opening import known_before, open_for, shown
-from rig.daemon.record import Unrecorded
-from rig.daemon.station import DISCARD, Station
-from rig.daemon.view import View
 from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.messages import TEST_RUN, Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_board
+from rig.recorder import release_test
+from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
+from rig.recorder.feed import StateFeed
+from rig.recorder.interrupts import Interrupts, StoppedError
+from rig.recorder.opening import known_before, open_for, shown
+from rig.recorder.published import PublishedState
+from rig.recorder.recorder import DISCARD, Recorder
+from rig.recorder.sink import NullSink
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -36,11 +36,12 @@ if TYPE_CHECKING:
     from rig.records import Drop
     from rig.session.store import Session
 
+log = logging.getLogger(__name__)
 _OPEN = (RunState.ARMED, RunState.FIRED)
 _VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
 
 
-class Desk:
+class Controller:
     """The one place where sessions are opened and drops are made.
 
     Parameters
@@ -48,17 +49,17 @@ class Desk:
     url
         The port, as the user named it.
     interrupts
-        As for `Station`.
-    hub
+        As for `Recorder`.
+    published
         Where everything is shown.
     halted
-        As for `Station`.
+        As for `Recorder`.
     keep_port
         Whether the port stays open between sessions.
 
     Attributes
     ----------
-    station
+    recorder
         Connected, or `None`.
     due
         Run and attempt of a drop that fell and was not collected yet.
@@ -69,21 +70,21 @@ class Desk:
         url: str,
         interrupts: Interrupts | None = None,
         *,
-        hub: Hub | None = None,
+        published: PublishedState | None = None,
         halted: Callable[[], bool] = lambda: False,
         keep_port: bool = False,
     ) -> None:
         self.url = url
         self.interrupts = Interrupts() if interrupts is None else interrupts
-        self.hub = Hub() if hub is None else hub
-        self.station: Station | None = None
+        self.published = PublishedState() if published is None else published
+        self.recorder: Recorder | None = None
         self.due: tuple[int, int] | None = None
         self._halted = halted
         self._keep_port = keep_port and not is_simulated(url)
         self._session: Session | None = None
         self._protocol: Protocol | None = None
         self._line_url = url  # with all that a simulation is told
-        self._home = Home(url)
+        self._locator = BoardLocator(url)
         self._unarmed: RigError | None = None  # why what was armed is not
         self._lost: dict[tuple[int, int], RigError] = {}  # why a drop is not in the session
 
@@ -141,10 +142,10 @@ class Desk:
         try:
             before = known_before(opened)
             self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
-            self._home.seek(before.get(SERIAL_NUMBER))
+            self._locator.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
             check_board(scene, self.connect().capabilities())
-            self._home.bound = True
+            self._locator.bound = True
             with self.interrupts.held():
                 opened.put_results([], __version__)  # of less than there will be
                 opened.commit()
@@ -153,32 +154,34 @@ class Desk:
             self._part_with(opened)
             raise
         about, plan = shown(opened, scene)
-        self.hub.plan(plan)
-        self.hub.set(session=about, drop=None, release_test=None)
+        log.info("session: %s", path)
+        self.published.plan(plan)
+        self.published.set(session=about, drop=None, release_test=None)
         return fetched
 
     def close_session(self) -> None:
         """Make safe and close the file, whole; nothing when none is open."""
         if self._session is not None:
+            log.info("closed: %s", self._session.path)
             self._part_with(self._session)
 
     def _part_with(self, session: Session) -> None:
         """Close a session; a port that shall stay open does."""
         self._session = self._protocol = None
-        self._home.bound = False
+        self._locator.bound = False
         self._lost.clear()
-        station, self.station, self.due = self.station, None, None
+        recorder, self.recorder, self.due = self.recorder, None, None
         port = None
         try:
-            if station is not None and self._keep_port:
+            if recorder is not None and self._keep_port:
                 with suppress(DeviceError):
-                    port = station.give_up()
-            if station is not None and port is None:
-                station.close()
+                    port = recorder.give_up()
+            if recorder is not None and port is None:
+                recorder.close()
         finally:
             session.close()
-            self.hub.plan(())
-            self.hub.set(
+            self.published.plan(())
+            self.published.set(
                 session=None, drop=None, link={"state": "closed", "error": None, "retry_s": None}
             )
             if port is not None:
@@ -194,32 +197,36 @@ class Desk:
         DeviceError
             No such port, nobody there, another protocol version, another board than the session's.
         """
-        if port is None and self.station is not None:
+        if port is None and self.recorder is not None:
             try:
-                port = self.station.give_up()
+                port = self.recorder.give_up()
             except DeviceError:
-                self.station.close()
-        book = Unrecorded() if self._session is None else self._session
-        self.station = None
-        self.hub.set(link={"state": "opening", "error": None, "retry_s": None})
+                self.recorder.close()
+        sink = NullSink() if self._session is None else self._session
+        self.recorder = None
+        self.published.set(link={"state": "opening", "error": None, "retry_s": None})
         url = self._line_url
         if not is_simulated(url):
-            url = self._home.now if port is not None else self._home.look()
-        station = Station(
-            book, url, self.interrupts, view=View(self.hub), halted=self._halted,
-            meet=self._home.meet,
+            url = self._locator.now if port is not None else self._locator.look()
+        recorder = Recorder(
+            sink, url, self.interrupts, feed=StateFeed(self.published), halted=self._halted,
+            meet=self._locator.meet,
         )  # fmt: skip
-        identity = station.connect(port)
-        self.hub.set(port={"url": self.url, "simulated": is_simulated(url), "path": self._home.now})
-        self.station = station
-        self.hub.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+        identity = recorder.connect(port)
+        self.published.set(
+            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.now}
+        )
+        self.recorder = recorder
+        self.published.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+        if port is None:
+            log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
         return identity
 
     def disconnect(self) -> None:
         """Let go of a port that fails."""
-        station, self.station, self.due = self.station, None, None
-        if station is not None:
-            station.close()
+        recorder, self.recorder, self.due = self.recorder, None, None
+        if recorder is not None:
+            recorder.close()
 
     def settle(self) -> tuple[int, int] | None:
         """Settle what an earlier connection left: a drop the device holds, a run without a record.
@@ -234,33 +241,59 @@ class Desk:
         DeviceError
             The device holds a drop of another session, or is in trouble.
         """
-        station = self._connected()
-        held = station.held()
+        recorder = self._connected()
+        held = recorder.held()
         if held is not None and held[0] == TEST_RUN:
-            release.forget(station)
+            release_test.forget(recorder)
             held = None
-        log = self.session.states()
+        entries = self.session.states()
         if held is not None:
-            if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in log):
+            if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in entries):
                 run, attempt = held
                 raise DeviceError(
                     f"the device holds a drop (run {run}, attempt {attempt}) of another session",
                     f"continue that session first; {DISCARD}",
                 )
-            station.fetch(*held)
+            recorder.fetch(*held)
             self._lost.pop(held, None)
-        for entry in {entry.run: entry for entry in log}.values():
+        for entry in {entry.run: entry for entry in entries}.values():
             if entry.state not in _OPEN or (entry.run, entry.attempt) == held:
                 continue
             if self.session.drop(entry.run, entry.attempt) is None:
                 why = ("the connection ended before the drop was recorded",)
-                station.state(entry.run, entry.attempt, RunState.INTERRUPTED, why)
+                recorder.state(entry.run, entry.attempt, RunState.INTERRUPTED, why)
         return held
 
     # ------------------------------------------------------------------ drops
 
+    def unsaved(self) -> bool:
+        """Ask whether a drop is armed or falls, or fell and is in no file yet.
+
+        Raises
+        ------
+        RigError
+            The device or the disk does not answer, so it is not known.
+        """
+        if self._session is not None:
+            self._session.commit()
+            latest = {entry.run: entry for entry in self._session.states()}
+            if any(
+                entry.state is RunState.FIRED
+                and self._session.drop(entry.run, entry.attempt) is None
+                for entry in latest.values()
+            ):
+                return True  # on a board that may be away at the moment
+        if self.recorder is None:
+            return False
+        if self.recorder.armed is not None:
+            return True
+        held = self.recorder.held()
+        if held is None or held[0] == TEST_RUN:
+            return False
+        return self._session is None or self._session.drop(*held) is None
+
     def wait(self, seconds: float) -> None:
-        """Let time pass, see `Station.wait`."""
+        """Let time pass, see `Recorder.wait`."""
         self._connected().wait(seconds)
 
     def arm(self, run: int, attempt: int) -> int:
@@ -276,27 +309,27 @@ class Desk:
         InputError
             Not of the plan, or not the attempt that comes next: no drop is made twice.
         DeviceRefusedError
-            As for `Station.arm`.
+            As for `Recorder.arm`.
         """
-        station = self._connected()
-        if self._protocol is None or station.armed or self.due:
+        recorder = self._connected()
+        if self._protocol is None or recorder.armed or self.due:
             raise InputError("this is not the moment to arm", "open a session; finish the drop")
         last = self.session.latest_state(run)
-        planned = self.hub.planned(run)
+        planned = self.published.planned(run)
         if not planned or attempt != (last.attempt if last else 0) + 1:
             raise InputError(
                 f"run {run}, attempt {attempt} is not what comes next",
                 "read the session again: another client may have gone on with it",
             )
         self._unarmed = None
-        return station.arm(run, attempt, self._protocol)
+        return recorder.arm(run, attempt, self._protocol)
 
     def notice(self) -> None:
         """Log that the device has disarmed itself, when it has."""
-        station = self.station
-        if station is None or station.armed is None or station.lapsed is None:
+        recorder = self.recorder
+        if recorder is None or recorder.armed is None or recorder.lapsed is None:
             return
-        refusal = DeviceRefusedError(Reason.NOT_ARMED, 0, station.lapsed)
+        refusal = DeviceRefusedError(Reason.NOT_ARMED, 0, recorder.lapsed)
         self.stop(refusal.message)
         self._unarmed = refusal
 
@@ -306,16 +339,16 @@ class Desk:
         Raises
         ------
         DeviceRefusedError
-            As for `Station.fire`.
+            As for `Recorder.fire`.
         """
-        station = self._connected()
-        armed = station.armed
+        recorder = self._connected()
+        armed = recorder.armed
         if armed is None:
             raise self._unarmed or InputError("nothing is armed", "arm first")
         try:
-            station.fire(token)
+            recorder.fire(token)
         finally:
-            if station.armed is None:
+            if recorder.armed is None:
                 self.due = armed
 
     def finish(self) -> None:
@@ -354,21 +387,21 @@ class Desk:
         return drop
 
     def test_release(self) -> dict[str, Any]:
-        """Drive the release once with nothing hung, see `rig.daemon.release.drive`.
+        """Drive the release once with nothing hung, see `rig.recorder.release_test.drive`.
 
         Raises
         ------
         InputError
             No session is open, or a drop is under way.
         """
-        station = self._connected()
-        if self._protocol is None or station.armed or self.due:
+        recorder = self._connected()
+        if self._protocol is None or recorder.armed or self.due:
             raise InputError(
                 "this is not the moment to test the release", "open a session; finish the drop"
             )
-        self.hub.set(release_test=None)
-        found = release.drive(station, self._protocol, self._halted)
-        self.hub.set(release_test=found)
+        self.published.set(release_test=None)
+        found = release_test.drive(recorder, self._protocol, self._halted)
+        self.published.set(release_test=found)
         return found
 
     def log_state(
@@ -403,16 +436,16 @@ class Desk:
         DeviceError
             The device does not answer: it disarms itself.
         """
-        station = self.station
-        if station is None:
+        recorder = self.recorder
+        if recorder is None:
             return
-        armed = station.armed
+        armed = recorder.armed
         self._unarmed = StoppedError(reason, "arm again when all is well")
         try:
-            station.abort()
+            recorder.abort()
         finally:
             if armed is not None:
-                station.state(*armed, RunState.INTERRUPTED, (reason,))
+                recorder.state(*armed, RunState.INTERRUPTED, (reason,))
 
     def close(self) -> None:
         """Close session and port."""
@@ -422,7 +455,7 @@ class Desk:
         finally:
             self.disconnect()
 
-    def _connected(self) -> Station:
-        if self.station is None:
+    def _connected(self) -> Recorder:
+        if self.recorder is None:
             raise DeviceError("there is no connection to the device", "wait until it is back")
-        return self.station
+        return self.recorder

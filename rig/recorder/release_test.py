@@ -5,27 +5,27 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rig.daemon.faults import StoppedError
 from rig.errors import DeviceError
 from rig.link.messages import TEST_RUN, Phase, pack_label
+from rig.recorder.interrupts import StoppedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.daemon.station import Station
     from rig.protocol.scene import Protocol
+    from rig.recorder.recorder import Recorder
 
 _LABEL = pack_label(TEST_RUN, 1)
 _TIMEOUT_MS = 1000  # it is fired at once, or never
 _AFTER_MS = 500  # what falls or trembles because of the pulse has been seen by then
 
 
-def drive(station: Station, protocol: Protocol, halted: Callable[[], bool]) -> dict[str, Any]:
+def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) -> dict[str, Any]:
     """Arm and fire with the protocol's pulse, and look what the gates see of it.
 
     Parameters
     ----------
-    station
+    recorder
         Connected, with nothing armed.
     protocol
         Its gates and its release.
@@ -44,9 +44,9 @@ def drive(station: Station, protocol: Protocol, halted: Callable[[], bool]) -> d
     StoppedError
         It was stopped; the release is off.
     """
-    device, release = station.device, protocol.release
+    device, release = recorder.device, protocol.release
     pulse_ms = round(release.pulse * 1e3)
-    with station.interrupts.held():
+    with recorder.interrupts.held():
         token = device.arm(
             label=_LABEL,
             gates=protocol.gates.mask if protocol.gates else 0,
@@ -56,16 +56,16 @@ def drive(station: Station, protocol: Protocol, halted: Callable[[], bool]) -> d
             record_ms=pulse_ms + _AFTER_MS,
         )
         try:
-            station.interrupts.check()
+            recorder.interrupts.check()
             _insist(not halted())
             device.fire(token)
             drop = device.collect(_LABEL, stop=halted)
         except BaseException:
             with suppress(DeviceError):
                 device.abort()
-                forget(station)
+                forget(recorder)
             raise
-        forget(station)
+        forget(recorder)
     _insist(not halted())
     sensed = drop.certificate.release_sense if drop.certificate else None
     return {
@@ -77,10 +77,10 @@ def drive(station: Station, protocol: Protocol, halted: Callable[[], bool]) -> d
     }
 
 
-def forget(station: Station) -> None:
+def forget(recorder: Recorder) -> None:
     """Let the device forget a test's drop, when it holds one: it would forbid the next."""
-    device = station.device
-    with station.interrupts.held():
+    device = recorder.device
+    with recorder.interrupts.held():
         state = device.status()
         if state.label != _LABEL or state.phase not in {Phase.RECORDING, Phase.HOLDING}:
             return

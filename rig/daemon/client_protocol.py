@@ -1,4 +1,4 @@
-"""A client's side of the conversation with a daemon; without any I/O."""
+"""A client's side of the protocol: messages, and the copy of the state; without any I/O."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rig.daemon import rpc
 from rig.errors import DeviceError
 
 
-class Dialogue:
+class ClientProtocol:
     """Numbers requests, and finds messages in the bytes that come."""
 
     def __init__(self) -> None:
@@ -45,6 +45,50 @@ class Dialogue:
         return messages
 
 
+class Replica:
+    """A client's copy of the state, as API.md describes it.
+
+    Attributes
+    ----------
+    n
+        Number of the last change that is in it.
+    state
+        Sections by name.
+    """
+
+    def __init__(self) -> None:
+        self.n = 0
+        self.state: dict[str, Any] = {}
+
+    def snapshot(self, message: dict[str, Any]) -> None:
+        """Take a whole state: the answer to ``subscribe``, or a ``snapshot``."""
+        self.n, self.state = message["n"], message["state"]
+
+    def change(self, message: dict[str, Any]) -> None:
+        """Take a ``change``.
+
+        Raises
+        ------
+        ValueError
+            One is missing before it: the daemon never leaves one out.
+        """
+        if message["n"] != self.n + 1:
+            raise ValueError(f"change {message['n']} behind {self.n}")
+        self.n = message["n"]
+        self.state |= message.get("set", {})
+        changed = {run["run"]: run for run in message.get("runs", [])}
+        if changed:
+            self.state["runs"] = [changed.get(run["run"], run) for run in self.state["runs"]]
+        self.state["edges"] += message.get("edges", [])
+
+    def notified(self, method: str, params: dict[str, Any]) -> None:
+        """Take any notification of the two kinds."""
+        if method == "snapshot":
+            self.snapshot(params)
+        elif method == "change":
+            self.change(params)
+
+
 def hello(name: str, token: str) -> dict[str, Any]:
     """Give the parameters of the first request, see API.md.
 
@@ -53,7 +97,7 @@ def hello(name: str, token: str) -> dict[str, Any]:
     name
         What others are told of this client.
     token
-        From `rig.daemon.place.reach`.
+        From `rig.daemon.socket_path.reach`.
     """
     return {"api": rpc.API, "client": name} | ({"token": token} if token else {})
 

@@ -35,7 +35,7 @@ Edge3 = tuple[int, int, int]
 """Tick, channel, blocked."""
 
 
-class Hub:
+class PublishedState:
     """The state.
 
     Attributes

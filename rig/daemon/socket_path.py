@@ -6,7 +6,6 @@ import json
 import os
 import socket
 import struct
-import sys
 from pathlib import Path
 
 from rig.errors import DeviceError, InputError
@@ -55,8 +54,6 @@ def check_folder(folder: Path) -> None:
     InputError
         As for `prepare_folder`.
     """
-    if os.name == "nt":
-        return
     about = folder.stat()
     if about.st_uid != os.getuid():
         raise InputError(f"{folder} belongs to somebody else", "name another place with --socket")
@@ -70,8 +67,8 @@ def check_folder(folder: Path) -> None:
 
 def peer_uid(connection: socket.socket) -> int | None:
     """Ask the kernel which user is at the other end; `None` where it cannot be asked."""
-    option = getattr(socket, "SO_PEERCRED", None)
-    if option is None or connection.family != getattr(socket, "AF_UNIX", None):
+    option = getattr(socket, "SO_PEERCRED", None)  # Linux has it
+    if option is None or connection.family != socket.AF_UNIX:
         return None
     data = connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size)
     uid: int = _CREDENTIALS.unpack(data)[1]
@@ -104,7 +101,7 @@ def reach(path: Path) -> tuple[socket.socket, str]:
             told = json.loads(tcp.read_text("ascii"))
             address = "127.0.0.1", told["port"]
             line, token = socket.create_connection(address, _REACH_S), told["token"]
-        elif sys.platform != "win32":
+        else:
             line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             line.settimeout(_REACH_S)
             line.connect(str(path))
@@ -112,8 +109,7 @@ def reach(path: Path) -> tuple[socket.socket, str]:
         if line is not None:
             line.close()
         raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
-    if line is None or peer_uid(line) not in {None, getattr(os, "getuid", int)()}:
-        if line is not None:
-            line.close()
+    if peer_uid(line) not in {None, os.getuid()}:
+        line.close()
         raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")
     return line, token

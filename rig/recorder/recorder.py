@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import random
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
 from rig.clock.host import HostWatch, SystemClock
-from rig.daemon.faults import StoppedError
-from rig.daemon.interrupts import Interrupts
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
@@ -17,20 +16,22 @@ from rig.link.port import open_port, port_clock
 from rig.link.transcript import Received
 from rig.ports import told
 from rig.protocol.measurable import record_ms
+from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.records import ClockSample, Pulse
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rig.daemon.record import Record as Book
-    from rig.daemon.view import View
     from rig.link.messages import DisarmReason, Identity
     from rig.link.port import Port
     from rig.link.transcript import Direction, Record
     from rig.protocol.scene import Protocol
+    from rig.recorder.feed import StateFeed
+    from rig.recorder.sink import SessionSink
     from rig.records import Drop
 
+log = logging.getLogger(__name__)
 ARM_TIMEOUT_MS = 10_000
 DISCARD = "taking the power from the board discards the drop, a reset does not"
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
@@ -38,7 +39,7 @@ _ARMED_S = 0.1  # at most, while armed: the device disarms itself when the host 
 _REFERENCE_S = 10.0  # between two questions for the latest pulse of the reference
 
 
-class Station:
+class Recorder:
     """The owner of the port and of the session.
 
     All bytes are put into the session before anything is done with them; a drop is committed before
@@ -52,7 +53,7 @@ class Station:
         The port.
     interrupts
         Kept waiting during each call; by default nobody's.
-    view
+    feed
         What is told of everything that becomes known.
     halted
         Asked all the time whether everything shall be off.
@@ -67,18 +68,18 @@ class Station:
 
     def __init__(
         self,
-        session: Book,
+        session: SessionSink,
         url: str,
         interrupts: Interrupts | None = None,
         *,
-        view: View | None = None,
+        feed: StateFeed | None = None,
         halted: Callable[[], bool] = lambda: False,
         meet: Callable[[Identity], dict[str, str]] = lambda _: {},
     ) -> None:
         self.session = session
         self.url = url
         self.interrupts = Interrupts() if interrupts is None else interrupts
-        self._view = view
+        self._feed = feed
         self._halted = halted
         self._meet = meet
         self._port: Port | None = None
@@ -318,8 +319,10 @@ class Station:
         with self.interrupts.held():
             self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
             self.session.commit()
-            if self._view is not None:
-                self._view.state(run, attempt, state, reasons)
+            if state is RunState.INTERRUPTED:
+                log.info("run %d, attempt %d: interrupted: %s", run, attempt, "; ".join(reasons))
+            if self._feed is not None:
+                self._feed.state(run, attempt, state, reasons)
 
     @contextmanager
     def _unless(self, *checks: Callable[[], None]) -> Iterator[None]:
@@ -341,8 +344,9 @@ class Station:
     def _keep(self, drop: Drop) -> Drop:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
-        if self._view is not None:
-            self._view.recorded(drop)
+        log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
+        if self._feed is not None:
+            self._feed.recorded(drop)
         self._acknowledge(drop)
         return drop
 
@@ -365,5 +369,5 @@ class Station:
             self.session.add_pulse(record)
         if isinstance(record, Received) and isinstance(record.message, Disarmed):
             self.lapsed = record.message.reason
-        if self._view is not None:
-            self._view.know(record)
+        if self._feed is not None:
+            self._feed.know(record)

@@ -55,7 +55,7 @@ def known_before(session: Reader) -> dict[str, str]:
 
 
 def shown(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Describe a session and its plan as the hub's sections ``session`` and ``runs`` do."""
+    """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
     latest = {entry.run: entry for entry in session.states()}
     plan = []
     for run in runs(protocol):

@@ -1,0 +1,97 @@
+"""The published state on its way to the clients that subscribed to it."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+from rig.daemon import rpc
+
+if TYPE_CHECKING:
+    from rig.daemon.connection import Connection
+    from rig.recorder.published import PublishedState
+
+_CHANGES_S = 0.004
+"""From one message to the next: in a flood a face takes many together; at 5000 edges/s, a frame in
+8 ms, each goes out at once."""
+_FULL = 1 << 16
+"""Bytes on their way to one client; beyond, it gets a snapshot when it has read them."""
+
+
+class Publisher:
+    """Sends changes to whoever keeps up, snapshots to whoever does so again.
+
+    Parameters
+    ----------
+    published
+        The state.
+
+    Attributes
+    ----------
+    connections
+        All clients.
+    """
+
+    def __init__(self, published: PublishedState) -> None:
+        self.published = published
+        self.connections: set[Connection] = set()
+        self._dirty = asyncio.Event()
+
+    def add(self, connection: Connection) -> None:
+        """Count a client, which may subscribe."""
+        self.connections.add(connection)
+        self.published.set(clients=len(self.connections))
+
+    def discard(self, connection: Connection) -> None:
+        """Forget a client."""
+        self.connections.discard(connection)
+        self.published.set(clients=len(self.connections))
+        self._watch()
+
+    def subscribe(self, connection: Connection) -> dict[str, Any]:
+        """Give a client the snapshot upon which its changes will follow."""
+        self.spread()  # what the others are told first is in the snapshot
+        connection.subscribed = True
+        self._watch()
+        return self.published.snapshot()
+
+    def unsubscribe(self, connection: Connection) -> None:
+        """Send a client no more changes."""
+        connection.subscribed = connection.behind = False
+        self._watch()
+
+    def spread(self) -> None:
+        """Send what changed."""
+        change = self.published.take()
+        line = None if change is None else rpc.request("change", change, None)
+        snapshot = None
+        for connection in self.connections:
+            if not connection.subscribed:
+                continue
+            if connection.waiting() > _FULL:
+                connection.behind = True
+            elif connection.behind:
+                snapshot = snapshot or rpc.request("snapshot", self.published.snapshot(), None)
+                connection.behind = False
+                connection.send(snapshot)
+            elif line is not None:
+                connection.send(line)
+
+    async def run(self) -> None:
+        """Send what changes, until cancelled."""
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            loop.call_soon_threadsafe(self._dirty.set)
+
+        self.published.changed = wake
+        self._dirty.set()
+        while True:
+            if not any(connection.behind for connection in self.connections):
+                await self._dirty.wait()
+            self._dirty.clear()
+            self.spread()
+            await asyncio.sleep(_CHANGES_S)
+
+    def _watch(self) -> None:
+        self.published.watched = any(one.subscribed for one in self.connections)

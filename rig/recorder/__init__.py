@@ -1,0 +1,1 @@
+"""The one owner of the port and of the session file."""

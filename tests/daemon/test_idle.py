@@ -1,0 +1,127 @@
+"""A daemon that nobody asked for by name ends when nobody needs it, and never with a drop."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from rig.bench.stand import FENCE, Stand
+from rig.cli import main
+from rig.link.messages import Phase
+from rig.session.store import Session
+from tests.daemon.at_work import working
+from tests.waiting import PATIENCE_S
+
+IDLE_S = 0.4
+ALONE = f"no client for {IDLE_S:g} s"
+
+
+@pytest.fixture
+def stand():
+    """Have a board and a daemon that ends when it is left alone."""
+    with Stand(runs=2, seed=3, small_disk=True) as made:
+        made.start_daemon("--idle-timeout", str(IDLE_S))
+        yield made
+
+
+@pytest.fixture
+def driver(stand, client):
+    """Have a session open and control of it."""
+    one = client("the driver")
+    one.take_control()
+    one.open_session(str(stand.protocol), str(stand.session))
+    return one
+
+
+def ended(stand):
+    """Wait until the daemon has ended, and give the lines that it said."""
+    _, told = stand.daemon.communicate(timeout=PATIENCE_S)
+    assert stand.daemon.returncode == 0, told
+    assert not stand.socket.exists()
+    return told.splitlines()
+
+
+def states(stand):
+    with Session.open(stand.session, readonly=True) as session:
+        return [(e.run, e.attempt, str(e.state)) for e in session.states()]
+
+
+def test_it_stays_while_a_client_is_there_and_ends_after_it(stand, client):
+    one = client("one")
+    time.sleep(3 * IDLE_S)
+    assert one.call("renew") == {}
+    one.close()
+    assert any(ALONE in line for line in ended(stand))
+
+
+def test_one_that_was_started_by_hand_stays(tmp_path):
+    with Stand(runs=1) as stand:
+        stand.start_daemon()
+        other = subprocess.run(
+            [sys.executable, "-m", "rig", "daemon", "--port", "sim://", "--socket",
+             str(stand.folder / "other" / "rig.sock"), "--idle-timeout", str(IDLE_S)],
+            capture_output=True, text=True, timeout=PATIENCE_S, check=True,
+        )  # fmt: skip
+        assert ALONE in other.stderr
+        stand.client().close()
+
+
+def test_it_is_not_at_rest_while_a_drop_is_armed(tmp_path):
+    scene = tmp_path / "fence.yaml"
+    scene.write_text(FENCE.replace("RUNS", "1"), "utf-8")
+    bench = SimpleNamespace(port="sim://?seed=3", protocol=scene, session=tmp_path / "session")
+    with working(bench) as (worker, ask):
+        assert worker.at_rest().result(PATIENCE_S)
+        ask(lambda controller: controller.arm(1, 1))
+        assert not worker.at_rest().result(PATIENCE_S)
+        ask(lambda controller: controller.stop("enough"))
+        assert worker.at_rest().result(PATIENCE_S)
+
+
+def test_what_was_armed_is_disarmed_before_it_ends(stand, driver):
+    driver.arm(1, 1)
+    driver.close()
+    ended(stand)
+    assert list(stand.happened())[-1]["phase"] == Phase.IDLE
+    assert states(stand) == [(1, 1, "armed"), (1, 1, "interrupted")]
+
+
+def test_a_drop_that_falls_is_in_the_file_before_it_ends(stand, driver):
+    driver.fire(driver.arm(1, 1))
+    driver.close()
+    told = ended(stand)
+    (recorded,) = (n for n, line in enumerate(told) if "attempt 1: recorded" in line)
+    (alone,) = (n for n, line in enumerate(told) if ALONE in line)
+    assert recorded < alone
+    assert states(stand)[-1] == (1, 1, "recorded")
+
+
+def test_a_drop_that_only_the_board_has_is_waited_for(stand, driver):
+    driver.fire(driver.arm(1, 1))
+    stand.hand("pull 4")
+    driver.close()
+    ended(stand)
+    assert states(stand) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
+
+
+def test_it_stays_until_the_disk_has_taken_everything(stand, driver):
+    stand.disk.fill(stand.daemon)
+    driver.close()
+    time.sleep(4 * IDLE_S)
+    assert stand.daemon.poll() is None
+    stand.disk.free(stand.daemon)
+    assert any(line.startswith("trouble: ") for line in ended(stand))
+    with Session.open(stand.session, readonly=True) as session:
+        assert list(session.pings())
+
+
+@pytest.mark.parametrize("span", ["0", "-1", "nan", "inf", "soon"])
+def test_a_span_that_is_none_is_refused(span, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["daemon", "--port", "sim://", "--idle-timeout", span])
+    assert stop.value.code == 2
+    assert "is not a time in seconds, more than 0" in capsys.readouterr().err

@@ -1,0 +1,90 @@
+"""Whoever started a daemon reads on stderr what became of it, each thing once."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from rig.bench.stand import Stand
+from rig.daemon.lease import Lease
+from rig.daemon.worker import Worker
+from rig.errors import RigError
+from rig.recorder.published import PublishedState
+from tests.waiting import PATIENCE_S
+
+ENDLESS = """
+import logging
+from rig.daemon.log import logged_to_stderr
+with logged_to_stderr():
+    for number in range(5000):
+        logging.getLogger("rig.daemon").info("%d %s", number, 90 * "x")
+print("not held up", flush=True)
+"""
+
+
+def test_a_session_and_a_pulled_cable_are_told_once_each():
+    with Stand(runs=2, seed=3) as stand:
+        stand.start_daemon()
+        told = [stand.daemon.stderr.readline().rstrip()]
+        client = stand.client("the driver")
+        client.take_control()
+        client.open_session(str(stand.protocol), str(stand.session))
+        client.fire(client.arm(1, 1))
+        client.collect(1, 1)
+        client.arm(2, 1)
+        client.stop("enough")
+        stand.hand("pull 1")
+        told += [stand.daemon.stderr.readline().rstrip() for _ in range(5)]
+        while not told[-1].startswith("up"):
+            told.append(stand.daemon.stderr.readline().rstrip())
+        client.close_session()
+        client.close()
+        stand.daemon.send_signal(signal.SIGTERM)
+        told += stand.daemon.communicate(timeout=PATIENCE_S)[1].splitlines()
+    down = [line for line in told if line.startswith("down: ")]
+    assert down
+    assert len(set(down)) == len(down)
+    up = r"up: .+, id [0-9a-f]{16}"
+    expected = [
+        up,
+        "in control: the driver",
+        f"session: {stand.session}",
+        r"run 1, attempt 1: recorded, \d+ edges",
+        "run 2, attempt 1: interrupted: enough",
+        up,
+        f"closed: {stand.session}",
+        "in control: nobody",
+        "rig daemon: ended",
+    ]
+    others = [line for line in told if line not in down]
+    assert len(others) == len(expected), others
+    for line, pattern in zip(others, expected, strict=True):
+        assert re.fullmatch(pattern, line), others
+
+
+def test_a_fault_of_the_program_is_logged_with_its_traceback_once(caplog):
+    lease = Lease()
+    lease.take("me", "a test")
+    worker = Worker("sim://", PublishedState(), lease)
+    worker.start()
+    try:
+        with pytest.raises(RigError, match="unexpected: ZeroDivisionError"):
+            worker.submit(lambda _: 1 / 0, "me").result(PATIENCE_S)
+    finally:
+        worker.end()
+        worker.join()
+    assert [record.exc_info[0] for record in caplog.records] == [ZeroDivisionError]
+
+
+def test_a_terminal_that_takes_nothing_holds_nobody_up():
+    with subprocess.Popen(
+        [sys.executable, "-c", ENDLESS], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as done:  # its stderr is a pipe that has room for some 600 of the lines
+        assert done.stdout.readline() == "not held up\n"
+        done.stdout.close()
+        told = done.stderr.read()
+    assert told.startswith("0 xxx")
