@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import array
 import errno
+import fcntl
 import os
 import socket
+import termios
 import warnings
 from typing import Any, Protocol
 
@@ -180,9 +182,6 @@ class NetworkPort:
         """Bytes that can be read at once."""
         if not self._port.in_waiting:  # also says when the port is closed
             return 0
-        import fcntl  # noqa: PLC0415 - not on Windows
-        import termios  # noqa: PLC0415
-
         count = array.array("i", [0])
         fcntl.ioctl(self._port.fileno(), termios.FIONREAD, count)
         return count[0]

@@ -158,22 +158,22 @@ def test_nothing_asks_for_the_time_from_arming_to_the_certificate(finished):
     assert {PING, REFERENCE} <= set(idle)
 
 
-def test_a_waiting_station_keeps_the_device_armed_without_clock_samples(tmp_path, fence):
+def test_a_waiting_recorder_keeps_the_device_armed_without_clock_samples(tmp_path, fence):
     protocol = reader.read(fence)
     with (
         Session.create(
             tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
         ) as session,
-        Recorder(session, f"sim://?protocol={fence}") as station,
+        Recorder(session, f"sim://?protocol={fence}") as recorder,
     ):
-        station.wait(2.0)
-        token = station.arm(1, 1, protocol)
+        recorder.wait(2.0)
+        token = recorder.arm(1, 1, protocol)
         before = len(session.pings())
-        station.wait(3.0)
+        recorder.wait(3.0)
         assert len(session.pings()) == before > 3
-        station.fire(token)
-        station.collect(1, 1)
-        station.wait(1.0)
+        recorder.fire(token)
+        recorder.collect(1, 1)
+        recorder.wait(1.0)
         assert len(session.pings()) > before
 
 
@@ -211,10 +211,10 @@ def test_a_host_that_sleeps_between_samples_is_noticed(tmp_path, fence, monkeypa
     with Session.create(
         tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
     ) as session:
-        with Recorder(session, f"sim://?protocol={fence}") as station:
-            station.wait(60.0)
+        with Recorder(session, f"sim://?protocol={fence}") as recorder:
+            recorder.wait(60.0)
             hosts[0].suspend(seconds)
-            station.wait(60.0)
+            recorder.wait(60.0)
         (found,) = session.host_breaks()
         assert (found.slept_ns, found.stepped_ns) == (round(seconds * S), 0)
         clock = calibration(session)
@@ -231,8 +231,8 @@ def test_a_real_host_is_believed_no_further_than_its_quartz(tmp_path, fence):
         with Session.create(
             tmp_path / f"{simulated}", protocol.text, "f", simulated=simulated, origin="x"
         ) as session:
-            with Recorder(session, f"sim://?protocol={fence}") as station:
-                station.wait(60.0)
+            with Recorder(session, f"sim://?protocol={fence}") as recorder:
+                recorder.wait(60.0)
             scales[simulated] = calibration(session).device
     assert scales[True].u < 2e-6
     assert scales[False].u == pytest.approx(50e-6 / 3**0.5, rel=0.01)

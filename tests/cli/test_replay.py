@@ -29,9 +29,9 @@ def tamper(session, sql, *values):
 def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
     connect = Recorder.connect
 
-    def wired(station, port):
-        identity = connect(station, port)
-        station._port.board.sense(0.0125)
+    def wired(recorder, port):
+        identity = connect(recorder, port)
+        recorder._port.board.sense(0.0125)
         return identity
 
     monkeypatch.setattr(Recorder, "connect", wired)

@@ -29,10 +29,10 @@ def once_armed(monkeypatch):
     def have(happen, times):
         arm, number = Recorder.arm, count(1)
 
-        def armed(station, *what):
-            token = arm(station, *what)
+        def armed(recorder, *what):
+            token = arm(recorder, *what)
             if next(number) <= times:
-                port = station._port
+                port = recorder._port
                 port.board.advance(port.clock.now_ns())
                 happen(port)
             return token
@@ -99,27 +99,27 @@ def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_a
 
 def test_a_slow_disk_does_not_disarm(run, tmp_path, monkeypatch):
     """Between arming and firing the disk is waited for twice."""
-    commit, stations = Session.commit, []
+    commit, recorders = Session.commit, []
     connect = Recorder.connect
 
     def slow(session):
         commit(session)
-        if stations and stations[0]._port is not None:
-            stations[0].clock.sleep(0.2)
+        if recorders and recorders[0]._port is not None:
+            recorders[0].clock.sleep(0.2)
 
-    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
+    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), recorders.append(s))[0])
     monkeypatch.setattr(Session, "commit", slow)
     done = run()
     assert done.code == 0
     assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
 
 
-def test_a_station_that_waits_while_armed_stays_armed(run, monkeypatch):
+def test_a_recorder_that_waits_while_armed_stays_armed(run, monkeypatch):
     arm = Recorder.arm
 
-    def patient(station, *what):
-        token = arm(station, *what)
-        station.wait(3.0)
+    def patient(recorder, *what):
+        token = arm(recorder, *what)
+        recorder.wait(3.0)
         return token
 
     monkeypatch.setattr(Recorder, "arm", patient)
@@ -131,13 +131,13 @@ def test_a_station_that_waits_while_armed_stays_armed(run, monkeypatch):
 def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
     arm, waited = Recorder.arm, []
 
-    def armed(station, *what):
+    def armed(recorder, *what):
         if len(waited) % 2 == 0:
-            now = station.clock.now_ns()
-            station._port.board._controller.release.pulse(1, now, 500_000)
+            now = recorder.clock.now_ns()
+            recorder._port.board._controller.release.pulse(1, now, 500_000)
             waited.append(now)
-        token = arm(station, *what)
-        waited.append(station.clock.now_ns())
+        token = arm(recorder, *what)
+        waited.append(recorder.clock.now_ns())
         return token
 
     monkeypatch.setattr(Recorder, "arm", armed)
@@ -151,11 +151,11 @@ def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
 def test_an_open_stop_is_waited_for_a_little(run, tmp_path, monkeypatch, looks, code):
     wait, number = Recorder.wait, count(1)
 
-    def waited(station, seconds, *more):
-        wait(station, seconds, *more)
+    def waited(recorder, seconds, *more):
+        wait(recorder, seconds, *more)
         step = next(number)
         if step in {1, looks}:
-            station._port.board.stop(step == 1)
+            recorder._port.board.stop(step == 1)
 
     monkeypatch.setattr(Recorder, "wait", waited)
     done = run()
@@ -169,10 +169,10 @@ def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fenc
 
     def ask(what):
         asked.append(what)
-        stations[0]._port.board.stop(len(asked) == 1)
+        recorders[0]._port.board.stop(len(asked) == 1)
 
-    stations, connect = [], Recorder.connect
-    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), stations.append(s))[0])
+    recorders, connect = [], Recorder.connect
+    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), recorders.append(s))[0])
     operator = Operator(say=lambda _: None, ask=ask)
     run_protocol(str(fence), "sim://", str(tmp_path / "s"), operator, 1)
     assert asked[1].startswith("not armed: the emergency stop is open; ")
