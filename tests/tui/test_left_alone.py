@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import shutil
 
-from rig.tui import wire
+from rig.tui import client
 from tests.tui.lab import PATIENCE_S, run, short_folder
 
 
 def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
-    monkeypatch.setattr(wire, "_IDLE_S", 1.0)
+    monkeypatch.setattr(client, "_IDLE_S", 1.0)
     folder = short_folder()
 
     async def work():
@@ -19,7 +19,7 @@ def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
         async def connected():
             there.set()
 
-        line = wire.Wire("sim://", folder / "rig.sock", connected)
+        line = client.ReconnectingClient("sim://", folder / "rig.sock", connected)
         keeping = asyncio.get_running_loop().create_task(line.keep())
         await asyncio.wait_for(there.wait(), PATIENCE_S)
         keeping.cancel()
