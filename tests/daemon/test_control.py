@@ -149,18 +149,21 @@ def unheard(monkeypatch):
     with Stand(runs=2, seed=3) as stand, working(stand) as (worker, ask):
         token = ask(lambda controller: controller.arm(1, 1))
         yield stand, worker, token
+        stand.hand("mute 0")  # else a worker that no STOP reaches never ends
 
 
-def repeated(worker, times=3):
-    until(lambda: worker.controller.recorder.device.statistics()["repeats"] >= times)
+def line(worker):
+    return worker.controller.recorder.device.statistics()
 
 
 def test_a_stop_does_not_wait_for_answers_that_are_lost(unheard):
-    """The board hears and is not heard: what is repeated keeps it armed."""
+    """The board hears and is not heard: what is asked is repeated, and ended by what STOP asks."""
     stand, worker, _ = unheard
     stand.hand("mute 1")
-    repeated(worker)
+    until(lambda: line(worker)["repeats"])
+    asked = line(worker)["requests"]
     stopped = worker.stop("no answer")
+    until(lambda: line(worker)["requests"] > asked)
     stand.await_phase(Phase.IDLE)
     stand.hand("mute 0")
     stopped.result(PATIENCE_S)
@@ -171,7 +174,7 @@ def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
     stand, worker, token = unheard
     stand.hand("mute fall")
     fired = worker.submit(lambda controller: controller.fire(token), "me")
-    repeated(worker, 1)
+    until(lambda: line(worker)["repeats"])
     stand.await_phase(Phase.RECORDING)
     worker.stop("no answer")
     stand.await_phase(Phase.HOLDING)
