@@ -34,7 +34,7 @@ from tests.cli.lab import (
     short,
     truth_of,
 )
-from tests.waiting import PATIENCE_S
+from tests.waiting import PATIENCE_S, until
 
 NAMES = {signal.SIGINT: "SIGINT", signal.SIGTERM: "SIGTERM", signal.SIGKILL: "SIGKILL"}
 
@@ -47,8 +47,9 @@ def stopped(arguments, session, number, wait_s):
     )  # fmt: skip
     lock = session.with_name(session.name + ".lock")
     try:
-        while process.poll() is None and not _holds(lock, process.pid):
-            time.sleep(0.002)
+        until(
+            lambda: process.poll() is not None or (_holds(lock, process.pid) and session.exists())
+        )
         time.sleep(wait_s)
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE_S)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sqlite3
 import subprocess
 from itertools import count
@@ -385,31 +386,32 @@ def test_a_campaign_goes_on_when_nobody_listens_to_its_narration(protocol, tmp_p
 def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path):
     """While a run is going on, at the speed of a real one."""
     protocol, session = tmp_path / "two.yaml", tmp_path / "s"
-    protocol.write_text(short("40 deg", 2, "0.2 s"), "utf-8")
+    protocol.write_text(short("40 deg", 500, "0.2 s"), "utf-8")  # more than there is time for
     run = ("run", protocol, "--session", session, "--port")
     writer = subprocess.Popen(
-        command(*run, "sim://?pace=1"), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True,
+        command(*run, "sim://?pace=1"), cwd=ROOT, stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
         assert writer.stderr is not None
-        assert writer.stderr.readline().startswith("run 1/2")
+        assert writer.stderr.readline().split()[1] == "1/500"
         reader = rig("analyze", session, "--json")
         second = rig(*run, "sim://")
         assert writer.poll() is None, "all this happened while it was being written"
         assert reader.returncode == 0, reader.stderr
-        assert [r["run"] for r in json.loads(reader.stdout)["runs"]] == [1]
+        assert json.loads(reader.stdout)["runs"][0]["run"] == 1
         assert second.returncode == 2
         assert f"is being written by process {writer.pid}" in second.stderr
-        out, err = writer.communicate(timeout=PATIENCE_S)
+        writer.send_signal(signal.SIGINT)
+        _, err = writer.communicate(timeout=PATIENCE_S)
     finally:
         writer.kill()
         writer.wait()
         for stream in (writer.stdout, writer.stderr):
             stream.close()
-    assert writer.returncode == 0, err
-    assert out.startswith("SIMULATED DATA\n")
-    assert_whole(session, 2)
+    assert writer.returncode == 130, err
+    with Session.open(session, readonly=True) as opened:
+        assert replay(opened).differences == ()
 
 
 def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
