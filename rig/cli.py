@@ -37,8 +37,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted. Results go to
     stdout, everything else to stderr.
     """
-    # The matrices here are small: more threads only get into each other's way.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _open_streams()
     try:
         try:

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import os
-
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
-
-# As the `rig` command does, before numpy is loaded: with several threads a sum's last digits
-# depend on how busy the machine is, and replays are compared to the last digit.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # `./run test` says the same every time: the same examples, and none that an earlier run has left.
 # To look for new ones is for `./run bench search`, which keeps what it finds under .hypothesis/.

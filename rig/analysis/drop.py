@@ -13,6 +13,7 @@ from rig.analysis.result import Audit, DropResult
 from rig.analysis.sides import guesses_of, sides_of
 from rig.analysis.suspects import suspects
 from rig.analysis.verdict import judge, pattern_faults
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from rig.clock.calibration import TimeScale
@@ -45,6 +46,7 @@ def analyze_drop(
     return fit_drop(protocol, run, drop, scale, components)[0]
 
 
+@one_thread
 def fit_drop(
     protocol: Protocol,
     run: Run,

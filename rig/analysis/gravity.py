@@ -19,6 +19,7 @@ from rig.analysis.legs import leg_slopes
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import DRAG_U
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -77,6 +78,7 @@ class GravityCheck:
         }
 
 
+@one_thread
 def check_gravity(
     protocol: Protocol, cases: Iterable[tuple[DropResult, Drop, TimeScale]]
 ) -> GravityCheck | None:

@@ -20,6 +20,7 @@ from rig.analysis.fit import Matched, match, without_strays
 from rig.analysis.joint import Joint, joint_step, scaled
 from rig.analysis.normal import STRAY
 from rig.analysis.shared import Shared
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -93,6 +94,7 @@ class Lesson:
     settled: bool
 
 
+@one_thread
 def learn(fits: Sequence[Fit]) -> Lesson:
     """Adjust all drops of a session together.
 

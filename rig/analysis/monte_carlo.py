@@ -13,6 +13,7 @@ from rig.analysis.joint import Joint, joint_step
 from rig.analysis.quantities import measurands
 from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import ANYTHING
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,6 +60,7 @@ class Propagated:
         return {name: getattr(self, name) for name in self.__slots__}
 
 
+@one_thread
 def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     """Draw everything that is uncertain, and adjust again each time, with nothing linearised.
 
@@ -89,6 +91,7 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     return {name: Propagated.of(np.array(values)) for name, values in found.items()}
 
 
+@one_thread
 def session_monte_carlo(lesson: Lesson, trials: int, seed: int) -> list[dict[str, Propagated]]:
     """Draw everything that is uncertain about a session, and adjust all drops together again.
 

@@ -16,6 +16,7 @@ from rig.analysis.summary import Incline, summarize
 from rig.errors import InputError
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -83,6 +84,7 @@ class Analysis:
         return found
 
 
+@one_thread
 def analyze(
     protocol: Protocol,
     drops: Sequence[Drop],
@@ -142,6 +144,7 @@ def overruled(result: DropResult, causes: Sequence[str] | None) -> DropResult:
     return replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
 
 
+@one_thread
 def gather(
     protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
 ) -> Analysis:

@@ -19,6 +19,7 @@ from rig.model.rods import rod_impacts
 from rig.protocol.plan import runs
 from rig.protocol.scene import Gate, Gates, Run
 from rig.records import Drop
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -132,6 +133,7 @@ def with_beams(protocol: Protocol, beams: Sequence[tuple[Role, float]]) -> Proto
     return replace(protocol, gates=Gates(gates, protocol.gates.height_u))
 
 
+@one_thread
 def cases(
     protocol: Protocol,
     beams: Sequence[tuple[Role, float]],

@@ -11,6 +11,7 @@ import numpy as np
 from rig.design.cases import BEAM
 from rig.estimate.coefficients import KNOWN, described, given_alphas
 from rig.estimate.hypotheses import alphas
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,6 +52,7 @@ class Outlook:
         return {name: self.typical(name) for name in self.single} | dict(self.coefficients)
 
 
+@one_thread
 def outlook(
     protocol: Protocol,
     found: Cases,

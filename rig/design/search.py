@@ -12,6 +12,7 @@ from rig.design.cases import cases
 from rig.design.outlook import outlook
 from rig.design.readable import MARGIN, margin
 from rig.measurands import averaged
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -79,6 +80,7 @@ def candidates(protocol: Protocol, limits: Room) -> list[float]:
     return [round(float(height), 4) for height in grid[clear]]
 
 
+@one_thread
 def better(
     protocol: Protocol,
     components: Components,

@@ -18,6 +18,7 @@ from rig.estimate.posterior import posterior
 from rig.estimate.rods import impulses
 from rig.estimate.tail import chi2_tail
 from rig.sections import Sections
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from rig.protocol.scene import Protocol, Run
 
 
+@one_thread
 def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     """Estimate what the impacts of a session have in common.
 

@@ -1,0 +1,374 @@
+"""The Python door: a session's results and edges, and predictions, for scripts and notebooks.
+
+>>> import rig
+>>> session = rig.open("my.session")
+>>> found = session.analyze()
+>>> found.runs[0].separation.value
+>>> print(found)
+
+Values are in SI units, angles in degrees. A session is opened for reading; nothing here writes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from rig.errors import InputError
+from rig.measurands import MEASURANDS
+from rig.predictions import predictions
+from rig.protocol import reader
+from rig.report.numbers import plus_minus
+from rig.report.table import summary_table
+from rig.results import calibration, protocol_of, with_analysis
+from rig.session.export import flatten
+from rig.session.store import Session as SessionFile
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.session import Analysis
+    from rig.analysis.summary import Incline
+    from rig.protocol.scene import Protocol
+    from rig.units import Quantity
+
+__all__ = ["Edges", "Found", "Line", "Prediction", "Run", "Session", "open", "predict",
+           "read_protocol"]  # fmt: skip
+
+
+def open(path: str | os.PathLike[str]) -> Session:  # noqa: A001 - it is rig.open
+    """Open a session for reading.
+
+    Parameters
+    ----------
+    path
+        The session file, as `rig run` or `rig import` made it. It may still be growing.
+
+    Raises
+    ------
+    SessionError
+        If there is no such session, or it cannot be read.
+    """
+    return Session(SessionFile.open(path, readonly=True))
+
+
+def read_protocol(path: str | os.PathLike[str]) -> Protocol:
+    """Read a protocol file.
+
+    Raises
+    ------
+    InputError
+        With every problem at its line and column.
+    """
+    return reader.read(str(path))
+
+
+def predict(protocol: Protocol) -> list[Prediction]:
+    """Predict each incline of a protocol's plan by the discrete model (Eqs. 8 to 13).
+
+    Returns
+    -------
+    list of Prediction
+        One an incline; of unlike chains one for each that strikes.
+    """
+    lines: list[dict[str, Any]] = [
+        {name: line.get(name) for name in Prediction.__slots__} for line in predictions(protocol)
+    ]
+    return [Prediction(**line) for line in lines]
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What the model says of one incline; `None` is what the scene does not have or tell.
+
+    Attributes
+    ----------
+    incline_deg, impact_chain
+        What it is of; a chain is named where two are unlike.
+    model, alpha, gamma
+        What was computed, and the coefficients of Eq. 9.
+    separation_m, separation_u_m, speed_m_s, speed_u_m_s
+        Δz and V with their standard uncertainties.
+    fall_time_s, free_fall_speed_m_s
+        Until the top rod strikes; and how fast it would be without any impact.
+    in_domain, notes
+        Whether the model describes the case, and what there is to say.
+    """
+
+    incline_deg: float
+    impact_chain: str | None
+    model: str
+    alpha: float | None
+    gamma: float | None
+    separation_m: float | None
+    separation_u_m: float | None
+    speed_m_s: float | None
+    speed_u_m_s: float | None
+    fall_time_s: float | None
+    free_fall_speed_m_s: float
+    in_domain: bool
+    notes: list[str]
+
+
+class Edges(NamedTuple):
+    """The edges of one drop, in the order in which they came; shape ``(edges,)`` each.
+
+    Attributes
+    ----------
+    time_s
+        Since the release was fired, by the calibrated clock.
+    channel
+        Of the gate.
+    blocked
+        Whether the beam is dark from then on.
+    """
+
+    time_s: NDArray[np.float64]
+    channel: NDArray[np.int64]
+    blocked: NDArray[np.bool_]
+
+
+class Session:
+    """A session, open for reading; also a context manager."""
+
+    def __init__(self, file: SessionFile) -> None:
+        self._file = file
+
+    @property
+    def simulated(self) -> bool:
+        """Whether no chain ever fell."""
+        return self._file.simulated
+
+    @property
+    def protocol(self) -> Protocol:
+        """What was planned, as the session keeps it."""
+        return protocol_of(self._file)
+
+    def analyze(self, progress: Callable[[int, int], None] | None = None) -> Found:
+        """Compute everything from the raw edges, as `rig analyze` does.
+
+        Parameters
+        ----------
+        progress
+            Called with the number of drops done and the number of all.
+        """
+        said, analysis = with_analysis(self._file, progress)
+        return Found(said, analysis)
+
+    def edges(self, run: int, attempt: int | None = None) -> Edges:
+        """Return the recorded edges of a run, by default of its latest attempt.
+
+        Raises
+        ------
+        InputError
+            If no such drop was recorded.
+        """
+        import numpy as np  # noqa: PLC0415 - a door costs nothing before it is used
+
+        drops = [drop for drop in self._file.drops() if drop.run == run]
+        drops = [drop for drop in drops if attempt is None or drop.attempt == attempt]
+        if not drops:
+            recorded = sorted({drop.run for drop in self._file.drops()})
+            raise InputError(f"no recorded drop of run {run}", f"recorded are the runs {recorded}")
+        drop = drops[-1]
+        ticks, channels, blocked = zip(*drop.edges, strict=True) if drop.edges else ((), (), ())
+        hz = calibration(self._file).scale(drop).hz
+        return Edges(
+            np.array(ticks, dtype=np.float64) / hz,
+            np.array(channels, dtype=np.int64),
+            np.array(blocked, dtype=np.bool_),
+        )
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        stamp = ", simulated" if self.simulated else ""
+        return f"<session {self._file.path.name}: {len(self._file.latest_drops())} runs{stamp}>"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class _Quantities:
+    """Measured quantities by name; those of the project have attributes of their own."""
+
+    quantities: Mapping[str, Measured]
+
+    def _one(self, name: str) -> Measured:
+        if name not in self.quantities:
+            raise InputError(f"{self!r} has no {MEASURANDS[name].label}", self._what_it_has())
+        return self.quantities[name]
+
+    def _what_it_has(self) -> str:
+        return f"it has {', '.join(self.quantities) or 'no quantities'}"
+
+    @property
+    def separation(self) -> Measured:
+        """Δz at level, corrected to simultaneous release, m."""
+        return self._one("separation_m")
+
+    @property
+    def speed(self) -> Measured:
+        """V of the impact chain's top rod, m/s."""
+        return self._one("speed_m_s")
+
+    @property
+    def gravity(self) -> Measured:
+        """Acceleration of a chain that strikes nothing, m/s²."""
+        return self._one("gravity_m_s2")
+
+    def _written(self) -> str:
+        rows = (MEASURANDS[name] for name in self.quantities)
+        said = (
+            f"{row.symbol} {plus_minus(self.quantities[row.name].json(), row.scale)} {row.unit}"
+            for row in rows
+            if row.told
+        )
+        return ", ".join(said)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Run(_Quantities):
+    """One drop.
+
+    Attributes
+    ----------
+    quantities
+        By JSON name, with value, u, `expanded` (95 %), degrees of freedom and budget.
+    run, attempt, incline_deg, impact_chain
+        Which it was.
+    verdict, reasons
+        ``accepted``, ``marginal``, ``void`` or ``rejected``, and why.
+    """
+
+    run: int = field(kw_only=True)
+    attempt: int = field(kw_only=True)
+    incline_deg: float = field(kw_only=True)
+    impact_chain: str | None = field(kw_only=True)
+    verdict: str = field(kw_only=True)
+    reasons: tuple[str, ...] = field(kw_only=True)
+
+    @classmethod
+    def _of(cls, one: DropResult) -> Run:
+        return cls(
+            one.quantities,
+            run=one.run.number,
+            attempt=one.attempt,
+            incline_deg=one.run.incline_deg,
+            impact_chain=one.run.impact,
+            verdict=one.verdict,
+            reasons=one.reasons,
+        )
+
+    @property
+    def separation_raw(self) -> Measured:
+        """Δz as it happened, m."""
+        return self._one("separation_raw_m")
+
+    @property
+    def release_skew(self) -> Measured:
+        """The free chain's release less the impact chain's, s."""
+        return self._one("release_skew_s")
+
+    @property
+    def fall_time(self) -> Measured:
+        """From the impact chain's release to its top rod's strike, s."""
+        return self._one("fall_time_s")
+
+    def __repr__(self) -> str:
+        at = f" at {self.incline_deg:g}°, {self.impact_chain} strikes" if self.impact_chain else ""
+        said = f": {self._written()}" if self.quantities else ""
+        return f"<run {self.run}{at}, {self.verdict}{said}>"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Line(_Quantities):
+    """The mean of all good runs at one incline, or of one of two unlike chains there.
+
+    Attributes
+    ----------
+    quantities
+        Means by JSON name.
+    incline_deg, impact_chain, n
+        What it is of, and how many runs.
+    predicted
+        What the model says, with its u; nothing outside its domain.
+    """
+
+    incline_deg: float = field(kw_only=True)
+    impact_chain: str | None = field(kw_only=True)
+    n: int = field(kw_only=True)
+    predicted: Mapping[str, Quantity] = field(kw_only=True)
+
+    @classmethod
+    def _of(cls, one: Incline) -> Line:
+        return cls(
+            one.means,
+            incline_deg=one.incline_deg,
+            impact_chain=one.impact_chain,
+            n=one.n,
+            predicted=one.predicted,
+        )
+
+    def __repr__(self) -> str:
+        return f"<{self.incline_deg:g}°, mean of {self.n}: {self._written()}>"
+
+
+class Found:
+    """What a session says.
+
+    Attributes
+    ----------
+    runs
+        The last attempt at each run, in order.
+    summary
+        Means, in order of incline.
+    """
+
+    def __init__(self, said: dict[str, Any], analysis: Analysis) -> None:
+        self._said = said
+        self.runs = tuple(Run._of(one) for one in analysis.runs)
+        self.summary = tuple(Line._of(one) for one in analysis.summary)
+
+    def json(self) -> dict[str, Any]:
+        """Return what `rig analyze --json` prints."""
+        return self._said
+
+    def to_frame(self) -> Any:
+        """Return the runs as a pandas table, a row a run, columns as in `rig export`'s runs.csv.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 - only who wants a table needs it
+        except ImportError as error:
+            raise InputError("a table needs pandas", "pip install pandas") from error
+        left_out = {"budget", "causes"}
+        rows = [
+            flatten({key: value for key, value in run.items() if key not in left_out})
+            for run in self._said["runs"]
+        ]
+        return pd.DataFrame(rows).set_index("run")
+
+    def __str__(self) -> str:
+        stamp = "SIMULATED DATA\n" if self._said["simulated"] else ""
+        return stamp + summary_table(self._said)
+
+    def __repr__(self) -> str:
+        good = sum(run.verdict in {"accepted", "marginal"} for run in self.runs)
+        stamp = ", simulated" if self._said["simulated"] else ""
+        return f"<results of {len(self.runs)} runs, {good} of them good{stamp}>"

@@ -1,0 +1,113 @@
+"""The Python door: what its page and its notebook say, and that it says what the commands say."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import rig
+from rig.errors import InputError, SessionError
+from rig.threads import one_thread
+from tests.cli.lab import ROOT
+
+DOCS = ROOT / "docs"
+
+
+@pytest.fixture
+def here(finished, tmp_path, monkeypatch):
+    """A folder as the page supposes it: with a session and its protocol."""
+    finished.copy(tmp_path).rename(tmp_path / "my.session")
+    (tmp_path / "my-chains.yaml").write_text(finished.protocol.read_text("utf-8"), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.usefixtures("here")
+def test_the_page_can_be_typed_in():
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL)
+    assert len(blocks) > 4
+    exec("".join(blocks), {})
+
+
+@pytest.mark.usefixtures("here")
+def test_the_notebook_runs(monkeypatch, capsys):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    cells = json.loads((DOCS / "notebook.ipynb").read_text("utf-8"))["cells"]
+    assert all(not cell.get("outputs") for cell in cells)
+    exec("\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "code"), {})
+    assert "SIMULATED DATA" in capsys.readouterr().out
+
+
+def test_it_says_what_the_command_says(here, call):
+    said = json.loads(call("analyze", here / "my.session", "--json").out)
+    with rig.open("my.session") as session:
+        found = session.analyze()
+        assert session.simulated
+        assert session.protocol.title == "A short campaign"
+    assert json.loads(json.dumps(found.json())) == said
+    for run, record in zip(found.runs, said["runs"], strict=True):
+        assert run.separation.json() == record["separation_m"]
+        assert run.separation_raw.json() == record["separation_raw_m"]
+        assert run.speed.json() == record["speed_m_s"]
+        assert run.release_skew.json() == record["release_skew_s"]
+        assert run.fall_time.json() == record["fall_time_s"]
+        assert (run.run, run.verdict) == (record["run"], record["verdict"])
+    for line, record in zip(found.summary, said["summary"], strict=True):
+        assert line.speed.json() == record["speed_m_s"]
+        assert line.predicted["speed_m_s"].value == record["predicted"]["speed_m_s"]
+    assert str(found).removeprefix("SIMULATED DATA\n") in call("analyze", "my.session").out
+    assert repr(found) == "<results of 4 runs, 4 of them good, simulated>"
+    written = repr(found.runs[0])
+    assert re.fullmatch(r"<run 1 at 40°, A strikes, accepted: Δz .* ± .* cm, .*>", written)
+    with pytest.raises(InputError, match="has no g"):
+        _ = found.runs[0].gravity
+
+
+@pytest.mark.usefixtures("here")
+def test_edges_are_those_that_export_writes(call, tmp_path):
+    assert call("export", "my.session", "--csv", tmp_path / "csv").code == 0
+    table = np.loadtxt(tmp_path / "csv" / "edges.csv", delimiter=",", skiprows=1)
+    session = rig.open("my.session")
+    for run in (1, 4):
+        edges = session.edges(run)
+        mine = table[table[:, 0] == run]
+        np.testing.assert_array_equal(edges.channel, mine[:, 1])
+        np.testing.assert_array_equal(edges.blocked, mine[:, 3] == 1)
+        np.testing.assert_allclose(edges.time_s, mine[:, 2], rtol=0, atol=2e-12)
+    with pytest.raises(InputError, match="no recorded drop of run 99"):
+        session.edges(99)
+    assert repr(session) == "<session my.session: 4 runs, simulated>"
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    with pytest.raises(SessionError, match="no session"):
+        rig.open(tmp_path / "none.session")
+    with pytest.raises(AttributeError, match="it offers"):
+        _ = rig.opne
+    with pytest.raises(InputError):
+        rig.read_protocol(tmp_path / "none.yaml")
+
+
+def test_coming_to_the_door_loads_nothing():
+    code = (
+        "import rig, sys; print(sorted({'numpy', 'scipy', 'yaml', 'textual'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_matrices_keep_to_one_thread_for_as_long_as_a_call_lasts():
+    def threads():
+        return [one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"]
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        assert before  # numpy has one
+        assert set(one_thread(threads)()) == {1}
+        assert threads() == before
