@@ -328,37 +328,6 @@ def _parser() -> argparse.ArgumentParser:
         help="seconds that one Monte Carlo setting may take (default 120)",
     )
     _json(every)
-    clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
-    clock.set_defaults(module="bench_clock")
-    clock.add_argument(
-        "--protocol", default="protocols/picket-fence.yaml", metavar="FILE", help="any scene"
-    )
-    clock.add_argument("--seeds", type=_count, default=20, metavar="N", help="lines to simulate")
-    _json(clock)
-    faults = benches.add_parser("faults", help="kill, pull and garble sessions; count what is lost")
-    faults.set_defaults(module="bench_faults")
-    faults.add_argument(
-        "--share", type=_count, default=100, metavar="PERCENT", help="of the full counts"
-    )
-    faults.add_argument("--jobs", type=_count, default=6, metavar="N", help="rigs side by side")
-    faults.add_argument(
-        "--board", dest="boards", nargs="+", choices=["sim", "emu"], default=["sim", "emu"],
-        help="virtual, or real firmware in an emulator",
-    )  # fmt: skip
-    faults.add_argument(
-        "--kind", dest="kinds", nargs="+", metavar="KIND", help="only these",
-        choices=["daemon", "runner", "cable", "reset", "disk", "noise", "race", "deaf"],
-    )  # fmt: skip
-    _json(faults)
-    links = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
-    links.set_defaults(module="bench_link")
-    _json(links)
-    screen = benches.add_parser("tui", help="what the screen costs, and how late it is")
-    screen.set_defaults(module="bench_tui")
-    screen.add_argument(
-        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
-    )
-    _json(screen)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")

@@ -7,10 +7,10 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
+from rig.bench.acceptance import acceptance_table
 from rig.bench.accuracy import accuracy
 from rig.bench.dials import DOUBLED, STACK, doubled
-from rig.bench.proof import proof_table
-from rig.bench.quick import BLOCK, quick_accuracy
+from rig.bench.fast_accuracy import BLOCK, fast_accuracy
 from rig.commands.output import print_json, say
 from rig.measurands import MEASURANDS
 
@@ -30,7 +30,7 @@ def main(arguments: Namespace) -> int:
     if arguments.json:
         print_json(found)
     elif arguments.doubled:
-        print("\n".join([*_table(found["default"]), "", *proof_table(found)]))
+        print("\n".join([*_table(found["default"]), "", *acceptance_table(found)]))
     else:
         print("\n".join(_table(found)))
     return 0
@@ -51,7 +51,7 @@ def _proof(arguments: Namespace) -> dict[str, Any]:
     ports = {"default": arguments.port} | ports
     with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as pool:
         cases = {
-            dial: pool.submit(quick_accuracy, protocol, port, rigs)
+            dial: pool.submit(fast_accuracy, protocol, port, rigs)
             for dial, port in ports.items()
             if dial not in STACK
         }

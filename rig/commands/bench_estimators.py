@@ -9,10 +9,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rig.bench.estimators import as_json, estimators
+from rig.bench.figures import estimators_figure
 from rig.commands.output import print_json, say
 from rig.files import make_folder, write_atomic
 from rig.report.columns import Column
-from rig.report.estimators import estimators_figure
 from rig.report.table import aligned
 
 if TYPE_CHECKING:

@@ -10,11 +10,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.bench.figures import precision_figure
 from rig.bench.precision import as_json, precision
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import write_atomic
-from rig.report.precision import precision_figure
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -93,7 +93,7 @@ def _quartiles(spread: Spread, scale: float) -> str:
 
 def _write(folder: Path, costs: Sequence[Cost], text: str) -> None:
     """Write ``scenes.csv``, ``scenes.json`` and the picture."""
-    from rig.report.scenes import scenes_figure  # noqa: PLC0415 - it needs matplotlib
+    from rig.bench.figures import scenes_figure  # noqa: PLC0415 - it needs matplotlib
 
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")

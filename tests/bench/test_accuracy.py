@@ -7,11 +7,11 @@ from dataclasses import asdict
 
 import pytest
 
+from rig.bench.acceptance import acceptance_table, failures
 from rig.bench.accuracy import Errors
+from rig.bench.baselines import plain_fit, two_gate_timer
 from rig.bench.dials import DOUBLED, STACK, doubled, with_setting
-from rig.bench.proof import failures, proof_table
-from rig.bench.quick import _falls, _sessions, quick_accuracy
-from rig.bench.rivals import plain_fit, two_gate_timer
+from rig.bench.fast_accuracy import _falls, _sessions, fast_accuracy
 from rig.errors import RigError
 from rig.protocol.plan import runs
 from sim.dials import Dials, read_dials
@@ -81,13 +81,13 @@ def test_every_planned_run_has_its_turn():
 
 
 def test_a_rig_s_drops_are_judged_by_their_truth():
-    found = quick_accuracy(SOURCE, "sim://", 1)
+    found = fast_accuracy(SOURCE, "sim://", 1)
     assert found["verdicts"].keys() <= {"accepted", "marginal"}
     assert found["edges_matched"] > 1000
     assert found["edges_given_to_a_wrong_rod"] == 0
     assert 0.0 < found["speed_rms_relative"] < 3e-3
     assert found["quantities"]["speed_m_s"]["n"] == sum(found["verdicts"].values()) == 4
-    lines = proof_table({"default": found})
+    lines = acceptance_table({"default": found})
     assert len(lines) == 2  # a heading, and nothing beyond a limit
     assert lines[1].split()[:2] == ["default", "4"]
 

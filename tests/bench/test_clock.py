@@ -1,10 +1,10 @@
-"""``rig bench clock``, small: errors fall with time, and a reference beats them all."""
+"""``./run bench clock``, small: errors fall with time, and a reference beats them all."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from rig.bench.clock import clock
+from bench.clock import clock
 
 FENCE = str(Path(__file__).parents[2] / "protocols" / "picket-fence.yaml")
 

@@ -9,8 +9,8 @@ import pytest
 
 from rig.analysis.drop import fit_drop
 from rig.analysis.quantities import quantities
-from rig.bench.draws import drawn
-from rig.bench.line_fits import line_fit
+from rig.bench.baselines import line_fit
+from rig.bench.estimators import drawn
 from rig.cli import main
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case

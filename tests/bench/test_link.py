@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.bench import decoding, link
+from bench import decoding, link
 from rig.link.messages import EVENTS_PER_FRAME
 from rig.link.transcript import Received, Transcript
 

@@ -12,8 +12,8 @@ from itertools import pairwise
 import pytest
 
 from rig.bench import scenes as bench
-from rig.bench.scene_ladder import ladder
 from rig.bench.scene_probe import bytecodes, evaluations
+from rig.bench.scenes import ladder
 from rig.cli import main
 from rig.errors import RigError
 from rig.model.fall import hits

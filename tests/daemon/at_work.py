@@ -13,11 +13,11 @@ from tests.waiting import PATIENCE_S
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rig.bench.stand import Stand
+    from bench.process_fixture import ProcessFixture
 
 
 @contextmanager
-def working(stand: Stand) -> Iterator[tuple[Worker, Callable[..., Any]]]:
+def working(stand: ProcessFixture) -> Iterator[tuple[Worker, Callable[..., Any]]]:
     """Have a worker at a board, with a session open, and a way to ask it; control never lapses."""
     lease = Lease(lambda: 0.0)
     lease.take("me", "a test")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rig.bench.stand import Stand
+from bench.process_fixture import ProcessFixture
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def stand() -> Iterator[Stand]:
+def stand() -> Iterator[ProcessFixture]:
     """Have a board and a daemon for a protocol of two runs."""
-    with Stand(runs=2, seed=3) as made:
+    with ProcessFixture(runs=2, seed=3) as made:
         made.start_daemon()
         yield made
 
 
 @pytest.fixture
-def client(stand: Stand) -> Iterator[Callable[[str], Client]]:
+def client(stand: ProcessFixture) -> Iterator[Callable[[str], Client]]:
     """Connect clients that are gone at the end of the test."""
     made: list[Client] = []
 

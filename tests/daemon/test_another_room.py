@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rig.bench.invariants import broken
-from rig.bench.stand import Stand
+from bench.invariants import broken
+from bench.process_fixture import ProcessFixture
 from rig.link.messages import Phase
 from rig.link.port import BAUDRATE
 from tests.daemon.far_port import FarPort
@@ -13,7 +13,7 @@ from tests.daemon.far_port import FarPort
 
 @pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
 def test_a_session_survives_a_connection_that_is_lost_while_chains_fall(scheme):
-    with Stand(1) as stand, FarPort(stand.port, scheme) as far:
+    with ProcessFixture(1) as stand, FarPort(stand.port, scheme) as far:
         stand.port = far.url
         stand.start_daemon()
         stand.start_runner()

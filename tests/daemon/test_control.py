@@ -7,8 +7,8 @@ from functools import partial
 
 import pytest
 
-from rig.bench.invariants import broken, longest_on
-from rig.bench.stand import Stand
+from bench.invariants import broken, longest_on
+from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, InputError
 from rig.link.client import Device
@@ -147,7 +147,7 @@ def test_any_client_stops_a_recording_and_what_there_is_is_kept(stand, armed, cl
 def unheard(monkeypatch):
     """Have a board and a worker that, unless stopped, repeats a request for ever."""
     monkeypatch.setattr("rig.recorder.recorder.Device", partial(Device, tries=10**9))
-    with Stand(runs=2, seed=3) as stand, working(stand) as (worker, ask):
+    with ProcessFixture(runs=2, seed=3) as stand, working(stand) as (worker, ask):
         token = ask(lambda controller: controller.arm(1, 1))
         yield stand, worker, token
         stand.hand("mute 0")  # else a worker that no STOP reaches never ends

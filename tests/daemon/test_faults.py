@@ -1,4 +1,4 @@
-"""Kills, pulls and resets at random moments; `rig bench faults` does it hundreds of times."""
+"""Kills, pulls and resets at random moments; `./run bench faults` does it hundreds of times."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from rig.bench.faults import CROWD, KINDS, NOISE, OFF_S, disturbed
-from rig.bench.invariants import broken
+from bench.faults import CONTENTION, KINDS, NOISE, OFF_S, disturbed
+from bench.invariants import broken
 from rig.errors import SessionError
 from rig.link.messages import Phase
 from rig.session.store import Session
 
 
 def test_nothing_is_lost_whatever_dies():
-    with ThreadPoolExecutor(len(KINDS) + len(CROWD) + 1) as pool:
+    with ThreadPoolExecutor(len(KINDS) + len(CONTENTION) + 1) as pool:
         noise = pool.submit(disturbed, "daemon", 0, 5, runs=1, dials=NOISE)
         made = [pool.submit(disturbed, kind, 2, 7, runs=1) for kind in KINDS]
-        crowd = [pool.submit(make, 1, 9) for make in CROWD.values()]
+        crowd = [pool.submit(make, 1, 9) for make in CONTENTION.values()]
         for tally in (one.result() for one in (noise, *made, *crowd)):
             assert tally.broken == []
             assert tally.longest_on_s <= OFF_S

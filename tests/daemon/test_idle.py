@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rig.bench.stand import FENCE, Stand
+from bench.process_fixture import FENCE, ProcessFixture
 from rig.cli import main
 from rig.errors import RigError
 from rig.link.messages import Phase
@@ -24,7 +24,7 @@ ALONE = f"no client for {IDLE_S:g} s"
 @pytest.fixture
 def stand():
     """Have a board and a daemon that ends when it is left alone."""
-    with Stand(runs=2, seed=3, small_disk=True) as made:
+    with ProcessFixture(runs=2, seed=3, small_disk=True) as made:
         made.start_daemon("--idle-timeout", str(IDLE_S))
         yield made
 
@@ -81,7 +81,7 @@ def test_it_stays_while_a_client_is_there_and_ends_after_it(stand, client):
 
 
 def test_one_that_was_started_by_hand_stays(tmp_path):
-    with Stand(runs=1) as stand:
+    with ProcessFixture(runs=1) as stand:
         stand.start_daemon()
         other = subprocess.run(
             [sys.executable, "-m", "rig", "daemon", "--port", "sim://", "--socket",

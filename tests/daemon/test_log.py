@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from rig.bench.stand import Stand
+from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import RigError
@@ -27,7 +27,7 @@ print("not held up", flush=True)
 
 
 def test_a_session_and_a_pulled_cable_are_told_once_each():
-    with Stand(runs=2, seed=3) as stand:
+    with ProcessFixture(runs=2, seed=3) as stand:
         stand.start_daemon()
         told = [stand.daemon.stderr.readline().rstrip()]
         client = stand.client("the driver")

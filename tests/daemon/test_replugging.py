@@ -8,7 +8,7 @@ from contextlib import closing
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
-from rig.bench.stand import Stand
+from bench.process_fixture import ProcessFixture
 from rig.errors import DeviceError
 from rig.recorder.controller import Controller
 from rig.session.store import Session
@@ -35,7 +35,7 @@ def usb(monkeypatch):
 
 
 def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
-    with Stand(1) as stand:
+    with ProcessFixture(1) as stand:
         elsewhere = stand.folder / "elsewhere"
         usb |= {stand.port: "85430", elsewhere: "85430"}
         with working(stand) as (worker, ask):
@@ -53,7 +53,7 @@ def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
 
 @pytest.mark.parametrize("numbers", [("85430", "999"), (None, None), ("85430", "85430")])
 def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
-    with Stand(1, seed=1) as stand, Stand(1, seed=2) as other:
+    with ProcessFixture(1, seed=1) as stand, ProcessFixture(1, seed=2) as other:
         usb |= {stand.port: numbers[0]}
         with working(stand) as (worker, ask):
             ask(lambda controller: controller.fire(controller.arm(1, 1)))
@@ -73,7 +73,7 @@ def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
 
 
 def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
-    with Stand(1) as stand:
+    with ProcessFixture(1) as stand:
         elsewhere = stand.folder / "elsewhere"
         usb |= {stand.port: "85430", elsewhere: "85430"}
         with closing(Controller(str(stand.port))) as controller:

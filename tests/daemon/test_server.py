@@ -13,7 +13,7 @@ import sys
 
 import pytest
 
-from rig.bench.stand import Stand
+from bench.process_fixture import ProcessFixture
 from rig.daemon import rpc
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
@@ -243,7 +243,7 @@ def test_over_tcp_the_token_is_asked_for(door):
 
 
 def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
-    with Stand(runs=1) as stand:
+    with ProcessFixture(runs=1) as stand:
         stand.start_daemon()
         first = stand.daemon
         with pytest.raises(DeviceError, match="another daemon answers"):
@@ -256,7 +256,7 @@ def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
 
 
 def test_over_tcp_too_a_second_daemon_is_refused_and_a_run_goes_through():
-    with Stand(runs=1) as stand:
+    with ProcessFixture(runs=1) as stand:
         stand.start_daemon("--tcp")
         first = stand.daemon
         for options in (["--tcp"], []):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rig.bench.stand import Stand
+from bench.process_fixture import ProcessFixture
 from tests.tui.lab import Lab, short_folder
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ def lab() -> Iterator[Lab]:
 
 
 @pytest.fixture
-def cabled() -> Iterator[tuple[Stand, Lab]]:
+def cabled() -> Iterator[tuple[ProcessFixture, Lab]]:
     """A board behind a cable, and a daemon that owns its port."""
-    with Stand(runs=2, seed=3) as stand:
+    with ProcessFixture(runs=2, seed=3) as stand:
         bench = Lab(stand.folder, stand.protocol, str(stand.port))
         bench.start()
         yield stand, bench

@@ -37,7 +37,7 @@ CLOCK_U = 1e-6
 """How well the time scale is known, relative: a few minutes of clock samples."""
 
 
-def quick_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
+def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
     """Simulate and analyse one short session on each of many rigs: one block of drops.
 
     Parameters

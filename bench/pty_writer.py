@@ -29,7 +29,7 @@ print(json.dumps(sent))
 """
 
 
-class Terminal:
+class PtyWriter:
     """A raw terminal, and a process that writes into its far end.
 
     Parameters

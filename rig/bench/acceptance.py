@@ -52,7 +52,7 @@ def failures(found: Mapping[str, Any]) -> Iterator[str]:
             yield f"coverage of {label} is {errors['coverage']:.1%}"
 
 
-def proof_table(cases: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def acceptance_table(cases: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """One line a case: rms errors, the largest bias, coverage by quantity, and what fails."""
     names = [name for name in _NAMES if name in next(iter(cases.values()))["quantities"]]
     limits = [name for name in LIMITS if name in names]

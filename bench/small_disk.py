@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rig.bench.stand import Process
+    from bench.process_fixture import Process
 
 _SIZE = "4m"
 _CHUNK = bytes(1 << 12)

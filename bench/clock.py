@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
+from rig.commands.output import print_json, say
 from rig.protocol.scene import PPS_U
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
 
 if TYPE_CHECKING:
+    from argparse import Namespace
     from collections.abc import Callable
 
     from rig.clock.rate import TickRate
@@ -123,3 +125,16 @@ def _row(duration: float, source: str, pairs: list[tuple[float, float]]) -> Row:
         sum(u for _, u in pairs) / n,
         sum(abs(error) <= 1.96 * u for error, u in pairs) / n,
     )
+
+
+def main(arguments: Namespace) -> int:
+    """Print errors of the tick rate against the time clocks were compared for."""
+    rows = clock(arguments.protocol, arguments.seeds, say, DURATIONS_S)
+    if arguments.json:
+        print_json({"rows": [asdict(row) for row in rows]})
+        return 0
+    print(f"{'after':>7}  {'by':<9}  {'rms':>9}  {'worst':>9}  {'stated u':>9}  within 1.96 u")
+    for row in rows:
+        errors = "  ".join(f"{ppm:>5.2g} ppm" for ppm in (row.rms, row.worst, row.u))
+        print(f"{row.duration_s:>5.0f} s  {row.source:<9}  {errors}  {row.held:>13.0%}")
+    return 0

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
-from rig.bench.small_disk import SmallDisk
+from bench.small_disk import SmallDisk
 from rig.daemon.client import Client
 from rig.errors import DeviceError
 
@@ -40,7 +40,7 @@ _READY_S = 120.0  # only what never comes takes longer, however busy the machine
 _BOARDS = {"sim": "sim.pty", "emu": "rig_emulator.hands"}
 
 
-class Stand:
+class ProcessFixture:
     """Everything in one temporary folder; a context that ends what it started.
 
     Parameters

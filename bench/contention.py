@@ -9,14 +9,14 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.bench.invariants import broken, longest_on
-from rig.bench.stand import Stand
-from rig.bench.tally import Tally
+from bench.invariants import broken, longest_on
+from bench.process_fixture import ProcessFixture
+from bench.tally import Tally
 from rig.daemon import rpc
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
-    from rig.bench.stand import Process
+    from bench.process_fixture import Process
 
 _RUNS = 2
 _DEAF = 4  # clients that never read, in each session
@@ -31,13 +31,13 @@ def raced(count: int, seed: int, board: str = "sim") -> Tally:
     Parameters
     ----------
     count, seed, board
-        As for `rig.bench.faults.disturbed`.
+        As for `bench.faults.disturbed`.
     """
     tally = Tally()
     for n in range(count):
-        with Stand(_RUNS, seed + n, board=board) as stand:
-            stand.start_daemon()
-            runners = [stand.start_runner() for _ in range(2)]
+        with ProcessFixture(_RUNS, seed + n, board=board) as processes:
+            processes.start_daemon()
+            runners = [processes.start_runner() for _ in range(2)]
             told = [_ended(one) for one in runners]
             codes = sorted(code for code, _ in told)
             refused = any("has control" in said for _, said in told)
@@ -45,7 +45,7 @@ def raced(count: int, seed: int, board: str = "sim") -> Tally:
             if codes not in ([0, DeviceError.exit_code], [0, 0]) or (codes[1] and not refused):
                 tally.broken.append(f"both or none of two runners: {told}")
             tally.disturbed += bool(codes[1])
-            _look(stand, tally)
+            _look(processes, tally)
     return tally
 
 
@@ -55,23 +55,23 @@ def deaf(count: int, seed: int, board: str = "sim") -> Tally:
     Parameters
     ----------
     count, seed, board
-        As for `rig.bench.faults.disturbed`.
+        As for `bench.faults.disturbed`.
     """
     tally = Tally()
     for n in range(count):
-        with Stand(_RUNS, seed + n, board=board) as stand, ExitStack() as lines:
-            stand.start_daemon()
-            stand.client().close()
-            before = _most_memory(stand.daemon)
+        with ProcessFixture(_RUNS, seed + n, board=board) as processes, ExitStack() as lines:
+            processes.start_daemon()
+            processes.client().close()
+            before = _most_memory(processes.daemon)
             for _ in range(_DEAF):
-                _ask_and_never_read(lines.enter_context(socket.socket(socket.AF_UNIX)), stand)
+                _ask_and_never_read(lines.enter_context(socket.socket(socket.AF_UNIX)), processes)
                 tally.disturbed += 1
-            if (code := stand.run()) != 0:
-                tally.broken.append(f"a runner ended with {code}: {stand.told}")
-            tally.memory_bytes = max(tally.memory_bytes, _most_memory(stand.daemon) - before)
+            if (code := processes.run()) != 0:
+                tally.broken.append(f"a runner ended with {code}: {processes.told}")
+            tally.memory_bytes = max(tally.memory_bytes, _most_memory(processes.daemon) - before)
             if tally.memory_bytes > _GROWTH:
                 tally.broken.append(f"the daemon grew by {tally.memory_bytes} bytes")
-            _look(stand, tally)
+            _look(processes, tally)
     return tally
 
 
@@ -84,17 +84,17 @@ def _ended(runner: Process) -> tuple[int, str]:
     return runner.returncode, told
 
 
-def _look(stand: Stand, tally: Tally) -> None:
-    happened = list(stand.happened())
-    tally.broken += broken(stand.session, happened, stand.runs)
+def _look(processes: ProcessFixture, tally: Tally) -> None:
+    happened = list(processes.happened())
+    tally.broken += broken(processes.session, happened, processes.runs)
     tally.longest_on_s = max(tally.longest_on_s, longest_on(happened))
     tally.sessions += 1
-    tally.runs += stand.runs
+    tally.runs += processes.runs
     tally.drops += sum("drop" in seen for seen in happened)
 
 
-def _ask_and_never_read(line: socket.socket, stand: Stand) -> None:
-    line.connect(str(stand.socket))
+def _ask_and_never_read(line: socket.socket, processes: ProcessFixture) -> None:
+    line.connect(str(processes.socket))
     line.sendall(rpc.request("hello", {"api": rpc.API, "client": "deaf"}, 1))
     line.settimeout(0.2)
     with suppress(TimeoutError):  # the daemon does not take more than it can answer

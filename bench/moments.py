@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Sequence
 
-    from rig.bench.stand import Seen, Stand
+    from bench.process_fixture import ProcessFixture, Seen
 
 STATES = ("idle", "armed", "firing", "falling", "collecting", "stored", "judging")
 """What a moment can fall upon: nothing armed (settling, connecting, opening); armed; fired in the
@@ -34,12 +34,12 @@ _LOOK_S = 0.0005
 _AGAIN_S = 0.1  # until a runner that found the link down is started again
 
 
-def reach(stand: Stand, chance: random.Random, accept: Sequence[int] = (0, 4)) -> bool:
+def reach(processes: ProcessFixture, chance: random.Random, accept: Sequence[int] = (0, 4)) -> bool:
     """Let the runner run until a random moment.
 
     Parameters
     ----------
-    stand
+    processes
         With a runner.
     chance
         Chooses the moment.
@@ -54,32 +54,32 @@ def reach(stand: Stand, chance: random.Random, accept: Sequence[int] = (0, 4)) -
     _, phase, first, last = chance.choices(_AIMS, [aim[0] for aim in _AIMS])[0]
     delay = chance.uniform(first, last)
     until = time.monotonic() + delay if phase is None else None
-    stand.follow()  # what was before does not count
+    processes.follow()  # what was before does not count
     while until is None or time.monotonic() < until:
-        assert stand.runner is not None
-        if stand.runner.poll() is not None:
-            code = stand.waited()
+        assert processes.runner is not None
+        if processes.runner.poll() is not None:
+            code = processes.waited()
             if code == 0:
                 return False
             if code not in accept:
-                raise AssertionError(stand.told)
+                raise AssertionError(processes.told)
             time.sleep(_AGAIN_S)
-            stand.start_runner()
+            processes.start_runner()
         if until is None:
-            begun = [seen["at_s"] for seen in stand.follow() if seen.get("phase") == phase]
+            begun = [seen["at_s"] for seen in processes.follow() if seen.get("phase") == phase]
             until = begun[0] + delay if begun else None
         time.sleep(_LOOK_S)
     return True
 
 
-def fell_upon(stand: Stand, at_s: float) -> str:
+def fell_upon(processes: ProcessFixture, at_s: float) -> str:
     """Say which of `STATES` a moment fell upon."""
     phase, state = Phase.IDLE, None
-    for seen in stand.happened():
+    for seen in processes.happened():
         if "phase" in seen and seen["at_s"] <= at_s:
             phase = Phase(seen["phase"])
-    if stand.session.exists():
-        with Session.open(stand.session, readonly=True) as session:
+    if processes.session.exists():
+        with Session.open(processes.session, readonly=True) as session:
             for entry in session.states():
                 if entry.host_ns <= at_s * 1e9:
                     state = entry.state

@@ -19,10 +19,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.decoding import bytewise, checked, frames, speed, to_edges
-from rig.bench.stand import Stand
-from rig.bench.terminal import Terminal
+from bench.decoding import bytewise, checked, frames, speed, to_edges
+from bench.process_fixture import ProcessFixture
+from bench.pty_writer import PtyWriter
 from rig.clock.host import SystemClock
+from rig.commands.output import print_json, say
 from rig.daemon.server import Server
 from rig.link.exchange import Exchange
 from rig.link.messages import EVENTS_PER_FRAME, Fired
@@ -33,6 +34,7 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 
 if TYPE_CHECKING:
+    from argparse import Namespace
     from collections.abc import Callable, Iterable
 
 _FRAMES = 65_000 // EVENTS_PER_FRAME  # the number of an event is a u16
@@ -42,7 +44,7 @@ _IDLE_S = 5.0
 _BEST_OF = 3
 _FLOOD = """
 import json, sys
-from rig.bench.link import delivered, memory_mb
+from bench.link import delivered, memory_mb
 rate, _ = delivered(int(sys.argv[1]), 0.0)
 print(json.dumps([rate, memory_mb("self", "VmHWM")]))
 """
@@ -75,7 +77,7 @@ def read_alone(count: int, every_s: float) -> tuple[float, list[float]]:
     """Read frames through a terminal with pyserial and do nothing with them; see `delivered`."""
     data = frames(count)
     ends = [*accumulate(map(len, data))]
-    terminal = Terminal(data, every_s)
+    terminal = PtyWriter(data, every_s)
     port = open_port(terminal.path)
     terminal.start()
     got, seen = 0, []
@@ -132,7 +134,7 @@ async def _deliver(folder: Path, count: int, every_s: float) -> tuple[float, lis
     )
     assert client.stdout is not None
     await loop.run_in_executor(None, client.stdout.readline)
-    terminal = Terminal(frames(count), every_s)
+    terminal = PtyWriter(frames(count), every_s)
     await loop.run_in_executor(None, _read, folder, server, terminal, count)
     seen = json.loads(await loop.run_in_executor(None, client.stdout.read))
     client.wait()
@@ -145,7 +147,7 @@ async def _deliver(folder: Path, count: int, every_s: float) -> tuple[float, lis
     return wanted / (seen[-1][1] - times[0]), _latencies(times, ends, seen)
 
 
-def _read(folder: Path, server: Server, terminal: Terminal, count: int) -> None:
+def _read(folder: Path, server: Server, terminal: PtyWriter, count: int) -> None:
     """Do what the worker does while a drop is recorded."""
     with Session.create(
         folder / "session", "protocol: 1\n", "bench", simulated=True, origin="bench"
@@ -165,20 +167,20 @@ def _read(folder: Path, server: Server, terminal: Terminal, count: int) -> None:
 def idle() -> dict[str, float]:
     """CPU share and memory of a daemon with a board and nothing to do, and with a watcher."""
     found = {}
-    with Stand(1) as stand:
-        stand.start_daemon()
-        assert stand.daemon is not None
-        with_client = stand.client()
+    with ProcessFixture(1) as processes:
+        processes.start_daemon()
+        assert processes.daemon is not None
+        with_client = processes.client()
         with_client.call("subscribe")
         time.sleep(3.0)  # the board has been found
         for name in ("watched", "alone"):
             if name == "alone":
                 with_client.close()
                 time.sleep(1.5)
-            before = cpu_s(stand.daemon.pid)
+            before = cpu_s(processes.daemon.pid)
             time.sleep(_IDLE_S)
-            found[f"{name}_cpu"] = (cpu_s(stand.daemon.pid) - before) / _IDLE_S
-        found["memory_mb"] = memory_mb(stand.daemon.pid)
+            found[f"{name}_cpu"] = (cpu_s(processes.daemon.pid) - before) / _IDLE_S
+        found["memory_mb"] = memory_mb(processes.daemon.pid)
     return found
 
 
@@ -251,3 +253,24 @@ def link(say: Callable[[str], None]) -> dict[str, Any]:
         "load": os.getloadavg()[0],
         "cores": os.cpu_count(),
     }
+
+
+def main(arguments: Namespace) -> int:
+    """Measure the way from the port to a client."""
+    found = link(say)
+    if arguments.json:
+        print_json(found)
+        return 0
+    for name, rate in found["edges_per_s"].items():
+        print(f"{name.replace('_', ' '):<28}{rate:>12,.0f} edges/s")
+    print("latency at 5000 edges/s, median and p99")
+    for name, late in found["latency_at_5000_per_s_s"].items():
+        median, p99 = late["median"] * 1e3, late["p99"] * 1e3
+        print(f"{name.replace('_', ' '):<28}{median:>7.1f} {p99:.1f} ms")
+    idle = found["idle"]
+    print(f"{'idle daemon':<28}{idle['alone_cpu']:>12.1%} of a core")
+    print(f"{'with one who watches':<28}{idle['watched_cpu']:>12.1%} of a core")
+    print(f"{'memory, idle':<28}{idle['memory_mb']:>12.0f} MB")
+    print(f"{'memory, most in a flood':<28}{found['busy']['memory_mb']:>12.0f} MB")
+    print(f"{'load of the machine':<28}{found['load']:>12.1f} on {found['cores']} cores")
+    return 0

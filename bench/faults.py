@@ -7,24 +7,27 @@ import subprocess
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from rig.bench.crowd import deaf, raced
-from rig.bench.invariants import broken, longest_on
-from rig.bench.moments import fell_upon, off_after, reach
-from rig.bench.stand import Stand
-from rig.bench.tally import Tally
+from bench.contention import deaf, raced
+from bench.invariants import broken, longest_on
+from bench.moments import STATES, fell_upon, off_after, reach
+from bench.process_fixture import ProcessFixture
+from bench.tally import Tally
+from rig.commands.output import print_json, say
 from rig.errors import DeviceError, SessionError
 from rig.link.transcript import Transcript
 from rig.session.store import Session
 
 if TYPE_CHECKING:
+    from argparse import Namespace
     from collections.abc import Callable
 
 KINDS = ("daemon", "runner", "cable", "reset", "disk")
 """What can be disturbed: processes killed, the cable pulled for a moment, the board reset, the
 disk filled for a moment."""
-CROWD = {"race": raced, "deaf": deaf}
+CONTENTION = {"race": raced, "deaf": deaf}
 """What clients can do to each other: two that want control at once, some that never read."""
 NOISE = {"corrupt": "0.01", "lose": "0.005"}
 """Of each byte, in both directions."""
@@ -34,6 +37,20 @@ _RUNS = 6  # in a session
 _TRIES = 40  # of a runner that finds the link down
 _TROUBLE_S = 3.0  # in which a runner sees the trouble, or is done with its work
 _DISK_FULL_S = 1.0
+_COUNTS = {
+    "sim": {
+        "daemon": 200,
+        "runner": 50,
+        "cable": 100,
+        "reset": 40,
+        "disk": 40,
+        "noise": 8,
+        "race": 10,
+        "deaf": 4,
+    },
+    # The emulator takes a good part of a core for each rig.
+    "emu": {"daemon": 40, "runner": 10, "cable": 20, "reset": 10, "noise": 2},
+}
 _DOWN = (0, DeviceError.exit_code)
 _FULL = (*_DOWN, SessionError.exit_code)
 
@@ -67,80 +84,80 @@ def disturbed(
     tally, chance = Tally(), random.Random(f"{kind} {seed}")  # noqa: S311 - moments, not secrets
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
-        with Stand(
+        with ProcessFixture(
             runs, seed + tally.sessions, dials, board=board, small_disk=kind == "disk"
-        ) as stand:
-            stand.start_daemon()
-            tally.full_disk = stand.disk.how if stand.disk else ""
+        ) as processes:
+            processes.start_daemon()
+            tally.full_disk = processes.disk.how if processes.disk else ""
             moments = []
             while tally.disturbed < count:
-                stand.see_to_runner()
-                if not reach(stand, chance, accept):
+                processes.see_to_runner()
+                if not reach(processes, chance, accept):
                     break
                 tally.disturbed += 1
                 moments.append(time.monotonic())
-                _disturb(stand, kind, chance)
-                tally.broken += _unreadable(stand)
-                tally.fell_upon[fell_upon(stand, moments[-1])] += 1
-            _finish(stand)
-            _look(stand, moments, tally)
+                _disturb(processes, kind, chance)
+                tally.broken += _unreadable(processes)
+                tally.fell_upon[fell_upon(processes, moments[-1])] += 1
+            _finish(processes)
+            _look(processes, moments, tally)
     return tally
 
 
-def _disturb(stand: Stand, kind: str, chance: random.Random) -> None:
+def _disturb(processes: ProcessFixture, kind: str, chance: random.Random) -> None:
     if kind == "daemon":
-        stand.kill(stand.daemon)
-        stand.waited()
-        stand.start_daemon()
+        processes.kill(processes.daemon)
+        processes.waited()
+        processes.start_daemon()
         return
     if kind == "runner":
-        stand.kill(stand.runner)
+        processes.kill(processes.runner)
         return
     if kind == "cable":
-        stand.hand(f"pull {chance.uniform(0.02, 0.6):.3f}")
+        processes.hand(f"pull {chance.uniform(0.02, 0.6):.3f}")
     elif kind == "reset":
-        stand.hand("reset")
+        processes.hand("reset")
     elif kind == "disk":
-        assert stand.disk is not None
-        stand.disk.fill(stand.daemon)
+        assert processes.disk is not None
+        processes.disk.fill(processes.daemon)
         time.sleep(chance.uniform(0.1, _DISK_FULL_S))
-        stand.disk.free(stand.daemon)
+        processes.disk.free(processes.daemon)
     else:
         raise ValueError(kind)
     with suppress(subprocess.TimeoutExpired):
-        stand.waited(_TROUBLE_S)
+        processes.waited(_TROUBLE_S)
 
 
-def _unreadable(stand: Stand) -> list[str]:
-    if stand.session.exists():
+def _unreadable(processes: ProcessFixture) -> list[str]:
+    if processes.session.exists():
         try:
-            with Session.open(stand.session, readonly=True) as session:
+            with Session.open(processes.session, readonly=True) as session:
                 list(session.drops())
         except Exception as error:
             return [f"unreadable: {error}"]
     return []
 
 
-def _finish(stand: Stand) -> None:
+def _finish(processes: ProcessFixture) -> None:
     for _ in range(_TRIES):
-        if stand.run() == 0:
+        if processes.run() == 0:
             return
         time.sleep(0.2)
-    raise DeviceError(f"the session does not end: {stand.told}")
+    raise DeviceError(f"the session does not end: {processes.told}")
 
 
-def _look(stand: Stand, moments: list[float], tally: Tally) -> None:
+def _look(processes: ProcessFixture, moments: list[float], tally: Tally) -> None:
     """See what a finished session has, and whether every promise was kept."""
-    happened = list(stand.happened())
-    tally.broken += broken(stand.session, happened, stand.runs)
+    happened = list(processes.happened())
+    tally.broken += broken(processes.session, happened, processes.runs)
     tally.longest_on_s = max(tally.longest_on_s, longest_on(happened))
     tally.off_after_s = max(tally.off_after_s, *(off_after(happened, at) for at in moments), 0.0)
     if tally.longest_on_s > OFF_S:
         tally.broken.append("the release was on too long")
     tally.sessions += 1
-    tally.runs += stand.runs
+    tally.runs += processes.runs
     transcript = Transcript()
-    with Session.open(stand.session, readonly=True) as session:
+    with Session.open(processes.session, readonly=True) as session:
         tally.drops += sum(1 for _ in session.drops())
         for host_ns, direction, data in session.byte_log():
             transcript.feed(direction, host_ns, data)
@@ -192,10 +209,67 @@ def _shares(kind: str, count: int, jobs: int) -> list[int]:
 
 def _some(kind: str, count: int, seed: int, board: str) -> Tally:
     try:
-        if kind in CROWD:
-            return CROWD[kind](count, seed, board)
+        if kind in CONTENTION:
+            return CONTENTION[kind](count, seed, board)
         if kind == "noise":
             return disturbed("daemon", 0, seed, dials=NOISE, board=board)
         return disturbed(kind, count, seed, board=board)
     except Exception as error:
         return Tally(broken=[f"given up: {error!r}"])
+
+
+def main(arguments: Namespace) -> int:
+    """Kill, pull, reset, fill and garble, and count what was lost."""
+    found: dict[str, dict[str, Tally]] = {}
+    for board in arguments.boards:
+        if board == "emu" and find_spec("rig_emulator") is None:
+            say("left out: emu (pip install ./firmware/emulator)")
+            continue
+        counts = {
+            kind: max(1, round(count * arguments.share / 100))
+            for kind, count in _COUNTS[board].items()
+            if kind in (arguments.kinds or _COUNTS[board])
+        }
+        if counts:  # not every kind is done to both
+            found[board] = faults(counts, arguments.jobs, say, board)
+    if arguments.json:
+        print_json(
+            {
+                board: {kind: one.json() for kind, one in kinds.items()}
+                for board, kinds in found.items()
+            }
+        )
+    else:
+        for board, kinds in found.items():
+            _print(board, kinds)
+    troubles = [
+        f"{board} {kind}: {what}"
+        for board, kinds in found.items()
+        for kind, tally in kinds.items()
+        for what in tally.broken
+    ]
+    for trouble in troubles:
+        say(trouble)
+    return 1 if troubles else 0
+
+
+def _print(board: str, kinds: dict[str, Tally]) -> None:
+    names = ("times", *STATES, "sessions", "runs", "drops", "bad frames", "on ms", "off ms", "lost")
+    print(f"{board:<7}" + "".join(f"{name:>{_width(name)}}" for name in names))
+    for kind, one in kinds.items():
+        share = f"{one.bad_frames / max(1, one.frames):.1%}"
+        cells: list[object] = [one.disturbed, *(one.fell_upon[state] for state in STATES)]
+        cells += [one.sessions, one.runs, one.drops, share]
+        cells += [round(one.longest_on_s * 1e3), round(one.off_after_s * 1e3), len(one.broken)]
+        print(
+            f"{kind:<7}"
+            + "".join(f"{cell:>{_width(name)}}" for name, cell in zip(names, cells, strict=True))
+        )
+    if "disk" in kinds:
+        print(f"a full disk: {kinds['disk'].full_disk}")
+    if "deaf" in kinds:
+        print(f"a daemon nobody read from grew by {kinds['deaf'].memory_bytes / 1e6:.1f} MB")
+
+
+def _width(name: str) -> int:
+    return max(6, len(name)) + 1

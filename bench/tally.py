@@ -16,7 +16,7 @@ class Tally:
     disturbed
         How often.
     fell_upon
-        How often upon each of `rig.bench.moments.STATES`.
+        How often upon each of `bench.moments.STATES`.
     sessions, runs, drops
         Finished, done, and recorded (an attempt more for each that was spoiled).
     frames, bad_frames
@@ -27,9 +27,9 @@ class Tally:
     memory_bytes
         By how much a daemon grew while somebody did not read what it sent.
     full_disk
-        What stood for a full disk, see `rig.bench.small_disk.SmallDisk`.
+        What stood for a full disk, see `bench.small_disk.SmallDisk`.
     broken
-        Promises that were not kept, see `rig.bench.invariants.broken`.
+        Promises that were not kept, see `bench.invariants.broken`.
     """
 
     disturbed: int = 0

@@ -1,0 +1,1 @@
+"""What proves the software itself: real processes killed and flooded. ``./run bench`` runs it."""

@@ -1,0 +1,76 @@
+"""``python -m bench NAME``, as ``./run bench NAME`` calls it: one benchmark of the software."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one benchmark and return its exit code, as the ``rig`` command does."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded
+    arguments = _parser().parse_args(argv)
+    try:
+        code: int = import_module(f"bench.{arguments.bench}").main(arguments)
+    except RigError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="./run bench", description="Benchmarks of the software.")
+    benches = parser.add_subparsers(required=True, metavar="BENCH", dest="bench")
+
+    clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
+    clock.add_argument(
+        "--protocol", default="protocols/picket-fence.yaml", metavar="FILE", help="any scene"
+    )
+    clock.add_argument("--seeds", type=_count, default=20, metavar="N", help="lines to simulate")
+
+    faults = benches.add_parser("faults", help="kill, pull and garble sessions; count what is lost")
+    faults.add_argument(
+        "--share", type=_count, default=100, metavar="PERCENT", help="of the full counts"
+    )
+    faults.add_argument("--jobs", type=_count, default=6, metavar="N", help="rigs side by side")
+    faults.add_argument(
+        "--board", dest="boards", nargs="+", choices=["sim", "emu"], default=["sim", "emu"],
+        help="virtual, or real firmware in an emulator",
+    )  # fmt: skip
+    faults.add_argument(
+        "--kind", dest="kinds", nargs="+", metavar="KIND", help="only these",
+        choices=["daemon", "runner", "cable", "reset", "disk", "noise", "race", "deaf"],
+    )  # fmt: skip
+
+    link = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
+
+    tui = benches.add_parser("tui", help="what the screen costs, and how late it is")
+    tui.add_argument(
+        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
+    )
+    for one in (clock, faults, link, tui):
+        one.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    return parser
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise ValueError(text)
+    return number
+
+
+if __name__ == "__main__":
+    sys.exit(main())
