@@ -20,15 +20,8 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-EXTRAS = {
-    "distributed": "cluster",
-    "matplotlib": "report",
-    "mpmath": "bench",
-    "scipy": "bench",
-    "textual": "tui",
-    "textual_plot": "tui",
-}
-"""Packages that only some commands need, and the extra that brings each."""
+OPTIONAL = ("distributed", "mpmath")
+"""Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -57,9 +50,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
-        if package not in EXTRAS:
+        if package not in OPTIONAL:
             raise
-        _say(f"rig: this needs {package}: pip install 'chainrig[{EXTRAS[package]}]'")
+        from shlex import quote  # noqa: PLC0415 - never needed otherwise
+
+        _say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
         return BAD_INPUT
     except OSError as error:
         _say(f"rig: {error}")

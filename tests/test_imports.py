@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from rig.cli import OPTIONAL
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[1]
@@ -53,7 +57,8 @@ def test_an_import_does_show(package):
 
 
 def test_help_loads_neither_numpy_nor_yaml():
-    assert packages_loaded_by(HELP).isdisjoint({"numpy", "yaml", "matplotlib", "textual"})
+    heavy = {"numpy", "scipy", "yaml", "matplotlib", "textual"}
+    assert packages_loaded_by(HELP).isdisjoint(heavy)
 
 
 def test_the_runner_loads_neither_textual_nor_matplotlib():
@@ -65,3 +70,24 @@ def test_a_headless_run_loads_neither_textual_nor_matplotlib(tmp_path):
     loaded = packages_loaded_by(HEADLESS_RUN, str(session))
     assert session.is_file()
     assert loaded.isdisjoint({"matplotlib", "textual"})
+
+
+def imported(path: Path) -> set[str]:
+    """Name the top-level packages of all imports in a file, wherever in it they are."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {one.name for one in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module)
+    return {name.partition(".")[0] for name in found}
+
+
+def test_all_that_a_session_needs_is_a_plain_dependency():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    named = {re.match(r"[\w-]+", one).group().lower() for one in project["dependencies"]}
+    packages = {"pyserial": "serial", "pyyaml": "yaml", "textual-plot": "textual_plot"}
+    known = {packages.get(name, name) for name in named} | sys.stdlib_module_names
+    known |= {"rig", "sim", "rich", "textual_hires_canvas"}  # the last two come with Textual's
+    files = [path for room in ("rig", "sim") for path in ROOT.glob(f"{room}/**/*.py")]
+    assert set().union(*map(imported, files)) - known == set(OPTIONAL)

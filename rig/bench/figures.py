@@ -57,11 +57,6 @@ def precision_figure(title: str, points: Sequence[Point]) -> str:
     -------
     str
         SVG.
-
-    Raises
-    ------
-    InputError
-        If matplotlib is not installed.
     """
     with canvas((4.9, 2.9, 2.9), 8.0, simulated=False) as drawing:
         for panel, (field, label) in zip(drawing.axes, _PRECISION_PANELS, strict=True):
@@ -167,11 +162,6 @@ def scenes_figure(costs: Sequence[Cost]) -> str:
     -------
     str
         SVG.
-
-    Raises
-    ------
-    InputError
-        If matplotlib is not installed.
     """
     names = [cost.scene for cost in costs]
     with canvas((1.5, 1.5, 1.9), simulated=False) as drawing:

@@ -1,7 +1,7 @@
 """The methods of the precision benchmark, each with the settings over which it is swept.
 
-Needs scipy (the extra ``bench``). Every setting has a fall of its own for the gate: the chain cut
-off where the top rod passes it, so that what is timed is Δz and V and nothing else.
+Every setting has a fall of its own for the gate: the chain cut off where the top rod passes it, so
+that what is timed is Δz and V and nothing else.
 """
 
 from __future__ import annotations

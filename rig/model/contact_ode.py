@@ -7,7 +7,7 @@ Between impacts the state (Δz, what is gained in speed, τ'a₂, τ'a₁) follo
 linear, with the eigenvalue −1/τ' twice. Free fall is no part of what is stiff and is added in
 closed form; with Δz a state of its own, the relative tolerance holds for it however small α is.
 A leg ends at the event that the next rod strikes, and the next one starts afresh with q raised by
-ΔV. scipy is needed here and nowhere else in the model.
+ΔV. scipy is half a second to load, and so no prediction imports this.
 """
 
 from __future__ import annotations

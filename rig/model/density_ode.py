@@ -1,6 +1,6 @@
 """A chain of any density by numerical integration of Eq. 1 with Eq. 11.
 
-Needs scipy (the extra ``bench``), and so nothing else imports it.
+scipy is half a second to load, and so no prediction imports this.
 
 The independent variable is p of `rig.model.continuum.end`: x = ln(A/(z + γs)) = X p (a p + b).
 With V = e √n and e = dx/(X dp), every right-hand side is smooth from p = 0 on, also where the

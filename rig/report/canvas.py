@@ -6,8 +6,6 @@ import io
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import InputError
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -98,19 +96,10 @@ def canvas(
         Whether all panels have one horizontal axis.
     description
         Kept in the file's metadata, where programs find it.
-
-    Raises
-    ------
-    InputError
-        If matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
-        from matplotlib.figure import Figure  # noqa: PLC0415
-    except ImportError as error:
-        raise InputError(
-            "figures need matplotlib", "install it with: pip install 'chainrig[report]'"
-        ) from error
+    import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width_in, sum(heights)), layout="constrained")
         panels = figure.subplots(

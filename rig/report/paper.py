@@ -32,11 +32,6 @@ def paper_figure(number: int) -> tuple[str, dict[str, list[float]]]:
     -------
     svg, columns
         The figure, with what the text says and the equations do not below it; and its numbers.
-
-    Raises
-    ------
-    InputError
-        If matplotlib is not installed.
     """
     compute, draw, panels = _KINDS[number]
     columns = compute()

@@ -43,11 +43,6 @@ def pictures(
         What the bars on means of several runs stand for.
     sections
         Where a figure that cannot be drawn is noted.
-
-    Raises
-    ------
-    InputError
-        If there is something to draw and matplotlib is not installed.
     """
     runs = analysis.get("runs") or ()
 

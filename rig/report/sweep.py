@@ -43,11 +43,6 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
     str
         SVG. Where the model has no answer the picture is empty; where the point lies beyond its
         domain, maps are hatched and curves dashed. Colours span what is found inside the domain.
-
-    Raises
-    ------
-    InputError
-        If matplotlib is not installed.
     """
     caption = _caption(facts)
     foot = _LINE_HEIGHT * (caption.count("\n") + 2)

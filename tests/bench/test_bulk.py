@@ -64,20 +64,20 @@ def test_the_batch_is_what_is_timed():
 
 
 def test_the_solver_finds_the_same_fall():
-    pytest.importorskip("scipy")
     found = bench.solve(bench.paper_chain(), 1e-6)
     wanted = fall(bench.paper_chain(), bench.ALPHA, bench.GAMMA, bench.DROP, bench.GRAVITY)
     for name in ("separation_m", "speed_m_s", "time_s"):
         assert getattr(found, name) == pytest.approx(getattr(wanted, name), rel=1e-12)
 
 
-def no_scipy(monkeypatch):
-    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
+def no_mpmath(monkeypatch):
+    monkeypatch.delitem(sys.modules, "rig.bench.reference", raising=False)
+    monkeypatch.setitem(sys.modules, "mpmath", None)
 
 
 @needs_compiler
 def test_everything_is_counted_once_a_round(monkeypatch):
-    no_scipy(monkeypatch)
+    no_mpmath(monkeypatch)
     said = []
     found = bench.bulk(40, 3, said.append)
     assert (found["rods"], found["falls"], found["rounds"]) == (25, 40, 3)
@@ -85,12 +85,11 @@ def test_everything_is_counted_once_a_round(monkeypatch):
     ratios = "single_over_roots", "single_over_batch", "batch_over_c", "falls_per_s"
     for name in ratios:
         assert 0.0 < found[name]["least"] <= found[name]["median"] <= found[name]["most"]
-    assert said == ["no scipy.integrate here: left out the solver"]
+    assert said == ["no mpmath here: left out the solver"]
     assert "solver_over_single" not in found
 
 
 def test_the_solver_is_compared_at_rounding(monkeypatch):
-    pytest.importorskip("scipy")
     pytest.importorskip("mpmath")
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.delenv("CI", raising=False)
@@ -118,7 +117,7 @@ def test_turns_are_taken_in_rounds_and_the_best_counts():
 
 
 def test_without_a_compiler_the_loop_is_left_out_and_that_is_said(monkeypatch):
-    no_scipy(monkeypatch)
+    no_mpmath(monkeypatch)
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.delenv("CI", raising=False)
     said = []
@@ -144,7 +143,7 @@ def test_a_compiler_that_fails_is_an_error(monkeypatch, tmp_path):
 
 
 def test_the_command_prints_json_or_a_table(monkeypatch, capsys):
-    no_scipy(monkeypatch)
+    no_mpmath(monkeypatch)
     monkeypatch.delenv("CI", raising=False)
     assert main(["bench", "bulk", "--falls", "5", "--rounds", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["falls"] == 5

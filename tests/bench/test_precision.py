@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import asdict, replace
 from decimal import Decimal
@@ -330,11 +329,3 @@ def test_the_command_writes_all_of_it(quick, monkeypatch, tmp_path, capsys):
     for name in ("uniform", "graded"):
         svg = (tmp_path / "new" / f"precision-{name}.svg").read_text(encoding="utf-8")
         ET.fromstring(svg)
-
-
-def test_a_missing_scipy_is_said(monkeypatch, tmp_path, capsys):
-    monkeypatch.delitem(sys.modules, "rig.bench.precision", raising=False)
-    monkeypatch.delitem(sys.modules, "rig.bench.methods", raising=False)
-    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
-    assert cli.main(["bench", "precision", "-o", str(tmp_path)]) == 2
-    assert "pip install" in capsys.readouterr().err
