@@ -60,12 +60,6 @@ class DomainError(InputError, ValueError):
     """A model was asked for a value it cannot give (for example a singular Eq. 13)."""
 
 
-class RunVoidError(RigError):
-    """A run was void and stayed void, exit code 3."""
-
-    exit_code = 3
-
-
 class DeviceError(RigError):
     """The device refused, broke off or answered nonsense, exit code 4."""
 

@@ -300,10 +300,6 @@ class _CutDensity:
     def length_m(self) -> float:
         return self.whole.length_m - self.height_m
 
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        return tuple(z - self.height_m for z in self.whole.kinks if z > self.height_m)
-
     def mass_over_density(self, z: float) -> float:
         return self.whole.mass_over_density(z + self.height_m)
 

@@ -8,13 +8,11 @@ slope of its middle.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from statistics import fmean, stdev
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    Height = Callable[[float], float]
+    from collections.abc import Sequence
 
 FRAME_RATE_HZ = 480.0
 SPEED_FRAMES = 4
@@ -26,24 +24,6 @@ class Reading:
 
     separation_m: float
     speed_m_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Scatter:
-    """Many readings of one fall, with the frames falling anywhere.
-
-    Attributes
-    ----------
-    separation_m, speed_m_s
-        Means.
-    separation_bar, speed_bar
-        Half a standard deviation, which the paper draws as error bars.
-    """
-
-    separation_m: float
-    separation_bar: float
-    speed_m_s: float
-    speed_bar: float
 
 
 def frame_times(hit_s: float, phase: float, rate_hz: float = FRAME_RATE_HZ) -> list[float]:
@@ -75,24 +55,3 @@ def read_frames(times: Sequence[float], struck: Sequence[float], free_height: fl
     spread = sum((t - middle) ** 2 for t in times)
     slope = sum((t - middle) * z for t, z in zip(times, struck, strict=True)) / spread
     return Reading(free_height - struck[0], -slope)
-
-
-def film(
-    struck: Height, free: Height, hit_s: float, phases: int = 48, rate_hz: float = FRAME_RATE_HZ
-) -> Scatter:
-    """Film one fall many times, the frames falling evenly over all phases.
-
-    Parameters
-    ----------
-    struck, free
-        Height of each top rod against time, m.
-    hit_s
-        When the striking chain's top rod hits.
-    """
-    readings = []
-    for number in range(phases):
-        times = frame_times(hit_s, (number + 0.5) / phases, rate_hz)
-        readings.append(read_frames(times, [struck(t) for t in times], free(times[0])))
-    separations = [reading.separation_m for reading in readings]
-    speeds = [reading.speed_m_s for reading in readings]
-    return Scatter(fmean(separations), 0.5 * stdev(separations), fmean(speeds), 0.5 * stdev(speeds))

@@ -47,9 +47,6 @@ _FARTHEST = 45.0
 _SERIES_BELOW = 0.5
 """Argument below which the differences in S17 are summed as series."""
 
-LEADING_LIMIT = 2.0 * (2.0 * math.log(2.0) - 1.0)
-"""Δz/(α z₀) of Eq. 15 for γs/z₀ → 0: 2(2 ln 2 − 1) = 0.7726."""
-
 
 @dataclass(frozen=True, slots=True)
 class UniformChain:

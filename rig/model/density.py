@@ -11,24 +11,18 @@ decades, and no unit of mass is left in it. For an even density M/λ = z.
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from dataclasses import dataclass, field
-from itertools import accumulate, pairwise
+from dataclasses import dataclass
 from typing import Protocol
 
 from rig.errors import DomainError
 
 
 class Density(Protocol):
-    """A density along a chain."""
+    """A smooth density along a chain."""
 
     @property
     def length_m(self) -> float:
         """z₀, the chain's length."""
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """Distances from the top end, rising, at which the density is not smooth, m."""
 
     def mass_over_density(self, z: float) -> float:
         """M/λ at a distance z from the top end, m; 0 at z = 0."""
@@ -56,11 +50,6 @@ class Uniform:
     def __post_init__(self) -> None:
         _check_length(self.length_m)
 
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """None."""
-        return ()
-
     def mass_over_density(self, z: float) -> float:
         """M/λ = z."""
         return z
@@ -87,68 +76,10 @@ class Exponential:
         if not (math.isfinite(self.decades) and self.decades >= -300.0):
             raise DomainError(f"decades = {self.decades:g}: at least -300 and finite is wanted")
 
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """None."""
-        return ()
-
     def mass_over_density(self, z: float) -> float:
         """M/λ = (1 − e^−kz)/k with k = decades · ln 10/z₀."""
         rate = self.decades * math.log(10.0) / self.length_m
         return -math.expm1(-rate * z) / rate if rate else z
-
-
-@dataclass(frozen=True, slots=True)
-class Tabulated:
-    """A density that runs straight from each of some points to the next.
-
-    Attributes
-    ----------
-    distances
-        From the top end, m; strictly rising from 0 to the chain's length.
-    densities
-        λ there, in any one unit; all above zero.
-    """
-
-    distances: tuple[float, ...]
-    densities: tuple[float, ...]
-    _masses: tuple[float, ...] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        zs, values = self.distances, self.densities
-        if len(zs) != len(values) or len(zs) < 2:
-            raise DomainError(
-                f"{len(zs)} distances and {len(values)} densities: "
-                "as many of the one as of the other are wanted, at least two"
-            )
-        if zs[0] != 0.0 or not all(a < b < math.inf for a, b in pairwise(zs)):
-            raise DomainError("distances must rise from 0, each above the one before")
-        if not all(0.0 < value < math.inf for value in values):
-            raise DomainError("every density must be a finite number above zero")
-        pieces = (
-            0.5 * (low + high) * (b - a)
-            for (a, b), (low, high) in zip(pairwise(zs), pairwise(values), strict=True)
-        )
-        object.__setattr__(self, "_masses", tuple(accumulate(pieces, initial=0.0)))
-
-    @property
-    def length_m(self) -> float:
-        """z₀, the last of the distances."""
-        return self.distances[-1]
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """The distances between the first and the last."""
-        return self.distances[1:-1]
-
-    def mass_over_density(self, z: float) -> float:
-        """M/λ, both exactly those of the straight pieces."""
-        zs, values = self.distances, self.densities
-        i = min(bisect_right(zs, z), len(zs) - 1) - 1
-        low, high, into = values[i], values[i + 1], z - zs[i]
-        # From both ends: a light end beside a heavy one keeps its digits.
-        here = (low * (zs[i + 1] - z) + high * into) / (zs[i + 1] - zs[i])
-        return self._masses[i] / here + 0.5 * into * (1.0 + low / here)
 
 
 def _check_length(length_m: float) -> None:

@@ -1,4 +1,4 @@
-"""A chain of any density by numerical integration of Eq. 1 with Eq. 11.
+"""A chain of any smooth density by numerical integration of Eq. 1 with Eq. 11.
 
 scipy is half a second to load, and so no prediction imports this.
 
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -70,7 +69,7 @@ def end(
     method: Method = "DOP853",
     rtol: float = 1e-12,
 ) -> OdeEnd:
-    """Δz, V and t of a fall of a chain of any density.
+    """Δz, V and t of a fall of a chain of any smooth density.
 
     Parameters
     ----------
@@ -92,18 +91,12 @@ def end(
     if chain.reach_m == 0.0:
         raise DomainError("γs = 0: the end is infinitely fast and x has no end")
     fall = _Fall(chain, density)
-    state, evaluations, steps = fall.start(), 0, 0
-    for low, high in pairwise(fall.stops()):
-        # Across a kink of the density no step keeps its order.
-        solved = solve_ivp(
-            fall.slopes, (low, high), state, method=method, rtol=rtol, atol=1e-6 * rtol
-        )
-        if not solved.success:
-            raise DomainError(f"{method} fails at p = {solved.t[-1]:g}: {solved.message}")
-        state = solved.y[:, -1]
-        evaluations += int(solved.nfev)
-        steps += solved.t.size - 1
-    return fall.ended(state, evaluations, steps)
+    solved = solve_ivp(
+        fall.slopes, (0.0, 1.0), fall.start(), method=method, rtol=rtol, atol=1e-6 * rtol
+    )
+    if not solved.success:
+        raise DomainError(f"{method} fails at p = {solved.t[-1]:g}: {solved.message}")
+    return fall.ended(solved.y[:, -1], int(solved.nfev), solved.t.size - 1)
 
 
 class _Fall:
@@ -130,16 +123,6 @@ class _Fall:
         else:
             n = self.weight / (4.0 * self.square)
         return np.array([n, 0.0, 0.0, 0.0])
-
-    def stops(self) -> list[float]:
-        """Where in p the first strike, every kink of the density and the end are."""
-        inner = set()
-        for z in self.density.kinks:
-            x = math.log1p((self.chain.length_m - z) / (z + self.chain.reach_m))
-            share = x / self.span
-            root = math.sqrt(self.line**2 + 4.0 * self.square * share)
-            inner.add(2.0 * share / (self.line + root))
-        return [0.0, *sorted(p for p in inner if 0.0 < p < 1.0), 1.0]
 
     def slopes(self, p: float, state: NDArray[np.float64]) -> list[float]:
         """Derivatives of the state by p."""

@@ -1,4 +1,4 @@
-"""Impact coefficients α and γ of a rod chain (sections III.A to III.D of the paper)."""
+"""Impact coefficients α and γ of a rod chain (sections III.A to III.D and S V of the paper)."""
 
 from __future__ import annotations
 
@@ -37,6 +37,15 @@ class Impact:
 def alpha_level(restitution: float, inertia: float = UNIFORM_ROD_INERTIA) -> float:
     """α of a long chain on a level surface, Eq. 8."""
     return (1.0 + restitution) / 4.0 * (1.0 - inertia)
+
+
+def alpha_liftoff(restitution: float = 0.0, inertia: float = UNIFORM_ROD_INERTIA) -> float:
+    """α of the surface's push on a rod that is pulled up by one end, N = αλV², Eq. S20.
+
+    The same as Eq. 8 for a rod that is laid down, but `restitution` is β' between rod and chain
+    through the string: 0 where the string damps all bouncing.
+    """
+    return alpha_level(restitution, inertia)
 
 
 def alpha_inclined(

@@ -1,4 +1,4 @@
-"""The whole fall: both chains against time, the pulls, and where the energy goes."""
+"""The whole fall: both chains against time."""
 
 from __future__ import annotations
 
@@ -37,34 +37,6 @@ class Instant:
     separation_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class Blow:
-    """One impact and its energy.
-
-    Attributes
-    ----------
-    time_s, speed_m_s
-        When, and the speed just before.
-    impulse
-        J, the pull on the chain above, in units of mass × m/s.
-    brought
-        Kinetic energy that the rod brings, ½mV², in units of mass × (m/s)².
-    passed_on
-        What the chain above gains of it: JV + J²/2M.
-    """
-
-    time_s: float
-    speed_m_s: float
-    impulse: float
-    brought: float
-    passed_on: float
-
-    @property
-    def lost(self) -> float:
-        """What stays in the rod: never negative for α ≤ ½; 0 for α = ½ and a long chain."""
-        return self.brought - self.passed_on
-
-
 class Motion:
     """A fall that can be asked at any time between release and the top rod's impact.
 
@@ -91,8 +63,8 @@ class Motion:
         self._heights = [drop, *(-height for height in chain.heights)]
         self._speeds = [initial_speed, *(hit.speed_after for hit in self.hits)]
         # Not the difference of two speeds: it has no digits left where α is tiny.
-        self._steps = [hit.speed_before * gain for hit, gain in zip(self.hits, gains, strict=True)]
-        self._gained = [0.0, *accumulate(self._steps)]
+        steps = (hit.speed_before * gain for hit, gain in zip(self.hits, gains, strict=True))
+        self._gained = [0.0, *accumulate(steps)]
         # Nor the difference of two times: short legs late in a long fall would lose theirs.
         self._legs = [
             2.0 * (above - below) / (after + hit.speed_before) if above > below else 0.0
@@ -128,16 +100,3 @@ class Motion:
             speed,
             self._separations[leg] + self._gained[leg] * since,
         )
-
-    def blows(self) -> list[Blow]:
-        """Every impact with its impulse (Eq. 9) and energy, bottom rod first."""
-        above = [*list(accumulate(reversed(self.chain.masses[1:])))[::-1], 0.0]
-        found = []
-        for hit, step, mass, upper in zip(
-            self.hits, self._steps, self.chain.masses, above, strict=True
-        ):
-            speed = hit.speed_before
-            impulse = upper * step
-            gain = (speed + 0.5 * step) * impulse
-            found.append(Blow(hit.time_s, speed, impulse, 0.5 * mass * speed**2, gain))
-        return found

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.model.continuum import (
-    LEADING_LIMIT,
     UniformChain,
     end,
     separation_fast,
@@ -21,6 +20,8 @@ from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 
 LENGTHS = decades(-3, 3)
+LEADING_LIMIT = 2.0 * (2.0 * math.log(2.0) - 1.0)
+"""Δz/(α z₀) of Eq. 15 for γs/z₀ → 0."""
 RATIOS = decades(-15, 9)
 GRAVITIES = decades(-6, 3)
 

@@ -15,7 +15,7 @@ from mpmath import mp
 from rig.errors import DomainError
 from rig.model import continuum, density_ode
 from rig.model.chain import Chain
-from rig.model.density import Exponential, Tabulated, Uniform
+from rig.model.density import Exponential, Uniform
 from rig.model.fall import fall
 from tests.examples import examples
 from tests.model.chains import close, decades
@@ -125,37 +125,6 @@ def test_many_rods_reach_an_exponential_density_at_first_order(powers, drop):
     for coarse, fine in zip(*errors, strict=True):
         assert abs(fine) < 2e-3
         assert 0.85 < math.log2(coarse / fine) < 1.25
-
-
-def test_a_table_of_one_line_is_an_even_density():
-    straight = Tabulated((0.0, 0.2, 0.7, LENGTH), (3.0,) * 4)
-    one = ode(straight, 0.155, 0.0647, 0.18)
-    check(one, ode(Uniform(LENGTH), 0.155, 0.0647, 0.18), TIGHT)
-
-
-def test_a_fine_table_is_the_curve_it_follows():
-    curve, count = Exponential(LENGTH, 3.0), 40
-    errors = []
-    for points in (count, 2 * count):
-        zs = tuple(LENGTH * k / points for k in range(points + 1))
-        table = Tabulated(zs, tuple(10.0 ** (3.0 * z / LENGTH) for z in zs))
-        found = ode(table, 0.155, 0.0647, 0.18, rtol=1e-10)
-        errors.append(found.separation_m / ode(curve, 0.155, 0.0647, 0.18).separation_m - 1)
-    # Chords are too high by the second order of their length, but M and λ alike on average.
-    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.02)
-
-
-def test_a_kinked_density_without_gravity():
-    """V = V_h exp(α ∫ pull dz), by another quadrature, piece by piece."""
-    table = Tabulated((0.0, 0.3, 0.5, 1.0), (1.0, 20.0, 2.0, 9.0))
-    found = ode(table, 0.3, 0.05, 0.0, gravity=0.0, start=2.0)
-    with mp.workdps(30):
-
-        def pull(z):
-            return 1 / (mp.mpf(table.mass_over_density(float(z))) + mp.mpf("0.05"))
-
-        wanted = 2 * mp.exp(mp.mpf("0.3") * mp.quad(pull, [0, 0.3, 0.5, 1]))
-    assert close(found.speed_m_s, float(wanted), TIGHT)
 
 
 @examples(15)

@@ -12,7 +12,7 @@ from mpmath import mp
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
-from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
+from rig.model.impact import alpha_inclined, alpha_level, alpha_liftoff, gamma_finite, impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
@@ -239,3 +239,19 @@ def test_below_the_sliding_angle_alpha_exceeds_its_level_value():
     assert alpha_inclined(0.5, 0.2, sliding) == pytest.approx(alpha_level(0.5), rel=1e-14)
     assert alpha_inclined(0.5, 0.2, sliding / 2) > alpha_level(0.5)
     assert alpha_inclined(0.5, 0.2, sliding * 1.01) < alpha_level(0.5)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(0.0, 1.0))
+def test_equation_s20_solves_the_equations_of_motion(restitution, inertia):
+    """For m = V = 1 and L = 2 (so I = ξ): the right end goes to 1 + β', the left end stays.
+
+    N + F = ΔV_z (Eq. 3) and F − N = ξ Δω (Eq. 4), both changes being (1 + β')/2.
+    """
+    change = (1 + Fraction(restitution)) / 2
+    push = (change - Fraction(inertia) * change) / 2
+    assert abs(Fraction(alpha_liftoff(restitution, inertia)) - push) < Fraction(1, 10**15)
+
+
+def test_the_papers_value_of_lift_off():
+    assert alpha_liftoff() == pytest.approx(1 / 6, rel=1e-15)
+    assert f"{alpha_liftoff():.2f}" == "0.17"

@@ -71,6 +71,8 @@ def test_figure_6_vanishes_at_both_ends():
     ("5.08", ["5.137"]),
     ("Eq. 14", ["5.7 %"]),
     ("Eq. 15", ["1.8 %", "8 % at 0.05", "8 % at 0.9", "13 % at 0.01"]),
+    ("initial speeds", ["29 % as α → 0", "26 % at α = 0.1"]),
+    ("lift-off", ["0.167", "1.4 to 1.7 times"]),
     ("17 cm", ["20.0 cm", "18.7 cm"]),
 ])  # fmt: skip
 def test_where_text_and_equations_part(claim, figures):

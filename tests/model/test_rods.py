@@ -18,11 +18,11 @@ from rig.errors import DomainError
 from rig.model.chain import Chain
 from rig.model.fall import kicks
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
-from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
+from tests.model.blows import blows
 from tests.model.chains import close, decades, even_chain
 
 TIGHT = 1e-13
@@ -225,9 +225,9 @@ def test_unlike_rods_lose_energy_and_never_gain_any(chain, beta, mu, incline, dr
     impacts = rod_impacts(Surface(Quantity(beta), Quantity(mu)), chain, incline)
     assume(all(0.0 <= one.alpha <= 0.5 for one in impacts))
     gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
-    blows = Motion(chain, gains, drop, 9.81).blows()
-    assert all(blow.lost >= -TIGHT * blow.brought for blow in blows)
+    ledger = blows(chain, gains, drop, 9.81)
+    assert all(blow.lost >= -TIGHT * blow.brought for blow in ledger)
     potential = 9.81 * math.fsum(
         m * (drop + z) for m, z in zip(chain.masses, chain.heights, strict=True)
     )
-    assert math.fsum(blow.lost for blow in blows) == pytest.approx(potential, rel=1e-12)
+    assert math.fsum(blow.lost for blow in ledger) == pytest.approx(potential, rel=1e-12)
