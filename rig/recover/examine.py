@@ -74,7 +74,7 @@ def examine(path: str | os.PathLike[str]) -> Examined:
         It cannot be read at all.
     """
     snapshot = take_snapshot(path)
-    pages = read_pages(snapshot.data, snapshot.log)
+    pages = read_pages(snapshot.data)
     rows = find_rows(pages)
     drops = recover_drops(rows)
     foreign = _foreign(snapshot, pages, rows)
@@ -86,7 +86,7 @@ def examine(path: str | os.PathLike[str]) -> Examined:
 
 def describe(found: Examined) -> list[str]:
     """Say it in lines."""
-    snapshot, pages, rows = found.snapshot, found.pages, found.rows
+    snapshot, rows = found.snapshot, found.rows
     lines = [f"{snapshot.path}: {len(snapshot.data)} bytes"]
     if snapshot.writer:
         lines.append(f"is being written by {snapshot.writer}; this is how it was a moment ago")
@@ -94,8 +94,8 @@ def describe(found: Examined) -> list[str]:
         lines.append("may not be written by you: only reading is possible")
     if found.foreign:
         return [*lines, f"not a session: {found.foreign}"]
-    if pages.committed:
-        lines.append(f"{pages.committed} commits are in the log beside it (-wal) only: keep both")
+    if snapshot.logged:
+        lines.append(f"{snapshot.logged} pages are in the log beside it (-wal) only: keep both")
     meta = rows.meta
     what = {"true": "simulated", "false": "real"}.get(meta.get("simulated", ""), "unknown if real")
     lines.append(
@@ -119,7 +119,7 @@ def describe(found: Examined) -> list[str]:
     lines += [f"lost: {what}" for what in found.lost]
     if found.whole:
         lines.append("everything is whole")
-    if not snapshot.log and not snapshot.writer and _unfinished(rows):
+    if snapshot.logged is None and not snapshot.writer and _unfinished(rows):
         lines.append(
             "its last run is open: if there was a file of this name with -wal behind it, "
             "put it back beside this one, since it holds what came last"

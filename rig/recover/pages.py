@@ -1,19 +1,26 @@
-"""The pages of a SQLite file, also of a torn one: read as bytes, without SQLite.
+"""The records in a SQLite file's pages, read as bytes: a damaged one costs no other.
 
-The format is https://www.sqlite.org/fileformat2.html; sections are given where they are used.
+SQLite reads a table from its root down, and what a damaged page points at is lost to it. Here every
+page is read by itself, wherever it belongs. The format is https://www.sqlite.org/fileformat2.html;
+sections are given where they are used.
 """
 
 from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Value: TypeAlias = int | float | str | bytes | None
 
 MAGIC = b"SQLite format 3\0"
 _HEADER = 100  # bytes before the first page's b-tree, section 1.3
 _USUAL_PAGE = 4096  # what SQLite makes, unless told otherwise
-_WAL_MAGIC = 0x377F0682  # section 4.1; its last bit chooses the byte order of the checksums
-_WAL_HEADER = 32
-_FRAME_HEADER = 24
+TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR = 0x0D, 0x0A, 0x02
+_INTEGERS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}  # serial type → bytes, section 2.1
 
 
 @dataclass(frozen=True)
@@ -22,105 +29,174 @@ class Pages:
 
     Attributes
     ----------
-    size
-        Bytes a page.
-    reserved
-        Bytes at the end of each page that SQLite does not use.
+    usable
+        Bytes of a page that SQLite uses.
     expected
         How many pages there should be, 0 when nobody says.
     pages
-        Those that are there, by number from 1; the log's newer ones in place of the file's.
-    committed
-        Transactions that were in the log only.
+        Those that are there, by number from 1.
     """
 
-    size: int
-    reserved: int
+    usable: int
     expected: int
     pages: dict[int, bytes]
-    committed: int
 
     @property
     def missing(self) -> int:
         """How many pages there should be and are not."""
         return sum(number not in self.pages for number in range(1, self.expected + 1))
 
-    @property
-    def usable(self) -> int:
-        """Bytes of a page that SQLite uses."""
-        return self.size - self.reserved
 
-    def start(self, number: int) -> int:
-        """Where the b-tree begins in a page."""
-        return _HEADER if number == 1 else 0
-
-
-def read_pages(data: bytes, log: bytes = b"") -> Pages:
-    """Cut a database file into pages, with what its log holds beyond it.
-
-    Parameters
-    ----------
-    data
-        The file.
-    log
-        The ``-wal`` file beside it.
-    """
-    size = _page_size(data)
+def read_pages(data: bytes) -> Pages:
+    """Cut a database file into pages."""
+    size = int.from_bytes(data[16:18], "big")
+    size = 65536 if size == 1 else size
+    if not data.startswith(MAGIC) or not 512 <= size <= 65536 or size & (size - 1):
+        size = _USUAL_PAGE
     pages = {
         number + 1: data[number * size : (number + 1) * size] for number in range(len(data) // size)
     }
-    newer, committed, count = _newer(log, size)
-    pages |= newer
     first = pages.get(1, b"")
     if not first.startswith(MAGIC):
-        return Pages(size, 0, count, pages, committed)
-    expected = count or int.from_bytes(first[28:32], "big")
+        return Pages(size, 0, pages)
+    expected = int.from_bytes(first[28:32], "big")
     # A log that is not there may have held the rest; a wild number says nothing.
     if not 0 < expected < 4 * len(pages) + 1000:
         expected = 0
-    return Pages(size, first[20] if first[20] < size // 2 else 0, expected, pages, committed)
+    reserved = first[20] if first[20] < size // 2 else 0
+    return Pages(size - reserved, expected, pages)
 
 
-def _page_size(data: bytes) -> int:
-    size = int.from_bytes(data[16:18], "big")
-    size = 65536 if size == 1 else size
-    good = data.startswith(MAGIC) and 512 <= size <= 65536 and not size & (size - 1)
-    return size if good else _USUAL_PAGE
+class Cell(NamedTuple):
+    """One record; `rowid` is `None` in an index, and in a table that is kept as one."""
+
+    rowid: int | None
+    values: tuple[Value, ...]
 
 
-def _newer(log: bytes, size: int) -> tuple[dict[int, bytes], int, int]:
-    """Read the log up to its last whole commit: pages, transactions, size of the database then."""
-    if len(log) < _WAL_HEADER:
-        return {}, 0, 0
-    magic, _, page_size, _, *salts = struct.unpack(">6I", log[:24])
-    if magic & ~1 != _WAL_MAGIC or page_size != size:
-        return {}, 0, 0
-    words = ">" if magic & 1 else "<"
-    sums = _checksum(words, log[:24], (0, 0))
-    if sums != struct.unpack(">2I", log[24:32]):
-        return {}, 0, 0
-    done: dict[int, bytes] = {}
-    waiting: dict[int, bytes] = {}
-    committed = count = 0
-    for at in range(_WAL_HEADER, len(log) - size - _FRAME_HEADER + 1, size + _FRAME_HEADER):
-        header = log[at : at + _FRAME_HEADER]
-        page = log[at + _FRAME_HEADER : at + _FRAME_HEADER + size]
-        number, pages_then, *frame_salts = struct.unpack(">4I", header[:16])
-        sums = _checksum(words, header[:8] + page, sums)
-        if frame_salts != salts or sums != struct.unpack(">2I", header[16:24]):
-            break  # what follows is of an older log, or torn
-        waiting[number] = page
-        if pages_then:
-            done |= waiting
-            waiting = {}
-            committed, count = committed + 1, pages_then
-    return done, committed, count
+class BadCellError(ValueError):
+    """Bytes that are no record."""
 
 
-def _checksum(words: str, data: bytes, sums: tuple[int, int]) -> tuple[int, int]:
-    """Go on with the log's running checksum, section 4.2."""
-    one, two = sums
-    for first, second in struct.iter_unpack(f"{words}2I", data):
-        one = (one + first + two) & 0xFFFFFFFF
-        two = (two + second + one) & 0xFFFFFFFF
-    return one, two
+class Found(NamedTuple):
+    """The records of a page, and how many of its cells are none."""
+
+    cells: list[Cell]
+    bad: int
+
+
+def read_cells(pages: Pages, number: int) -> Found:
+    """Read all records of a page; a page without records has none.
+
+    Parameters
+    ----------
+    pages
+        The database.
+    number
+        Of the page.
+    """
+    page = pages.pages[number]
+    start = _HEADER if number == 1 else 0
+    kind = page[start]
+    if kind not in {TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR}:
+        return Found([], 0)
+    count = int.from_bytes(page[start + 3 : start + 5], "big")
+    pointers = start + (12 if kind == INDEX_INTERIOR else 8)
+    if pointers + 2 * count > pages.usable:
+        return Found([], 1)
+    found, bad = [], 0
+    for n in range(count):
+        at = int.from_bytes(page[pointers + 2 * n : pointers + 2 * n + 2], "big")
+        try:
+            found.append(_cell(pages, page, kind, at))
+        except (BadCellError, IndexError, struct.error):
+            bad += 1
+    return Found(found, bad)
+
+
+def _cell(pages: Pages, page: bytes, kind: int, at: int) -> Cell:
+    """Read a cell, sections 1.6 and 2.1."""
+    if kind == INDEX_INTERIOR:
+        at += 4  # the page to its left
+    size, at = _varint(page, at)
+    rowid = None
+    if kind == TABLE_LEAF:
+        rowid, at = _varint(page, at)
+    return Cell(rowid, tuple(_record(_payload(pages, page, kind, at, size))))
+
+
+def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
+    """Put a record together from its page and the pages it flows over to."""
+    usable = pages.usable
+    most = usable - 35 if kind == TABLE_LEAF else (usable - 12) * 64 // 255 - 23
+    if size > len(pages.pages) * usable:
+        raise BadCellError("longer than the file")
+    if size <= most:
+        return _cut(page, at, size, usable)
+    least = (usable - 12) * 32 // 255 - 23
+    here = least + (size - least) % (usable - 4)
+    here = here if here <= most else least
+    parts = [_cut(page, at, here, usable)]
+    follow = int.from_bytes(_cut(page, at + here, 4, usable), "big")
+    left = size - here
+    while left > 0:
+        if follow not in pages.pages:
+            raise BadCellError("its end is missing")
+        over = pages.pages[follow]
+        parts.append(over[4 : min(4 + left, usable)])
+        left -= len(parts[-1])
+        follow = int.from_bytes(over[:4], "big")
+    return b"".join(parts)
+
+
+def _cut(page: bytes, at: int, size: int, usable: int) -> bytes:
+    if at < 8 or at + size > usable:
+        raise BadCellError("outside of its page")
+    return page[at : at + size]
+
+
+def _record(payload: bytes) -> Iterator[Value]:
+    header, at = _varint(payload, 0)
+    body = header
+    while at < header:
+        kind, at = _varint(payload, at)
+        if kind in {10, 11}:
+            raise BadCellError("no such type")
+        size = _INTEGERS.get(kind, 8 if kind == 7 else max(0, kind - 12) // 2)
+        data = payload[body : body + size]
+        if len(data) != size:
+            raise BadCellError("cut short")
+        body += size
+        yield _value(kind, data)
+    if at != header or body != len(payload):
+        raise BadCellError("of another length than it says")
+
+
+def _value(kind: int, data: bytes) -> Value:
+    if kind == 0:
+        return None
+    if kind in {8, 9}:
+        return kind - 8
+    if kind == 7:
+        (number,) = struct.unpack(">d", data)
+        return float(number)
+    if kind < 7:
+        return int.from_bytes(data, "big", signed=True)
+    if kind % 2 == 0:
+        return data
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BadCellError("no text") from error
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    """Read SQLite's number of variable length: 7 bits a byte, at most 9 bytes, big end first."""
+    value = 0
+    for n in range(8):
+        byte = data[at + n]
+        value = value << 7 | byte & 0x7F
+        if byte < 0x80:
+            return value, at + n + 1
+    value = value << 8 | data[at + 8]
+    return value - (1 << 64) if value >> 63 else value, at + 9

@@ -6,12 +6,11 @@ import json
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
-from rig.recover.cells import read_cells
+from rig.recover.pages import read_cells
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from rig.recover.cells import Cell, Value
-    from rig.recover.pages import Pages
+    from rig.recover.pages import Cell, Pages, Value
 
 Row: TypeAlias = "tuple[Value, ...]"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import sqlite3
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,8 +21,10 @@ class Snapshot:
     ----------
     path
         Where it is.
-    data, log
-        The file, and the ``-wal`` file beside it (empty without one).
+    data
+        The file, with all that the ``-wal`` file beside it has to add to it.
+    logged
+        How many pages that has; `None` without it.
     writer
         Process that has it open for writing, in words; empty without one.
     writable
@@ -33,7 +35,7 @@ class Snapshot:
 
     path: Path
     data: bytes
-    log: bytes
+    logged: int | None
     writer: str
     writable: bool
     complaints: tuple[str, ...]
@@ -50,20 +52,19 @@ def take_snapshot(path: str | os.PathLike[str]) -> Snapshot:
     place = Path(os.path.realpath(path))
     if place.is_dir():
         raise SessionError(f"{path} is a folder", "name a session file")
-    writer = _writer(place)
+    writer, logged = _writer(place), None
     try:
         with TemporaryDirectory(prefix="rig-recover-") as folder:
             copy = Path(folder) / "copy"
-            copy_log = copy.with_name("copy-wal")
             if writer:
                 _copy_beside_writer(place, copy)
             else:
                 copy.write_bytes(place.read_bytes())
                 beside = place.with_name(place.name + "-wal")
-                with suppress(FileNotFoundError):
-                    copy_log.write_bytes(beside.read_bytes())
+                if beside.is_file() and (log := beside.read_bytes()):
+                    copy.with_name("copy-wal").write_bytes(log)
+                    logged = _fold_in(copy)
             data = copy.read_bytes()
-            log = copy_log.read_bytes() if copy_log.exists() else b""
             complaints = _complaints(copy)
     except SessionError:
         raise
@@ -72,7 +73,7 @@ def take_snapshot(path: str | os.PathLike[str]) -> Snapshot:
             f"cannot read {path}: {error.strerror or error}",
             "check its name and permissions, and that there is room for a copy in TMPDIR",
         ) from error
-    return Snapshot(place, data, log, writer, os.access(place, os.W_OK), complaints)
+    return Snapshot(place, data, logged, writer, os.access(place, os.W_OK), complaints)
 
 
 def _writer(place: Path) -> str:
@@ -99,6 +100,17 @@ def _copy_beside_writer(place: Path, copy: Path) -> None:
             source.backup(target)
     except sqlite3.Error:
         copy.write_bytes(place.read_bytes())
+
+
+def _fold_in(copy: Path) -> int:
+    """Let SQLite bring its log into the copy, up to the last whole commit; count its pages."""
+    try:
+        with closing(sqlite3.connect(copy)) as connection:
+            connection.execute("PRAGMA writable_schema = on")  # also into one that is damaged
+            _, logged, _ = connection.execute("PRAGMA wal_checkpoint").fetchone()
+    except sqlite3.Error:
+        return 0
+    return max(0, int(logged))
 
 
 def _complaints(copy: Path) -> tuple[str, ...]:
