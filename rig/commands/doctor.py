@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.output import say
-from rig.doctor import board_checks, file_checks, port_checks
-from rig.doctor.board import look_at_board
-from rig.doctor.computer import look_at_disk, look_at_port, look_at_session
-from rig.doctor.findings import Finding
+from rig.doctor import checks
+from rig.doctor.checks import Finding
+from rig.doctor.gathering import look_at_board, look_at_disk, look_at_port, look_at_session
 from rig.errors import DeviceError, SessionError
 from rig.link.port import open_port, port_clock
 from rig.usb.listing import serial_ports
@@ -19,15 +18,15 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator
 
-_PORT = (port_checks.permission, port_checks.other_owners, port_checks.modem_manager)
+_PORT = (checks.permission, checks.other_owners, checks.modem_manager)
 _BOARD = (
-    board_checks.firmware,
-    board_checks.held_drop,
-    board_checks.clock,
-    board_checks.round_trip,
-    board_checks.emergency_stop,
-    board_checks.stuck_gates,
-    board_checks.flickering_gates,
+    checks.firmware,
+    checks.held_drop,
+    checks.clock,
+    checks.round_trip,
+    checks.emergency_stop,
+    checks.stuck_gates,
+    checks.flickering_gates,
 )
 
 
@@ -54,12 +53,12 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
         yield from _board(url)
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
-    yield file_checks.disk(look_at_disk(Path(session).parent if session else Path()))
+    yield checks.disk_room(look_at_disk(Path(session).parent if session else Path()))
     if session and not Path(session).exists():
         yield Finding(f"session {session}", "not there", "check its name; rig run makes a new one")
     elif session:
         try:
-            yield file_checks.session(look_at_session(session))
+            yield checks.session_file(look_at_session(session))
         except SessionError as error:
             yield Finding(f"session {session}", error.message, error.hint)
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from rig.doctor import board_checks, file_checks, port_checks
-from rig.doctor.board_checks import mains_ripple
+from rig.doctor import checks
+from rig.doctor.checks import mains_ripple
 from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFacts
 from rig.link.gatewatch import GateStates
 from rig.records import ClockSample, Edge
@@ -49,27 +49,27 @@ def edges(gate, times_s):
 @pytest.mark.parametrize(
     ("check", "facts"),
     [
-        *((c, PORT) for c in (port_checks.permission, port_checks.other_owners)),
-        (port_checks.modem_manager, PORT),
-        (port_checks.modem_manager, replace(PORT, modem_manager=True, left_alone=True)),
+        *((c, PORT) for c in (checks.permission, checks.other_owners)),
+        (checks.modem_manager, PORT),
+        (checks.modem_manager, replace(PORT, modem_manager=True, left_alone=True)),
         *(
             (c, BOARD)
             for c in (
-                board_checks.firmware,
-                board_checks.held_drop,
-                board_checks.clock,
-                board_checks.round_trip,
-                board_checks.emergency_stop,
-                board_checks.stuck_gates,
-                board_checks.flickering_gates,
+                checks.firmware,
+                checks.held_drop,
+                checks.clock,
+                checks.round_trip,
+                checks.emergency_stop,
+                checks.stuck_gates,
+                checks.flickering_gates,
             )
         ),
-        (board_checks.firmware, replace(BOARD, shipped="")),
-        (board_checks.clock, replace(BOARD, pings=pings(ppm=4000))),
-        (board_checks.flickering_gates, replace(BOARD, edges=None, unwatched="a drop is held")),
-        (file_checks.disk, DiskFacts("/lab", 10**9)),
-        (file_checks.session, SessionFacts("s", True, "", "", "")),
-        (file_checks.session, SessionFacts("s", True, "", "process 7", "")),
+        (checks.firmware, replace(BOARD, shipped="")),
+        (checks.clock, replace(BOARD, pings=pings(ppm=4000))),
+        (checks.flickering_gates, replace(BOARD, edges=None, unwatched="a drop is held")),
+        (checks.disk_room, DiskFacts("/lab", 10**9)),
+        (checks.session_file, SessionFacts("s", True, "", "", "")),
+        (checks.session_file, SessionFacts("s", True, "", "process 7", "")),
     ],
 )
 def test_what_is_well_needs_no_advice(check, facts):
@@ -79,78 +79,78 @@ def test_what_is_well_needs_no_advice(check, facts):
 @pytest.mark.parametrize(
     ("check", "facts", "says", "advises"),
     [
-        (port_checks.permission, replace(PORT, exists=False), "no such port", "rig ports"),
-        (port_checks.permission, replace(PORT, usable=False), "the group dialout", "-aG dialout"),
-        (port_checks.permission, replace(PORT, usable=False, group=""), "its group", "-aG dialout"),
+        (checks.permission, replace(PORT, exists=False), "no such port", "rig ports"),
+        (checks.permission, replace(PORT, usable=False), "the group dialout", "-aG dialout"),
+        (checks.permission, replace(PORT, usable=False, group=""), "its group", "-aG dialout"),
         (
-            port_checks.other_owners,
+            checks.other_owners,
             replace(PORT, owners=(Owner(71, "screen /dev/ttyACM0"),)),
             "screen /dev/ttyACM0 (process 71)",
             "close that program",
         ),
         (
-            port_checks.other_owners,
+            checks.other_owners,
             replace(PORT, owners=(Owner(72, "rig daemon --port x"),)),
             "process 72",
             "let that daemon do the work",
         ),
-        (port_checks.modem_manager, replace(PORT, modem_manager=True), "restarts", "rig.usb.udev"),
+        (checks.modem_manager, replace(PORT, modem_manager=True), "restarts", "rig.usb.udev"),
         (
-            board_checks.firmware,
+            checks.firmware,
             replace(BOARD, shipped="chainrig 9"),
             "but chainrig 9",
             "rig flash",
         ),
-        (board_checks.held_drop, replace(BOARD, held=(7, 2)), "run 7, attempt 2", "rig run"),
-        (board_checks.clock, replace(BOARD, pings=()), "from 0 pings", "cable"),
-        (board_checks.clock, replace(BOARD, pings=pings(5700, 1000)), "+5700", "resonator"),
-        (board_checks.round_trip, replace(BOARD, pings=()), "no ping", "cable"),
+        (checks.held_drop, replace(BOARD, held=(7, 2)), "run 7, attempt 2", "rig run"),
+        (checks.clock, replace(BOARD, pings=()), "from 0 pings", "cable"),
+        (checks.clock, replace(BOARD, pings=pings(5700, 1000)), "+5700", "resonator"),
+        (checks.round_trip, replace(BOARD, pings=()), "no ping", "cable"),
         (
-            board_checks.round_trip,
+            checks.round_trip,
             replace(BOARD, pings=pings(trip_ns=130_000_000)),
             "130.0 ms",
             "busy",
         ),
         (
-            board_checks.emergency_stop,
+            checks.emergency_stop,
             replace(BOARD, edges=None, unwatched="it is open", stopped=True),
             "open",
             "close it",
         ),
         (
-            board_checks.flickering_gates,
+            checks.flickering_gates,
             replace(BOARD, states=GateStates(0, 4)),
             "gate 2",
             "clear the beam",
         ),
         (
-            board_checks.stuck_gates,
+            checks.stuck_gates,
             replace(BOARD, states=GateStates(0x0102, 0)),
             "gates 1, 8",
             "ground",
         ),
         (
-            board_checks.flickering_gates,
+            checks.flickering_gates,
             replace(BOARD, edges=None, states=GateStates(0, 4)),
             "gate 2",
             "clear the beam",
         ),
         (
-            board_checks.flickering_gates,
+            checks.flickering_gates,
             replace(BOARD, edges=edges(5, [0.1, 0.3])),
             "gate 5 2 times within 1 s",
             "clear the beam",
         ),
         (
-            board_checks.flickering_gates,
+            checks.flickering_gates,
             replace(BOARD, edges=edges(5, [n / 100 for n in range(90)])),
             "gate 5 90 times, in step with 100 Hz",
             "lamps",
         ),
-        (file_checks.disk, DiskFacts("/lab", 10**7), "10 MB free in /lab", "free 200 MB"),
-        (file_checks.session, SessionFacts("s", False, "it is empty", "", ""), "empty", "name a"),
+        (checks.disk_room, DiskFacts("/lab", 10**7), "10 MB free in /lab", "free 200 MB"),
+        (checks.session_file, SessionFacts("s", False, "it is empty", "", ""), "empty", "name a"),
         (
-            file_checks.session,
+            checks.session_file,
             SessionFacts("s", False, "", "", "9 pages"),
             "damaged: 9 pages",
             "rig recover s -o",

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
-from rig.doctor.board import look_at_board
-from rig.doctor.computer import look_at_disk, look_at_port, look_at_session
 from rig.doctor.facts import Owner
+from rig.doctor.gathering import look_at_board, look_at_disk, look_at_port, look_at_session
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.session.store import Session
@@ -198,7 +197,7 @@ def test_a_port_that_somebody_uses_is_not_opened(doctor, terminal, monkeypatch):
         raise AssertionError(f"{url} was opened")
 
     monkeypatch.setattr("rig.commands.doctor.open_port", fail)
-    monkeypatch.setattr("rig.doctor.computer._owners", lambda *_: [Owner(5, "screen")])
+    monkeypatch.setattr("rig.doctor.gathering._owners", lambda *_: [Owner(5, "screen")])
     code, out, _ = doctor("--port", terminal)
     assert code == 4
     assert "screen (process 5)" in out

@@ -1,26 +1,82 @@
-"""Checks of a board: firmware, clock, line, gates."""
+"""Checks of a port, a board, a session file and its disk: each is a function of facts alone."""
 
 from __future__ import annotations
 
 import cmath
+from dataclasses import dataclass
 from math import tau
 from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.rate import tick_rate
-from rig.doctor.findings import Finding
 from rig.link.gatewatch import listed
 from rig.link.messages import HOST_SILENCE_MS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.doctor.facts import BoardFacts
+    from rig.doctor.facts import BoardFacts, DiskFacts, PortFacts, SessionFacts
 
+RULE = (
+    "python -m rig.usb.udev | sudo tee /etc/udev/rules.d/60-chainrig.rules, then "
+    "sudo udevadm control --reload and sudo udevadm trigger"
+)
+ROOM = 200 * 10**6
+"""Bytes that should be free: a day of drops takes a few tens of MB, and its log as much again."""
 _MAINS_HZ = (50, 60, 100, 120)  # lamps flicker at twice the mains' frequency
 _IN_STEP = 0.8
 _ENOUGH = 10  # edges to tell a rhythm from chance
 _BEAM = "clear the beam, and see that its emitter has power and its plugs sit"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the doctor's; with an advice it is a trouble, without one all is well."""
+
+    name: str
+    what: str
+    advice: str = ""
+
+    def __str__(self) -> str:
+        if self.advice:
+            return f"{self.name}: {self.what}\n  do: {self.advice}"
+        return f"{self.name}: {self.what}"
+
+
+def permission(port: PortFacts) -> Finding:
+    """See that this user may read and write the port."""
+    name = f"permission for {port.path}"
+    if not port.exists:
+        return Finding(name, "there is no such port", "is the board plugged in? rig ports")
+    if port.usable:
+        return Finding(name, "given")
+    group = port.group or "its group"
+    return Finding(
+        name,
+        f"not given: it belongs to the group {group}",
+        f"sudo usermod -aG {port.group or 'dialout'} $USER and log in again, or {RULE}",
+    )
+
+
+def other_owners(port: PortFacts) -> Finding:
+    """See that no other process has the port open."""
+    name = f"other users of {port.path}"
+    if not port.owners:
+        return Finding(name, "none seen")
+    said = ", ".join(f"{owner.command} (process {owner.pid})" for owner in port.owners)
+    daemon = any("daemon" in owner.command for owner in port.owners)
+    advice = "let that daemon do the work: rig run and rig tui ask it" if daemon else ""
+    return Finding(name, said, advice or "close that program")
+
+
+def modem_manager(port: PortFacts) -> Finding:
+    """See that ModemManager does not take the board for a modem."""
+    name = f"ModemManager and {port.path}"
+    if not port.modem_manager:
+        return Finding(name, "it does not run")
+    if port.left_alone:
+        return Finding(name, "it is told to leave this port alone")
+    return Finding(name, "it may speak to the board, which restarts it", RULE)
 
 
 def firmware(board: BoardFacts) -> Finding:
@@ -137,3 +193,23 @@ def mains_ripple(times_s: Sequence[float]) -> int | None:
         if abs(mean) > _IN_STEP:
             return hz
     return None
+
+
+def disk_room(facts: DiskFacts) -> Finding:
+    """See that there is room for a session."""
+    said = f"{facts.free / 1e6:.0f} MB free in {facts.folder}"
+    if facts.free < ROOM:
+        return Finding("disk", said, f"free {ROOM / 1e6:.0f} MB there, or keep sessions elsewhere")
+    return Finding("disk", said)
+
+
+def session_file(facts: SessionFacts) -> Finding:
+    """See that a session file is whole."""
+    name = f"session {facts.path}"
+    if facts.foreign:
+        return Finding(name, f"not a session: {facts.foreign}", "name a file made by rig run")
+    if not facts.whole:
+        return Finding(
+            name, f"damaged: {facts.first_trouble}", f"rig recover {facts.path} -o NEW.session"
+        )
+    return Finding(name, f"whole, being written by {facts.writer}" if facts.writer else "whole")
