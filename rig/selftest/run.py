@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
 from rig.link.messages import MessageError
-from rig.selftest import arming, disturbances, drops, greeting, loopback, timing
+from rig.selftest import arming, drops, greeting, line_checks
 from rig.selftest.board import BoardUnderTest
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError, Outcome, Verdict
 
@@ -40,7 +40,7 @@ CHECKS = (
     Check("every message", greeting.every_message, idle=False),
     Check("UNKNOWN_MESSAGE", greeting.unknown_messages, idle=False),
     Check("BAD_PARAMETER by length", greeting.other_lengths, idle=False),
-    Check("round trips", timing.round_trips, idle=False),
+    Check("round trips", line_checks.round_trips, idle=False),
     Check("gates", greeting.gates_now, idle=False),
     Check("GATE_BLOCKED", greeting.a_blocked_gate),
     Check("NOT_ARMED", arming.fire_unarmed),
@@ -48,18 +48,18 @@ CHECKS = (
     Check("BAD_PARAMETER", arming.bad_orders),
     Check("ARM and ABORT", arming.arm_and_abort),
     Check("WRONG_TOKEN", arming.wrong_tokens),
-    Check("arming times out", timing.arming_times_out),
-    Check("a silent host disarms", timing.a_silent_host),
-    Check("repeated frames", disturbances.repeats),
-    Check("frames without seq", disturbances.without_seq, idle=False),
-    Check("junk on the line", disturbances.junk),
+    Check("arming times out", line_checks.arming_times_out),
+    Check("a silent host disarms", line_checks.a_silent_host),
+    Check("repeated frames", line_checks.repeats),
+    Check("frames without seq", line_checks.without_seq, idle=False),
+    Check("junk on the line", line_checks.junk),
     Check("certificate", drops.certificate),
     Check("BUSY", drops.busy),
     Check("ABORT of a recording", drops.abort_a_recording),
     Check("HOLDING_A_DROP", drops.holding),
     Check("reading again", drops.reading_again),
     Check("ACKNOWLEDGE and WRONG_CRC", drops.acknowledging),
-    Check("sync output to gate", loopback.sync_edges),
+    Check("sync output to gate", drops.sync_edges),
     Check("COOLING", drops.cooling),
     Check("GATE_UNSTEADY", _needs("it needs a hand in a beam")),
     Check("STOPPED", _needs("it needs a hand at the emergency stop")),

@@ -1,13 +1,15 @@
-"""Checks of time: round trips, the clock, and what the board does when nobody speaks."""
+"""Checks of the line: round trips and the clock, silence, repeats, and junk."""
 
 from __future__ import annotations
 
+import random
 from statistics import median
 from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.rate import tick_rate
 from rig.link import messages as wire
+from rig.link.frames import DELIMITER
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, Reason
 from rig.records import ClockSample
 from rig.selftest.verdicts import CheckFailedError
@@ -20,6 +22,8 @@ _PINGS = 60
 _TIMEOUT_MS = 400
 _ASK_S = 0.1
 _SLACK_S = 0.03  # of the computer, besides the line's own delay
+_QUIET_S = 0.05
+_BURSTS = 20
 
 
 def round_trips(board: BoardUnderTest) -> str:
@@ -76,3 +80,44 @@ def _disarms(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_ns: int)
     if board.phase() is not Phase.IDLE:
         raise CheckFailedError("it says DISARMED and is not idle")
     return f"after {took:.0f} ms"
+
+
+def repeats(board: BoardUnderTest) -> str:
+    """See that a repeated request is answered as before and not executed again."""
+    order = board.order()
+    seq = board.next_seq()
+    armed = board.ask(order, seq)
+    token = board.armed_by(armed)
+    if board.ask(order, seq) != armed:
+        raise CheckFailedError("a repeated ARM armed it again")
+    seq = board.next_seq()
+    fired = board.ask(wire.Fire(token), seq)
+    if not isinstance(fired, wire.Fired) or board.ask(wire.Fire(token), seq) != fired:
+        raise CheckFailedError("a repeated FIRE is not answered as before")
+    recorded = board.ending(fired, order.record_ms)
+    if recorded.certificate.fire_tick != fired.tick:
+        raise CheckFailedError("a repeated FIRE fired again")
+    seq = board.next_seq()
+    done = wire.Acknowledge(recorded.certificate.label, recorded.certificate.crc32)
+    if [board.ask(done, seq), board.ask(done, seq)] != [wire.Done()] * 2:
+        raise CheckFailedError("a repeated ACKNOWLEDGE is not answered as before")
+    return ""
+
+
+def without_seq(board: BoardUnderTest) -> str:
+    """See that a frame without a seq is passed over."""
+    board.line.say(wire.Status(), 0)
+    heard = board.wait(_QUIET_S, lambda h: isinstance(h.message, wire.State))
+    if heard is not None:
+        raise CheckFailedError("it answers a request that has no seq")
+    return ""
+
+
+def junk(board: BoardUnderTest) -> str:
+    """See that junk on the line disturbs nothing."""
+    noise = random.Random(3)  # noqa: S311 - noise, not secrets
+    for _ in range(_BURSTS):
+        board.line.port.write(noise.randbytes(noise.randrange(1, 300)) + DELIMITER)
+        if board.phase() is not Phase.IDLE:
+            raise CheckFailedError("junk made it do something")
+    return f"{_BURSTS} bursts"
