@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from rig.model.batch import Flags, Floats
     from rig.sweep.compute import Swept
-    from rig.sweep.grid import Axis
-    from rig.sweep.layout import Layout
+    from rig.sweep.layout import Axis, Layout
 
 _LINE_HEIGHT = 0.17  # inches
 _WRAP = 110

@@ -1,17 +1,19 @@
-"""From a protocol and what is to be varied to the grid and all that stays as it is."""
+"""From a protocol and ``NAME=LOW..HIGH:COUNT`` to the grid and all that stays as it is."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
-from rig.sweep.grid import Axis, Grid
-from rig.sweep.variables import scene_values
-from rig.sweep.vary import read_vary
+from rig.protocol.fields import did_you_mean
+from rig.sweep.variables import VARIABLES, scene_values
+from rig.units import UnitError, parse, quoted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
     from rig.model.chain import Chain
     from rig.model.surface import Pile
@@ -19,6 +21,46 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 20_000_000
 """Their results take 17 bytes each, all in memory until the file is written."""
+MOST_VALUES = 1_000_000
+_EXAMPLE = "write for example restitution=-0.4..0.9:200 or incline=40deg"
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One varied parameter and its values, rising or as the plan lists them.
+
+    Attributes
+    ----------
+    name
+        One of `rig.sweep.variables.VARIABLES`.
+    values
+        In SI, angles in degrees.
+    """
+
+    name: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """All combinations of the axes' values; the last axis runs fastest."""
+
+    axes: tuple[Axis, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values along each axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    def chunks(self, length: int) -> Iterator[range]:
+        """Cut the points, in their order, into pieces of `length`; the last may be shorter."""
+        for start in range(0, self.size, length):
+            yield range(start, min(start + length, self.size))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +98,7 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
     protocol
         The scene; of unlike chains the first one strikes, as in ``rig predict``.
     vary
-        As in `rig.sweep.vary.read_vary`.
+        As in `read_vary`.
 
     Raises
     ------
@@ -83,3 +125,118 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
         longer_m=others[0].length - first.length if others else 0.0,
         pile=protocol.surface.pile if protocol.surface and "incline" in scene else None,
     )
+
+
+class _FaultError(Exception):
+    """Something is wrong with the part of a text that starts at `column` (from 0)."""
+
+    def __init__(self, column: int, message: str) -> None:
+        super().__init__(message)
+        self.column = column
+
+
+def read_vary(texts: Iterable[str], known: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Read all ``--vary`` of a command line.
+
+    Parameters
+    ----------
+    texts
+        Each ``NAME=LOW..HIGH:COUNT``, or ``NAME=VALUE`` to hold a parameter at another value than
+        the protocol's. Quantities have their unit, as in a protocol.
+    known
+        Names of the parameters that the scene has.
+
+    Returns
+    -------
+    dict of str to tuple of float
+        Values by name in the order given, in SI, angles in degrees; one value where one was given.
+
+    Raises
+    ------
+    InputError
+        With every problem found, each with its text and column.
+    """
+    found: dict[str, tuple[float, ...]] = {}
+    problems = []
+    for text in texts:
+        try:
+            name, values = _read(text, known, found)
+        except _FaultError as fault:
+            problems.append(f"--vary {quoted(text, 80)}, column {fault.column + 1}: {fault}")
+        else:
+            found[name] = values
+    if problems:
+        raise InputError("\n".join(problems))
+    if all(len(values) == 1 for values in found.values()):
+        raise InputError("nothing is varied", f"{_EXAMPLE.partition(' or')[0]} behind --vary")
+    return found
+
+
+def _read(text: str, known: Sequence[str], taken: Container[str]) -> tuple[str, tuple[float, ...]]:
+    before, equals, after = text.partition("=")
+    name, start = before.strip(), len(before) + 1
+    if not equals:
+        raise _FaultError(0, _EXAMPLE)
+    if name not in known:
+        guess = did_you_mean(name, tuple(known))
+        raise _FaultError(0, f"not in this scene; {guess}it can vary: {', '.join(known)}")
+    if name in taken:
+        raise _FaultError(0, "given twice; keep one of them")
+    if ".." not in after:
+        if ":" in after:
+            raise _FaultError(start, f"a range is LOW..HIGH:COUNT; {_EXAMPLE}")
+        return name, (_value(name, after, start),)
+    low, _, rest = after.partition("..")
+    high, colon, count = rest.partition(":")
+    middle = start + len(low) + 2
+    if high.startswith("."):  # 1...5 may be 1. to .5 or a slip
+        raise _FaultError(
+            middle - 2, "between LOW and HIGH are two dots, and before a dot is a digit"
+        )
+    ends = _value(name, low, start), _value(name, high, middle)
+    if not ends[0] < ends[1]:
+        raise _FaultError(middle, f"found {high.strip()}; it must be more than {low.strip()}")
+    if not colon:
+        raise _FaultError(middle + len(high), f"say how many values: {text.strip()}:81")
+    return name, spaced(*ends, _count(count, middle + len(high) + 1))
+
+
+def _value(name: str, text: str, column: int) -> float:
+    accepted = VARIABLES[name].accepted
+    try:
+        read = parse(text.strip(), accepted.dimension)
+    except UnitError as error:
+        raise _FaultError(column, str(error)) from None
+    if read.u > 0:
+        raise _FaultError(column, f"found {text.strip()}; no uncertainty is used here")
+    if read.value not in accepted:
+        raise _FaultError(column, f"found {text.strip()}; accepted: {accepted}")
+    return read.value
+
+
+def _count(text: str, column: int) -> int:
+    digits = text.strip()
+    if digits.isascii() and digits.isdigit() and len(digits) < 10:
+        number = int(digits)
+        if 2 <= number <= MOST_VALUES:
+            return number
+    wanted = f"a whole number from 2 to {MOST_VALUES} is wanted"
+    raise _FaultError(column, f"found {quoted(digits)}; {wanted}")
+
+
+def spaced(low: float, high: float, count: int) -> tuple[float, ...]:
+    """Return `count` evenly spaced numbers from `low` to `high`, both among them.
+
+    Each is the float nearest to what a person finds by decimal arithmetic: 0 to 0.9 in nine steps
+    has 0.3 and not 0.30000000000000004.
+
+    Parameters
+    ----------
+    low, high
+        Finite.
+    count
+        At least 2.
+    """
+    start, end = Fraction(repr(low)), Fraction(repr(high))
+    step = (end - start) / (count - 1)
+    return tuple(float(start + step * number) for number in range(count))

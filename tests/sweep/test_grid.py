@@ -7,7 +7,7 @@ from decimal import Decimal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.sweep.grid import Axis, Grid, spaced
+from rig.sweep.layout import Axis, Grid, spaced
 
 FINITE = st.floats(-1e6, 1e6)
 LEAST = Decimal("5e-324")

@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
-from rig.sweep.grid import spaced
+from rig.sweep.layout import MOST_VALUES, read_vary, spaced
 from rig.sweep.variables import VARIABLES
-from rig.sweep.vary import MOST_VALUES, read_vary
 
 NAMES = tuple(VARIABLES)
 SPACES = st.sampled_from(["", " ", "  "])
