@@ -44,7 +44,7 @@ class _Kept(NullSink):
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class RateError:
     """Errors of the rate after one duration, over all seeds, ppm.
 
     Attributes
@@ -69,7 +69,7 @@ class Row:
 
 def clock(
     protocol: str, seeds: int, tell: Callable[[str], None], durations_s: tuple[float, ...]
-) -> list[Row]:
+) -> list[RateError]:
     """Compare clocks over a simulated line with 1 ms of exponential jitter.
 
     Parameters
@@ -115,9 +115,9 @@ def _error(rate: TickRate, u: float) -> tuple[float, float]:
     return (rate.hz / true - 1.0) * 1e6, math.hypot(rate.u_hz / true, u) * 1e6
 
 
-def _row(duration: float, source: str, pairs: list[tuple[float, float]]) -> Row:
+def _row(duration: float, source: str, pairs: list[tuple[float, float]]) -> RateError:
     n = len(pairs)
-    return Row(
+    return RateError(
         duration,
         source,
         math.sqrt(sum(error**2 for error, _ in pairs) / n),

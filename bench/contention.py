@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
-from bench.tally import Tally
+from bench.tally import FaultTally
 from rig.daemon import rpc
 from rig.errors import DeviceError
 
@@ -25,7 +25,7 @@ _GROWTH = 24 << 20
 """Bytes by which a daemon may grow in a session, whoever does not read."""
 
 
-def raced(count: int, seed: int, board: str = "sim") -> Tally:
+def raced(count: int, seed: int, board: str = "sim") -> FaultTally:
     """Start two runners at once on one session, so many times.
 
     Parameters
@@ -33,7 +33,7 @@ def raced(count: int, seed: int, board: str = "sim") -> Tally:
     count, seed, board
         As for `bench.faults.disturbed`.
     """
-    tally = Tally()
+    tally = FaultTally()
     for n in range(count):
         with ProcessFixture(_RUNS, seed + n, board=board) as processes:
             processes.start_daemon()
@@ -49,7 +49,7 @@ def raced(count: int, seed: int, board: str = "sim") -> Tally:
     return tally
 
 
-def deaf(count: int, seed: int, board: str = "sim") -> Tally:
+def deaf(count: int, seed: int, board: str = "sim") -> FaultTally:
     """Make sessions beside clients that ask for everything and never read.
 
     Parameters
@@ -57,7 +57,7 @@ def deaf(count: int, seed: int, board: str = "sim") -> Tally:
     count, seed, board
         As for `bench.faults.disturbed`.
     """
-    tally = Tally()
+    tally = FaultTally()
     for n in range(count):
         with ProcessFixture(_RUNS, seed + n, board=board) as processes, ExitStack() as lines:
             processes.start_daemon()
@@ -84,7 +84,7 @@ def _ended(runner: Process) -> tuple[int, str]:
     return runner.returncode, told
 
 
-def _look(processes: ProcessFixture, tally: Tally) -> None:
+def _look(processes: ProcessFixture, tally: FaultTally) -> None:
     happened = list(processes.happened())
     tally.broken += broken(processes.session, happened, processes.runs)
     tally.longest_on_s = max(tally.longest_on_s, longest_on(happened))

@@ -14,7 +14,7 @@ from bench.contention import deaf, raced
 from bench.invariants import broken, longest_on
 from bench.moments import STATES, fell_upon, off_after, reach
 from bench.process_fixture import ProcessFixture
-from bench.tally import Tally
+from bench.tally import FaultTally
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError, SessionError
 from rig.link.transcript import Transcript
@@ -63,7 +63,7 @@ def disturbed(
     runs: int = _RUNS,
     dials: dict[str, str] | None = None,
     board: str = "sim",
-) -> Tally:
+) -> FaultTally:
     """Make sessions, with so many disturbances at random moments.
 
     Parameters
@@ -81,7 +81,7 @@ def disturbed(
     board
         ``sim``, or ``emu`` for real firmware in an emulator.
     """
-    tally, chance = Tally(), random.Random(f"{kind} {seed}")  # noqa: S311 - moments, not secrets
+    tally, chance = FaultTally(), random.Random(f"{kind} {seed}")  # noqa: S311 - moments, not secrets
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
         with ProcessFixture(
@@ -146,7 +146,7 @@ def _finish(processes: ProcessFixture) -> None:
     raise DeviceError(f"the session does not end: {processes.told}")
 
 
-def _look(processes: ProcessFixture, moments: list[float], tally: Tally) -> None:
+def _look(processes: ProcessFixture, moments: list[float], tally: FaultTally) -> None:
     """See what a finished session has, and whether every promise was kept."""
     happened = list(processes.happened())
     tally.broken += broken(processes.session, happened, processes.runs)
@@ -167,7 +167,7 @@ def _look(processes: ProcessFixture, moments: list[float], tally: Tally) -> None
 
 def faults(
     counts: dict[str, int], jobs: int, say: Callable[[str], None], board: str = "sim"
-) -> dict[str, Tally]:
+) -> dict[str, FaultTally]:
     """Disturb everything, and make sessions on a bad line too.
 
     Parameters
@@ -181,7 +181,7 @@ def faults(
     board
         As for `disturbed`.
     """
-    found: dict[str, Tally] = {}
+    found: dict[str, FaultTally] = {}
     with ThreadPoolExecutor(jobs) as pool:
         work = {
             kind: [
@@ -191,7 +191,7 @@ def faults(
             for kind, count in counts.items()
         }
         for kind, parts in work.items():
-            found[kind] = Tally()
+            found[kind] = FaultTally()
             for part in parts:
                 found[kind].add(part.result())
             # Here only, where the machine has nothing else to do: the daemon may be late too.
@@ -207,7 +207,7 @@ def _shares(kind: str, count: int, jobs: int) -> list[int]:
     return [part for n in range(jobs) if (part := count // jobs + (n < count % jobs))]
 
 
-def _some(kind: str, count: int, seed: int, board: str) -> Tally:
+def _some(kind: str, count: int, seed: int, board: str) -> FaultTally:
     try:
         if kind in CONTENTION:
             return CONTENTION[kind](count, seed, board)
@@ -215,12 +215,12 @@ def _some(kind: str, count: int, seed: int, board: str) -> Tally:
             return disturbed("daemon", 0, seed, dials=NOISE, board=board)
         return disturbed(kind, count, seed, board=board)
     except Exception as error:
-        return Tally(broken=[f"given up: {error!r}"])
+        return FaultTally(broken=[f"given up: {error!r}"])
 
 
 def main(arguments: Namespace) -> int:
     """Kill, pull, reset, fill and garble, and count what was lost."""
-    found: dict[str, dict[str, Tally]] = {}
+    found: dict[str, dict[str, FaultTally]] = {}
     for board in arguments.boards:
         if board == "emu" and find_spec("rig_emulator") is None:
             say("left out: emu (pip install ./firmware/emulator)")
@@ -253,7 +253,7 @@ def main(arguments: Namespace) -> int:
     return 1 if troubles else 0
 
 
-def _print(board: str, kinds: dict[str, Tally]) -> None:
+def _print(board: str, kinds: dict[str, FaultTally]) -> None:
     names = ("times", *STATES, "sessions", "runs", "drops", "bad frames", "on ms", "off ms", "lost")
     print(f"{board:<7}" + "".join(f"{name:>{_width(name)}}" for name in names))
     for kind, one in kinds.items():

@@ -8,7 +8,7 @@ from typing import Any
 
 
 @dataclass(slots=True)
-class Tally:
+class FaultTally:
     """What happened.
 
     Attributes
@@ -45,7 +45,7 @@ class Tally:
     full_disk: str = ""
     broken: list[str] = field(default_factory=list)
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: FaultTally) -> None:
         """Take another tally's counts."""
         for name in ("disturbed", "sessions", "runs", "drops", "frames", "bad_frames"):
             setattr(self, name, getattr(self, name) + getattr(other, name))

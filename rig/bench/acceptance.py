@@ -33,7 +33,7 @@ def failures(found: Mapping[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     found
-        As `rig.bench.accuracy.Tally.json` gives it.
+        As `rig.bench.accuracy.AccuracyTally.json` gives it.
     """
     if found["edges_given_to_a_wrong_rod"]:
         yield f"{found['edges_given_to_a_wrong_rod']} edges given to a wrong rod"

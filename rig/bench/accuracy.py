@@ -84,7 +84,7 @@ class Errors:
 
 
 @dataclass(slots=True)
-class Tally:
+class AccuracyTally:
     """Everything counted over all sessions."""
 
     quantities: dict[str, Errors] = field(default_factory=dict)
@@ -214,7 +214,7 @@ def accuracy(
     """
     if not is_simulated(url):
         raise InputError(f"{url} is no simulation", "only a simulation knows the truth: sim://")
-    tally = Tally()
+    tally = AccuracyTally()
     with TemporaryDirectory() as folder:
         source = repeated(protocol, repeats, Path(folder)) if repeats else protocol
         for seed in range(1, seeds + 1):

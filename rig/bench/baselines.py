@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _FLICKER = 0.3e-3  # s: no rod is that fast
 
 
-class Reading(NamedTuple):
+class TimerReading(NamedTuple):
     """What a plain timer with two gates a side reads, SI units."""
 
     separation_m: float
@@ -37,7 +37,7 @@ class _Passage(NamedTuple):
     speed: float
 
 
-def two_gate_timer(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
+def two_gate_timer(protocol: Protocol, drop: Drop, hz: float) -> TimerReading | None:
     """Time the last passage at two gates of each side, the lowest but one that bounces reach.
 
     Between two gates a rod's mean speed is that at half time; from the lower one it falls freely.
@@ -45,7 +45,7 @@ def two_gate_timer(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
 
     Returns
     -------
-    Reading or None
+    TimerReading or None
         Nothing where a gate saw nothing or the passages come in the wrong order.
     """
     struck = _passage(protocol, drop, hz, "impact")
@@ -56,7 +56,7 @@ def two_gate_timer(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
     speed = math.sqrt(struck.speed**2 + 2.0 * gravity * struck.height)
     since = struck.time + 2.0 * struck.height / (struck.speed + speed) - free.time
     height = free.height - (free.speed + 0.5 * gravity * since) * since
-    return Reading(height, speed)
+    return TimerReading(height, speed)
 
 
 def _passage(protocol: Protocol, drop: Drop, hz: float, side: Side) -> _Passage | None:
@@ -80,7 +80,7 @@ def _last(gate: Gate, drop: Drop, hz: float) -> float | None:
     return 0.5 * (edges[-1].tick + edges[-2].tick) / hz
 
 
-def line_fit(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
+def line_fit(protocol: Protocol, drop: Drop, hz: float) -> TimerReading | None:
     """Fit the top rods' passages at all gates: they know no rods but the last.
 
     The free chain is a parabola with the place's gravity. Of the other only gates below the last
@@ -88,7 +88,7 @@ def line_fit(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
 
     Returns
     -------
-    Reading or None
+    TimerReading or None
         Nothing where fewer than two gates of a side saw a passage.
     """
     assert protocol.gates is not None
@@ -107,7 +107,7 @@ def line_fit(protocol: Protocol, drop: Drop, hz: float) -> Reading | None:
     hit = since + 2.0 * height / (speed + end)
     at, fast, then = _parabola(*free, gravity)
     left = hit - then
-    return Reading(at - (fast + 0.5 * gravity * left) * left, end)
+    return TimerReading(at - (fast + 0.5 * gravity * left) * left, end)
 
 
 def _passages(

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.errors import RigError
-from rig.model.batch import Falls, Floats, falls, given_impacts
+from rig.model.batch import FallBatch, Floats, falls, given_impacts
 from rig.model.chain import Chain
 from rig.model.fall import Fall, fall, kicks
 
@@ -44,7 +44,7 @@ _TRIES = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class MedianRange:
     """Median of all rounds, with the least and the most."""
 
     median: float
@@ -126,7 +126,7 @@ def bulk(count: int, rounds: int, say: Callable[[str], None]) -> dict[str, Any]:
     return found
 
 
-def batch_falls(chain: Chain, batch: Batch) -> Falls:
+def batch_falls(chain: Chain, batch: Batch) -> FallBatch:
     """All falls at once, in numpy."""
     impacts = given_impacts(batch.alpha, batch.gamma)
     return falls(
@@ -258,4 +258,4 @@ def _in_turns(timed: dict[str, Callable[[], float]], rounds: int) -> dict[str, l
 
 
 def _spread(values: Sequence[float]) -> dict[str, float]:
-    return asdict(Spread(statistics.median(values), min(values), max(values)))
+    return asdict(MedianRange(statistics.median(values), min(values), max(values)))

@@ -18,7 +18,7 @@ from rig.analysis.monte_carlo import monte_carlo
 from rig.analysis.quantities import measurands
 from rig.analysis.result import GOOD
 from rig.bench.accuracy import repeated
-from rig.bench.baselines import Reading, line_fit, two_gate_timer
+from rig.bench.baselines import TimerReading, line_fit, two_gate_timer
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
 from rig.results import detailed, protocol_of
@@ -139,11 +139,13 @@ def estimators(
     alone_s = (time.process_time() - begin) / max(1, len(good))
     if not cases:
         raise InputError("no good drop to compare", "take fewer disturbances, or more repeats")
-    session_readings = [Reading(*(one.quantities[name].value for name in _NAMES)) for one in good]
+    session_readings = [
+        TimerReading(*(one.quantities[name].value for name in _NAMES)) for one in good
+    ]
     alone = [_alone(one) for one in cases]
     all_truths = [truths[key] for key in keys]
     camera = [
-        Reading(
+        TimerReading(
             one["camera_separation_m"] - one["separation_raw_m"] + one["separation_m"],
             one["camera_speed_m_s"],
         )
@@ -177,7 +179,7 @@ def estimators(
     return found, left_out
 
 
-def drawn(fit: Fit, draws: int, seed: int) -> Reading:
+def drawn(fit: Fit, draws: int, seed: int) -> TimerReading:
     """Mean Δz and V over draws of all unknowns from their joint normal distribution.
 
     Nothing is linearised from the unknowns on: each draw is a fall of its own.
@@ -220,7 +222,7 @@ def drawn(fit: Fit, draws: int, seed: int) -> Reading:
         above = start + x[part["side"]][0] + x[part["free hang"]][0] + top
         total += [(above - 0.5 * gravity * time**2).sum(), np.sum(arrival)]
         done += size
-    return Reading(*(total / draws).tolist())
+    return TimerReading(*(total / draws).tolist())
 
 
 def as_json(found: list[Estimator], left_out: list[str]) -> dict[str, Any]:
@@ -228,22 +230,22 @@ def as_json(found: list[Estimator], left_out: list[str]) -> dict[str, Any]:
     return {"simulated": True, "estimators": [asdict(one) for one in found], "left_out": left_out}
 
 
-def _alone(case: _Case) -> Reading:
+def _alone(case: _Case) -> TimerReading:
     found = measurands(case.fit.model, case.fit.estimate.x)
-    return Reading(*(found[name][0] for name in _NAMES))
+    return TimerReading(*(found[name][0] for name in _NAMES))
 
 
-def _readjusted(case: _Case, trials: int) -> Reading:
+def _readjusted(case: _Case, trials: int) -> TimerReading:
     found = monte_carlo(case.fit, trials, SEED)
-    return Reading(*(found[name].mean for name in _NAMES))
+    return TimerReading(*(found[name].mean for name in _NAMES))
 
 
-def _draws(case: _Case, trials: int) -> Reading:
+def _draws(case: _Case, trials: int) -> TimerReading:
     return drawn(case.fit, trials, SEED)
 
 
 def _raw_point(
-    name: str, seconds: float, readings: list[Reading | None], cases: list[_Case]
+    name: str, seconds: float, readings: list[TimerReading | None], cases: list[_Case]
 ) -> Estimator:
     """These know no release times: their Δz is as it happened, and compared with that."""
     pairs = [
@@ -258,7 +260,7 @@ def _point(
     name: str,
     trials: int,
     seconds: float | None,
-    readings: list[Reading],
+    readings: list[TimerReading],
     truths: list[Mapping[str, Any]],
 ) -> Estimator:
     errors = [

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.session import analyze
-from rig.bench.accuracy import Tally
+from rig.bench.accuracy import AccuracyTally
 from rig.bench.dials import with_setting
 from rig.clock.calibration import TimeScale
 from rig.errors import RigError
@@ -52,7 +52,7 @@ def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        As `rig.bench.accuracy.Tally.json` gives it.
+        As `rig.bench.accuracy.AccuracyTally.json` gives it.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
         The simulation gave up.
     """
     scene = reader.read(protocol)
-    tally = Tally()
+    tally = AccuracyTally()
     source = with_setting(url, "protocol", str(Path(protocol).resolve()))
     for seed, told in _falls(source, _sessions(scene, rigs)):
         begin = time.perf_counter()
@@ -97,7 +97,9 @@ def _falls(url: str, sessions: Sequence[Sequence[int]]) -> Iterator[tuple[int, l
         raise RigError(f"the simulation {url} ended with exit code {simulation.returncode}")
 
 
-def _session(protocol: Protocol, seed: int, told: Iterable[dict[str, Any]], tally: Tally) -> None:
+def _session(
+    protocol: Protocol, seed: int, told: Iterable[dict[str, Any]], tally: AccuracyTally
+) -> None:
     """Analyse one rig's drops and judge the results."""
     # A calibration is off by chance, as far as it says.
     known = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())

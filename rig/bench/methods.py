@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.bench.precision_reference import Model, Scene
+    from rig.bench.precision_reference import Model, PrecisionScene
     from rig.model.density import Density
 
     Stage = tuple[float, ...]
@@ -128,7 +128,7 @@ class Method:
     limit: int | None = None
 
 
-def methods(scene: Scene, *, quick: bool = False) -> list[Method]:
+def methods(scene: PrecisionScene, *, quick: bool = False) -> list[Method]:
     """Every method that applies to a scene.
 
     Parameters
@@ -143,7 +143,7 @@ def methods(scene: Scene, *, quick: bool = False) -> list[Method]:
     ]
 
 
-def absent(scene: Scene) -> list[tuple[str, str]]:
+def absent(scene: PrecisionScene) -> list[tuple[str, str]]:
     """What does not apply to a scene: method and reason."""
     gone = []
     if scene.density is None:
@@ -164,7 +164,7 @@ def absent(scene: Scene) -> list[tuple[str, str]]:
     return gone
 
 
-def _discrete(scene: Scene, *, quick: bool) -> Iterator[Method]:
+def _discrete(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
     chain, gains, drop, gravity = scene.chain, scene.gains, scene.drop, scene.gravity
     cut, cut_gains = cut_at_gate(chain, gains)
 
@@ -216,7 +216,7 @@ def _discrete(scene: Scene, *, quick: bool) -> Iterator[Method]:
         )
 
 
-def _continuum(scene: Scene, *, quick: bool) -> Iterator[Method]:
+def _continuum(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
     if scene.density is None:
         return
     if isinstance(scene.density, Uniform):
@@ -239,7 +239,7 @@ def _continuum(scene: Scene, *, quick: bool) -> Iterator[Method]:
         )
 
 
-def _even(scene: Scene, density: Uniform, *, quick: bool) -> Iterator[Method]:
+def _even(scene: PrecisionScene, density: Uniform, *, quick: bool) -> Iterator[Method]:
     """Closed form and quadratures."""
     reach = scene.gamma * scene.spacing_m
     rest = (scene.alpha, 1.0, scene.drop, scene.gravity)
@@ -275,7 +275,7 @@ def _ended(end: continuum.ContinuumEnd, nodes: int) -> Answer:
     return Answer(end.separation_m, end.speed_m_s, end.time_s, end.evaluations, nodes)
 
 
-def _integrated(scene: Scene, density: Density, solver: Solver, rtol: float) -> Answer:
+def _integrated(scene: PrecisionScene, density: Density, solver: Solver, rtol: float) -> Answer:
     end = density_ode.end(
         density,
         scene.alpha,
@@ -304,7 +304,7 @@ class _CutDensity:
         return self.whole.mass_over_density(z + self.height_m)
 
 
-def _contact(scene: Scene, *, quick: bool) -> Iterator[Method]:
+def _contact(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
     chain, gains = scene.chain, scene.gains
     cut, cut_gains = cut_at_gate(chain, gains)
     fell = (scene.drop, scene.gravity)

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from decimal import Decimal
 
     from rig.bench.methods import Answer, Method, Setting
-    from rig.bench.precision_reference import Model, Scene, Truth
+    from rig.bench.precision_reference import ExactAnswer, Model, PrecisionScene
 
-    Truths = dict[float | None, Truth]
+    Truths = dict[float | None, ExactAnswer]
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 """Relative errors of Δz for which the cheapest method is looked for."""
@@ -154,7 +154,7 @@ class _Trial:
 
 
 def precision(
-    chosen: Sequence[Scene] | None = None,
+    chosen: Sequence[PrecisionScene] | None = None,
     *,
     quick: bool = False,
     progress: Callable[[str], None] = lambda _line: None,
@@ -218,7 +218,7 @@ def as_json(found: Precision) -> dict[str, object]:
 
 
 def _tried(
-    scene: Scene,
+    scene: PrecisionScene,
     lines: Sequence[Method],
     left_out: list[LeftOut],
     progress: Callable[[str], None],
@@ -272,7 +272,7 @@ def _take_turns(trials: Sequence[_Trial]) -> None:
                 trial.times.append(time.perf_counter() - begin)
 
 
-def _truths(scene: Scene, trials: Sequence[_Trial]) -> tuple[Truth, Truths]:
+def _truths(scene: PrecisionScene, trials: Sequence[_Trial]) -> tuple[ExactAnswer, Truths]:
     """50 digits of each model: the discrete one, and by contact time (`None`: the continuum)."""
     others: Truths = {}
     if scene.density is not None:
@@ -284,7 +284,7 @@ def _truths(scene: Scene, trials: Sequence[_Trial]) -> tuple[Truth, Truths]:
     return discrete_truth(scene), others
 
 
-def _point(scene: Scene, trial: _Trial, discrete: Truth, others: Truths) -> Point:
+def _point(scene: PrecisionScene, trial: _Trial, discrete: ExactAnswer, others: Truths) -> Point:
     setting, answer, model = trial.setting, trial.answer, trial.method.model
     truth = discrete if model == "discrete" else others[setting.contact_time_s]
     times = trial.times
@@ -316,7 +316,7 @@ def absolute_error(found: float, exact: Decimal) -> float:
     return 0.0 if found == float(exact) else float(abs(type(exact)(found) - exact))
 
 
-def _gaps(scene: Scene, discrete: Truth, others: Truths) -> list[Gap]:
+def _gaps(scene: PrecisionScene, discrete: ExactAnswer, others: Truths) -> list[Gap]:
     return [
         Gap(
             scene.name,

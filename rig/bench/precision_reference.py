@@ -38,7 +38,7 @@ Model = Literal["discrete", "continuum", "contact"]
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class PrecisionScene:
     """One chain on one surface.
 
     Attributes
@@ -76,7 +76,7 @@ class Scene:
         return kicks(self.chain, [self.alpha] * self.chain.rods, self.gamma)
 
 
-class Truth(NamedTuple):
+class ExactAnswer(NamedTuple):
     """Δz (m), V (m/s) and when the top rod is `GATE_M` above the contact point (s)."""
 
     separation: Decimal
@@ -84,7 +84,7 @@ class Truth(NamedTuple):
     gate: Decimal
 
 
-def scenes() -> tuple[Scene, ...]:
+def scenes() -> tuple[PrecisionScene, ...]:
     """All four, all at 40° on the paper's surface."""
     length = paper.LENGTH
     return (
@@ -109,14 +109,16 @@ def scene(
     contact_times: tuple[float, ...] = CONTACT_TIMES,
     *,
     incline_deg: float = paper.MIDDLE_INCLINE,
-) -> Scene:
+) -> PrecisionScene:
     """Put a chain on the paper's surface."""
     impact = impact_on(paper.BARE, chain, incline_deg)
     spacing = chain.length / (chain.rods - 1)
-    return Scene(name, title, chain, impact.alpha, impact.gamma, density, spacing, contact_times)
+    return PrecisionScene(
+        name, title, chain, impact.alpha, impact.gamma, density, spacing, contact_times
+    )
 
 
-def discrete_truth(scene: Scene) -> Truth:
+def discrete_truth(scene: PrecisionScene) -> ExactAnswer:
     """Rod by rod, Eq. 9 and free fall."""
     with mp.workdps(DIGITS + _SPARE):
         g = mp.mpf(scene.gravity)
@@ -135,7 +137,7 @@ def discrete_truth(scene: Scene) -> Truth:
         return _truth(_separation(scene, time), arrival, gate)
 
 
-def contact_truth(scene: Scene, contact_time: float) -> Truth:
+def contact_truth(scene: PrecisionScene, contact_time: float) -> ExactAnswer:
     """Impacts that last: pull ΔV·(t/τ'²)·exp(−t/τ') each, τ' = τ/2, leg by leg in closed form.
 
     Parameters
@@ -176,7 +178,7 @@ def contact_truth(scene: Scene, contact_time: float) -> Truth:
         return _truth(_separation(scene, time), speed, gate)
 
 
-def continuum_truth(scene: Scene) -> Truth:
+def continuum_truth(scene: PrecisionScene) -> ExactAnswer:
     """Eq. 1 with Eq. 11: in closed form for an even density, else by quadrature of V's closed form.
 
     Raises
@@ -199,7 +201,7 @@ def continuum_truth(scene: Scene) -> Truth:
         return _truth(_separation(scene, time), speed, late)
 
 
-def _stops(scene: Scene) -> list[tuple[mpmath.mpf, mpmath.mpf | None]]:
+def _stops(scene: PrecisionScene) -> list[tuple[mpmath.mpf, mpmath.mpf | None]]:
     """Heights of the rods with their gains ΔV/V, and of the gate with None, in rising order."""
     masses = [mp.mpf(mass) for mass in scene.chain.masses]
     above = [*accumulate(reversed(masses[1:]))][::-1]
@@ -213,17 +215,17 @@ def _stops(scene: Scene) -> list[tuple[mpmath.mpf, mpmath.mpf | None]]:
     return sorted(stops, key=lambda stop: stop[0])
 
 
-def _separation(scene: Scene, time: mpmath.mpf) -> mpmath.mpf:
+def _separation(scene: PrecisionScene, time: mpmath.mpf) -> mpmath.mpf:
     """How far free fall from rest still is above the contact point, m."""
     top = mp.mpf(scene.drop) + mp.mpf(scene.chain.heights[-1])
     return top - mp.mpf(scene.gravity) * time**2 / 2
 
 
-def _truth(separation: mpmath.mpf, speed: mpmath.mpf, gate: mpmath.mpf) -> Truth:
-    return Truth(*(Decimal(mp.nstr(value, DIGITS)) for value in (separation, speed, gate)))
+def _truth(separation: mpmath.mpf, speed: mpmath.mpf, gate: mpmath.mpf) -> ExactAnswer:
+    return ExactAnswer(*(Decimal(mp.nstr(value, DIGITS)) for value in (separation, speed, gate)))
 
 
-def _uniform(scene: Scene) -> tuple[mpmath.mpf, Callable[..., mpmath.mpf]]:
+def _uniform(scene: PrecisionScene) -> tuple[mpmath.mpf, Callable[..., mpmath.mpf]]:
     """V at the end by Eq. 14, and the time from one height down to another by S15.
 
     With v = ((z + γs)/(z₀ + γs))^(1+2α), S15 is ∫ v^(b−1) (c − d v)^(−1/2) dv, b = (1+α)/(1+2α): a
@@ -248,7 +250,7 @@ def _uniform(scene: Scene) -> tuple[mpmath.mpf, Callable[..., mpmath.mpf]]:
 
 
 def _exponential(
-    scene: Scene, density: Exponential
+    scene: PrecisionScene, density: Exponential
 ) -> tuple[mpmath.mpf, Callable[..., mpmath.mpf]]:
     """The same where M/λ = (1 − e^−kz)/k.
 

@@ -49,7 +49,7 @@ accept: {release_skew: 5 ms, missed_edges: 5 %}
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class LadderScene:
     """A protocol to be measured.
 
     Attributes
@@ -65,7 +65,7 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class Quartiles:
     """Median and quartiles of all rounds."""
 
     median: float
@@ -120,24 +120,26 @@ class Cost:
 
     scene: str
     account: Account
-    seconds: dict[str, Spread]
-    ratios: dict[str, Spread]
+    seconds: dict[str, Quartiles]
+    ratios: dict[str, Quartiles]
 
 
-def ladder() -> list[Scene]:
+def ladder() -> list[LadderScene]:
     """The paper's chain, from free fall to the whole experiment."""
     two = "  B: {like: A}\n"
     air = "drag: {terminal_speed: 25 m/s}\n"
     return [
-        Scene("free fall", _scene()),
-        Scene("α given, level", _scene("surface: {}\n", _DROP, keys=", alpha: 0.25, gamma: 1")),
-        Scene("level surface", _scene(_LEVEL, _DROP)),
-        Scene("inclined", _scene(_INCLINED, _DROP, _PLAN)),
-        Scene("± on β, μ, drop", _scene(_UNSURE, _UNSURE_DROP, _PLAN)),
-        Scene("second chain", _scene(two, _UNSURE, _UNSURE_DROP, _PLAN)),
-        Scene("six inclines", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS)),
-        Scene("gates", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS, _GATES)),
-        Scene("drag, no gates", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS, air)),
+        LadderScene("free fall", _scene()),
+        LadderScene(
+            "α given, level", _scene("surface: {}\n", _DROP, keys=", alpha: 0.25, gamma: 1")
+        ),
+        LadderScene("level surface", _scene(_LEVEL, _DROP)),
+        LadderScene("inclined", _scene(_INCLINED, _DROP, _PLAN)),
+        LadderScene("± on β, μ, drop", _scene(_UNSURE, _UNSURE_DROP, _PLAN)),
+        LadderScene("second chain", _scene(two, _UNSURE, _UNSURE_DROP, _PLAN)),
+        LadderScene("six inclines", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS)),
+        LadderScene("gates", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS, _GATES)),
+        LadderScene("drag, no gates", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS, air)),
     ]
 
 
@@ -172,7 +174,7 @@ def scenes(
     RigError
         If a scene's process fails.
     """
-    extra = [Scene(path.stem, path.read_text("utf-8")) for path in ready]
+    extra = [LadderScene(path.stem, path.read_text("utf-8")) for path in ready]
     with TemporaryDirectory() as folder:
         wanted = [*ladder(), *extra]
         files = [Path(folder) / f"{number}.yaml" for number in range(len(wanted))]
@@ -251,24 +253,24 @@ def _seconds(protocol: Protocol, turns: int) -> float:
     return (time.perf_counter() - begin) / turns
 
 
-def _spreads(times: Mapping[str, Sequence[float]]) -> dict[str, Spread]:
+def _spreads(times: Mapping[str, Sequence[float]]) -> dict[str, Quartiles]:
     return {kind: _spread(values) for kind, values in times.items()}
 
 
 def _ratios(
     times: Mapping[str, Sequence[float]], simplest: Mapping[str, Sequence[float]]
-) -> dict[str, Spread]:
+) -> dict[str, Quartiles]:
     return {
         kind: _spread([a / b for a, b in zip(values, simplest[kind], strict=True)])
         for kind, values in times.items()
     }
 
 
-def _spread(values: Sequence[float]) -> Spread:
+def _spread(values: Sequence[float]) -> Quartiles:
     if len(values) == 1:
-        return Spread(values[0], values[0], values[0])
+        return Quartiles(values[0], values[0], values[0])
     low, median, high = statistics.quantiles(values, n=4, method="inclusive")
-    return Spread(median, low, high)
+    return Quartiles(median, low, high)
 
 
 def as_json(costs: Sequence[Cost]) -> dict[str, Any]:

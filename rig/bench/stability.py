@@ -29,7 +29,7 @@ SOUND = 343.0
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class StabilityRow:
     """One line of the table.
 
     Attributes
@@ -55,8 +55,8 @@ class Row:
 
 
 def stability(
-    scenes: Iterable[Extreme] | None = None, progress: Callable[[Row], None] | None = None
-) -> list[Row]:
+    scenes: Iterable[Extreme] | None = None, progress: Callable[[StabilityRow], None] | None = None
+) -> list[StabilityRow]:
     """Try every scene.
 
     Parameters
@@ -75,7 +75,7 @@ def stability(
     return rows
 
 
-def examine(scene: Extreme) -> Row:
+def examine(scene: Extreme) -> StabilityRow:
     """Try one scene; a warning counts as a failure."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -90,17 +90,17 @@ def examine(scene: Extreme) -> Row:
                 scene.initial_speed,
             )
         except DomainError as error:
-            return Row(scene.group, scene.value, None, None, "refused", error.message, "–")
+            return StabilityRow(scene.group, scene.value, None, None, "refused", error.message, "–")
         except (ArithmeticError, ValueError, Warning) as error:
             said = f"{type(error).__name__}: {error}"
-            return Row(scene.group, scene.value, None, None, "FAILED", said, "–")
+            return StabilityRow(scene.group, scene.value, None, None, "FAILED", said, "–")
     exact = _exact(scene)
     separation = relative_error(found.separation_m, exact.separation)
     speed = relative_error(found.speed_m_s, exact.speed)
     good = max(separation, speed) <= scene.allowed
     verdict = "FAILED" if not good else "noted" if impact.notes else "exact"
     note = "; ".join(impact.notes)
-    return Row(
+    return StabilityRow(
         scene.group, scene.value, separation, speed, verdict, note, _naive(scene, impact, exact)
     )
 
@@ -210,6 +210,6 @@ def _end_speed(ratio: float, rods: int, restitution: float) -> float:
     return fall(chain, impact.alpha, impact.gamma, 0.18, 9.81).speed_m_s
 
 
-def as_json(rows: Iterable[Row]) -> list[dict[str, object]]:
+def as_json(rows: Iterable[StabilityRow]) -> list[dict[str, object]]:
     """Rows as plain objects."""
     return [asdict(row) for row in rows]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Sequence
 
-    from rig.bench.scenes import Cost, Spread
+    from rig.bench.scenes import Cost, Quartiles
 
 
 def main(arguments: Namespace) -> int:
@@ -86,7 +86,7 @@ def table(costs: Sequence[Cost]) -> str:
     return "\n".join(lines)
 
 
-def _quartiles(spread: Spread, scale: float) -> str:
+def _quartiles(spread: Quartiles, scale: float) -> str:
     median, low, high = (value * scale for value in (spread.median, spread.low, spread.high))
     return f"{median:.4g} ({low:.4g}–{high:.4g})"
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.bench.stability import Row, sonic_lengths, stability
+from rig.bench.stability import StabilityRow, sonic_lengths, stability
 from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.files import write_atomic
@@ -45,7 +45,7 @@ def main(arguments: Namespace) -> int:
 _VERDICTS = ("exact", "noted", "refused", "FAILED")
 
 
-def _print_row(row: Row) -> None:
+def _print_row(row: StabilityRow) -> None:
     errors = [
         "–" if error is None else f"{error:.1e}"
         for error in (row.separation_error, row.speed_error)
@@ -58,14 +58,16 @@ def _print_row(row: Row) -> None:
     )
 
 
-def _write(folder: Path, rows: Sequence[Row], text: str) -> None:
+def _write(folder: Path, rows: Sequence[StabilityRow], text: str) -> None:
     """Write ``stability.csv`` and ``stability.json``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
     table = io.StringIO()
-    writer = csv.DictWriter(table, [field.name for field in fields(Row)], lineterminator="\n")
+    writer = csv.DictWriter(
+        table, [field.name for field in fields(StabilityRow)], lineterminator="\n"
+    )
     writer.writeheader()
     writer.writerows(asdict(row) for row in rows)
     write_atomic(folder / "stability.csv", table.getvalue())

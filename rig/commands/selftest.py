@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rig.commands.output import say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
-from rig.selftest.board import Options
+from rig.selftest.board import SelftestOptions
 from rig.selftest.run import selftest
 from rig.selftest.verdicts import Verdict
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Make all checks, one line each."""
-    options = Options(arguments.loopback, arguments.drops, arguments.release)
+    options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release)
     if options.release:
         say("release 0 is going to be driven once: keep clear of it")
     with closing(open_port(arguments.port)) as port:

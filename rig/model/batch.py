@@ -63,7 +63,7 @@ class Impacts:
 
 
 @dataclass(frozen=True, slots=True)
-class Falls:
+class FallBatch:
     """The ends of falls; every array has the shape to which the inputs broadcast.
 
     Attributes
@@ -152,7 +152,7 @@ def falls(
     drop: ArrayLike,
     gravity: ArrayLike,
     initial_speed: ArrayLike = 0.0,
-) -> Falls:
+) -> FallBatch:
     """Δz, V and t of many falls (Eq. 9 and section III.D).
 
     Parameters
@@ -183,7 +183,7 @@ def falls(
     found[:, ~valid] = np.nan
     in_domain = valid & np.broadcast_to(impacts.in_domain, shape).reshape(-1)
     separation, speed, time = (one.reshape(shape) for one in found)
-    return Falls(separation, speed, time, valid.reshape(shape), in_domain.reshape(shape))
+    return FallBatch(separation, speed, time, valid.reshape(shape), in_domain.reshape(shape))
 
 
 @dataclass(slots=True)

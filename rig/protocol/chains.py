@@ -16,7 +16,7 @@ from rig.protocol.yamltree import Mapping, Node, Sequence
 from rig.units import Dimension, Quantity, quoted
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Faults
+    from rig.protocol.fields import FieldFaults
     from rig.protocol.yamltree import Place
 
 CHAIN_KEYS = (
@@ -42,7 +42,9 @@ class _Described:
     given_name: Place
 
 
-def read_chains(node: Node, faults: Faults, *, seen_by_gates: bool) -> dict[str, RodChain] | None:
+def read_chains(
+    node: Node, faults: FieldFaults, *, seen_by_gates: bool
+) -> dict[str, RodChain] | None:
     """Read the ``chains`` mapping.
 
     Parameters
@@ -81,7 +83,7 @@ def read_chains(node: Node, faults: Faults, *, seen_by_gates: bool) -> dict[str,
     return result if result and len(result) == len(entries) else None
 
 
-def _named(outer: Mapping, name: str, node: Node, faults: Faults) -> _Described | None:
+def _named(outer: Mapping, name: str, node: Node, faults: FieldFaults) -> _Described | None:
     """Check a chain's name and the name behind its ``like``."""
     path = fields.join("chains", name)
     place = next(key.place for key, _ in outer.entries if getattr(key, "text", None) == name)
@@ -97,7 +99,7 @@ def _named(outer: Mapping, name: str, node: Node, faults: Faults) -> _Described 
     return _Described(inner, None, inner.place)
 
 
-def _bases_first(described: dict[str, _Described | None], faults: Faults) -> list[str]:
+def _bases_first(described: dict[str, _Described | None], faults: FieldFaults) -> list[str]:
     """Order the names so that a chain comes after the one it is like; drop what cannot be."""
     order: list[str] = []
     for name, one in described.items():

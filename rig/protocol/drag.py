@@ -13,7 +13,7 @@ from rig.units import Dimension
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.protocol.fields import Faults
+    from rig.protocol.fields import FieldFaults
     from rig.protocol.scene import RodChain
     from rig.protocol.yamltree import Node
 
@@ -22,7 +22,7 @@ DENSITY = Range(Dimension.DENSITY, 0.0, 100.0, "kg/m^3", open_low=True)
 TERMINAL_SPEED = Range(Dimension.SPEED, 0.01, 1e4, "m/s")
 
 
-def read_drag(node: Node, chains: Iterable[RodChain], faults: Faults) -> Drag | None:
+def read_drag(node: Node, chains: Iterable[RodChain], faults: FieldFaults) -> Drag | None:
     """Read the ``drag`` mapping.
 
     Parameters

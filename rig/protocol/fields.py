@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from rig.errors import Problem
-from rig.protocol.yamltree import Mapping, Node, Place, Scalar, Sequence
+from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
 from rig.units import Dimension, Quantity, UnitError, format_quantity, parse, quoted
 
 T = TypeVar("T")
 
 
 @dataclass(slots=True)
-class Faults:
+class FieldFaults:
     """The problems found so far in one file."""
 
     source: str
@@ -30,7 +30,7 @@ class Faults:
         self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, message))
 
 
-Converter = Callable[[Node, str, Faults], T | None]
+Converter = Callable[[Node, str, FieldFaults], T | None]
 
 
 class Section:
@@ -59,7 +59,7 @@ class Section:
         self,
         node: Mapping,
         path: str,
-        faults: Faults,
+        faults: FieldFaults,
         accepted: tuple[str, ...],
         *,
         lenient: bool = False,
@@ -125,13 +125,13 @@ def did_you_mean(word: str, known: tuple[str, ...]) -> str:
 
 
 def unique_entries(
-    node: Mapping, path: str, faults: Faults
+    node: Mapping, path: str, faults: FieldFaults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
     """Return the places and values of a mapping's keys, noting repeated keys and odd ones."""
     keys: dict[str, Place] = {}
     values: dict[str, Node] = {}
     for key, value in node.entries:
-        if not isinstance(key, Scalar):
+        if not isinstance(key, ScalarNode):
             faults.add(key.place, path, f"found {key} as a key; a word is wanted")
         elif key.text in keys:
             first = keys[key.text].line
@@ -143,7 +143,7 @@ def unique_entries(
     return keys, values
 
 
-def mapping(node: Node, key: str, faults: Faults) -> Mapping | None:
+def mapping(node: Node, key: str, faults: FieldFaults) -> Mapping | None:
     """Convert to a mapping."""
     if isinstance(node, Mapping):
         return node
@@ -151,7 +151,7 @@ def mapping(node: Node, key: str, faults: Faults) -> Mapping | None:
     return None
 
 
-def sequence(node: Node, key: str, faults: Faults) -> Sequence | None:
+def sequence(node: Node, key: str, faults: FieldFaults) -> Sequence | None:
     """Convert to a list with something in it."""
     if isinstance(node, Sequence) and node.items:
         return node
@@ -160,15 +160,15 @@ def sequence(node: Node, key: str, faults: Faults) -> Sequence | None:
     return None
 
 
-def string(node: Node, key: str, faults: Faults) -> str | None:
+def string(node: Node, key: str, faults: FieldFaults) -> str | None:
     """Convert to text."""
-    if isinstance(node, Scalar) and node.kind == "text":
+    if isinstance(node, ScalarNode) and node.kind == "text":
         # An escape sequence in a title would act on the terminal that shows it.
         if all(character.isprintable() or character == "\n" for character in node.text):
             return node.text
         faults.add(node.place, key, f"found {node} with control characters; plain text is wanted")
         return None
-    if isinstance(node, Scalar) and node.kind != "nothing":
+    if isinstance(node, ScalarNode) and node.kind != "nothing":
         wanted = f'text is wanted: put it in quotes, "{node}"'
         faults.add(node.place, key, f"found {node}, which is {node.kind}; {wanted}")
     else:
@@ -179,10 +179,10 @@ def string(node: Node, key: str, faults: Faults) -> str | None:
 def choice(*accepted: str) -> Converter[str]:
     """Return a converter to one of a few words."""
 
-    def convert(node: Node, key: str, faults: Faults) -> str | None:
-        if isinstance(node, Scalar) and node.text in accepted:
+    def convert(node: Node, key: str, faults: FieldFaults) -> str | None:
+        if isinstance(node, ScalarNode) and node.text in accepted:
             return node.text
-        close = did_you_mean(node.text, accepted) if isinstance(node, Scalar) else ""
+        close = did_you_mean(node.text, accepted) if isinstance(node, ScalarNode) else ""
         faults.add(node.place, key, f"found {node}; {close}accepted: {', '.join(accepted)}")
         return None
 
@@ -192,8 +192,8 @@ def choice(*accepted: str) -> Converter[str]:
 def whole(low: int, high: int) -> Converter[int]:
     """Return a converter to a whole number from `low` to `high`."""
 
-    def convert(node: Node, key: str, faults: Faults) -> int | None:
-        if isinstance(node, Scalar) and node.kind == "a whole number" and len(node.text) <= 30:
+    def convert(node: Node, key: str, faults: FieldFaults) -> int | None:
+        if isinstance(node, ScalarNode) and node.kind == "a whole number" and len(node.text) <= 30:
             sign, digits = (-1, node.text[1:]) if node.text[0] == "-" else (1, node.text)
             base = {"0o": 8, "0x": 16}.get(digits[:2], 10)
             number = sign * int(digits, base)
@@ -226,8 +226,8 @@ class Range:
 def quantity(accepted: Range) -> Converter[Quantity]:
     """Return a converter to a quantity, with its uncertainty if one is written."""
 
-    def convert(node: Node, key: str, faults: Faults) -> Quantity | None:
-        if not isinstance(node, Scalar) or node.kind in {"nothing", "a boolean"}:
+    def convert(node: Node, key: str, faults: FieldFaults) -> Quantity | None:
+        if not isinstance(node, ScalarNode) or node.kind in {"nothing", "a boolean"}:
             wanted = f"{accepted.dimension.noun} is wanted, e.g. {accepted.dimension.example}"
             faults.add(node.place, key, f"found {node}; {wanted}")
             return None
@@ -248,7 +248,7 @@ def exact(accepted: Range, hint: str = "no uncertainty is used here") -> Convert
     """Return a converter to a bare value; a written uncertainty is refused, not dropped."""
     inner = quantity(accepted)
 
-    def convert(node: Node, key: str, faults: Faults) -> float | None:
+    def convert(node: Node, key: str, faults: FieldFaults) -> float | None:
         read = inner(node, key, faults)
         if read is None:
             return None

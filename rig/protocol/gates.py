@@ -15,7 +15,7 @@ from rig.units import Dimension
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.protocol.fields import Faults
+    from rig.protocol.fields import FieldFaults
     from rig.protocol.yamltree import Node, Place
     from rig.units import Quantity
 
@@ -29,7 +29,7 @@ Located = tuple[Gate, "Place", str]
 
 
 def read_gates(
-    node: Node, faults: Faults, *, surface: bool, chains: int
+    node: Node, faults: FieldFaults, *, surface: bool, chains: int
 ) -> tuple[Gates, list[Located]] | None:
     """Read the ``gates`` mapping.
 
@@ -75,7 +75,9 @@ def read_gates(
     return Gates(tuple(gate for gate, _, _ in located), height_u), located
 
 
-def _gate(node: Node, key: str, faults: Faults, side: Side, used: dict[int, int]) -> Located | None:
+def _gate(
+    node: Node, key: str, faults: FieldFaults, side: Side, used: dict[int, int]
+) -> Located | None:
     """Read one gate; `used` maps each channel taken so far to its line."""
     inner = fields.mapping(node, key, faults)
     if inner is None:
@@ -98,7 +100,7 @@ def check_clear(
     located: Iterable[Located],
     chains: Iterable[RodChain],
     drop: Quantity,
-    faults: Faults,
+    faults: FieldFaults,
     *,
     surface: bool,
 ) -> None:

@@ -12,7 +12,7 @@ from rig.protocol.yamltree import Sequence
 from rig.units import Dimension
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Converter, Faults
+    from rig.protocol.fields import Converter, FieldFaults
     from rig.protocol.yamltree import Node
 
 HEIGHT = Range(Dimension.LENGTH, 0.0, 100.0, "m")
@@ -37,7 +37,7 @@ def read_masses(heights: tuple[float, ...]) -> Converter[Masses]:
         from point to point.
     """
 
-    def convert(node: Node, key: str, faults: Faults) -> Masses | None:
+    def convert(node: Node, key: str, faults: FieldFaults) -> Masses | None:
         if isinstance(node, Sequence):
             return _listed(node, key, faults, len(heights))
         inner = fields.mapping(node, key, faults)
@@ -57,7 +57,7 @@ def read_masses(heights: tuple[float, ...]) -> Converter[Masses]:
     return convert
 
 
-def _listed(node: Sequence, key: str, faults: Faults, rods: int) -> Masses | None:
+def _listed(node: Sequence, key: str, faults: FieldFaults, rods: int) -> Masses | None:
     """Convert one mass a rod."""
     if len(node.items) != rods:
         message = f"found {len(node.items)} masses for {rods} rods; one for each rod is wanted"
@@ -72,7 +72,7 @@ def _listed(node: Sequence, key: str, faults: Faults, rods: int) -> Masses | Non
 def _exponential(rods: int) -> Converter[Masses]:
     """Return the converter from the masses of the two end rods."""
 
-    def convert(node: Node, key: str, faults: Faults) -> Masses | None:
+    def convert(node: Node, key: str, faults: FieldFaults) -> Masses | None:
         inner = fields.mapping(node, key, faults)
         if inner is None:
             return None
@@ -90,7 +90,7 @@ def _exponential(rods: int) -> Converter[Masses]:
 def _table(heights: tuple[float, ...]) -> Converter[Masses]:
     """Return the converter from points between which the mass of a rod runs straight."""
 
-    def convert(node: Node, key: str, faults: Faults) -> Masses | None:
+    def convert(node: Node, key: str, faults: FieldFaults) -> Masses | None:
         listed = fields.sequence(node, key, faults)
         if listed is None:
             return None
@@ -115,7 +115,7 @@ def _table(heights: tuple[float, ...]) -> Converter[Masses]:
     return convert
 
 
-def _point(node: Node, key: str, faults: Faults) -> tuple[float, float] | None:
+def _point(node: Node, key: str, faults: FieldFaults) -> tuple[float, float] | None:
     """Convert one line of the table."""
     inner = fields.mapping(node, key, faults)
     if inner is None:

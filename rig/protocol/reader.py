@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from rig.errors import InputError
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
-from rig.protocol.fields import Faults, Range, Section
+from rig.protocol.fields import FieldFaults, Range, Section
 from rig.protocol.scene import AT_REST, PPS_U, Accept, Plan, Protocol, Release
-from rig.protocol.yamltree import Mapping, Place, Scalar, load
+from rig.protocol.yamltree import Mapping, Place, ScalarNode, load
 from rig.units import Dimension, Quantity
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Protocol:
         before = data[: error.start]
         line = before.count(b"\n") + 1
         column = len(before[before.rfind(b"\n") + 1 :].decode("utf-8")) + 1
-        faults = Faults(source)
+        faults = FieldFaults(source)
         faults.add(Place(line, column), "", "not UTF-8 text; save the file as UTF-8")
         raise InputError(problems=faults.problems.values()) from None
     return parse(text, source)
@@ -106,14 +106,14 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a page of text")
-    faults = Faults(source)
+    faults = FieldFaults(source)
     protocol = _protocol(load(text, source), faults, text, kept=kept)
     if faults.problems or protocol is None:
         raise InputError(problems=faults.problems.values())
     return protocol
 
 
-def _protocol(node: Node, faults: Faults, text: str, *, kept: bool) -> Protocol | None:
+def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Protocol | None:
     """Read the root mapping; ``None`` (and faults) if anything is wrong."""
     root = fields.mapping(node, "", faults)
     if root is None:
@@ -159,9 +159,9 @@ def _protocol(node: Node, faults: Faults, text: str, *, kept: bool) -> Protocol 
     )
 
 
-def _version(node: Node, key: str, faults: Faults) -> int | None:
+def _version(node: Node, key: str, faults: FieldFaults) -> int | None:
     """Convert the version of the file format: there is one so far."""
-    if isinstance(node, Scalar) and node.plain and node.text == "1":
+    if isinstance(node, ScalarNode) and node.plain and node.text == "1":
         return 1
     faults.add(node.place, key, f"found {node}; this software reads protocol: 1")
     return None
@@ -206,7 +206,7 @@ def _gates(top: Section, chains: dict[str, RodChain] | None, drop: Quantity | No
 def _chains(*, seen_by_gates: bool) -> Converter[dict[str, RodChain]]:
     """Return the converter to the chains."""
 
-    def convert(node: Node, _key: str, faults: Faults) -> dict[str, RodChain] | None:
+    def convert(node: Node, _key: str, faults: FieldFaults) -> dict[str, RodChain] | None:
         return read_chains(node, faults, seen_by_gates=seen_by_gates)
 
     return convert
@@ -216,7 +216,7 @@ def _count(node: Node | None) -> int:
     """Return how many chains the file names, whether or not they can be read."""
     if not isinstance(node, Mapping):
         return 1
-    return len({key.text for key, _ in node.entries if isinstance(key, Scalar)})
+    return len({key.text for key, _ in node.entries if isinstance(key, ScalarNode)})
 
 
 def _gravity(top: Section) -> Quantity | None:
@@ -233,7 +233,7 @@ def _gravity(top: Section) -> Quantity | None:
     return given if "gravity" in top else site
 
 
-def _site(node: Node, key: str, faults: Faults) -> Quantity | None:
+def _site(node: Node, key: str, faults: FieldFaults) -> Quantity | None:
     """Convert latitude and height to gravity."""
     inner = fields.mapping(node, key, faults)
     if inner is None:

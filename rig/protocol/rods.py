@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
-from rig.protocol.yamltree import Scalar
+from rig.protocol.yamltree import ScalarNode
 from rig.units import Dimension
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Faults
+    from rig.protocol.fields import FieldFaults
     from rig.protocol.yamltree import Node, Sequence
 
 DIAMETER = Range(Dimension.LENGTH, 1e-6, 1.0, "mm")
@@ -79,9 +79,9 @@ def _spread(values: list[float], counts: list[int]) -> tuple[float, ...]:
     return tuple(v for v, count in zip(values, counts, strict=True) for _ in range(count))
 
 
-def _groups(node: Node, key: str, faults: Faults) -> list[_Group] | None:
+def _groups(node: Node, key: str, faults: FieldFaults) -> list[_Group] | None:
     """Convert a number of rods, or a list of groups."""
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         count = fields.whole(2, MOST_RODS)(node, key, faults)
         return None if count is None else [_Group(count, None, None)]
     items: Sequence | None = fields.sequence(node, key, faults)
@@ -92,7 +92,7 @@ def _groups(node: Node, key: str, faults: Faults) -> list[_Group] | None:
     return found if len(found) == len(groups) else None
 
 
-def _group(node: Node, key: str, faults: Faults) -> _Group | None:
+def _group(node: Node, key: str, faults: FieldFaults) -> _Group | None:
     """Convert one group."""
     inner = fields.mapping(node, key, faults)
     if inner is None:

@@ -8,11 +8,11 @@ from rig.boards import RELEASES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.scene import Accept, Order, Plan, Release
-from rig.protocol.yamltree import Scalar
+from rig.protocol.yamltree import ScalarNode
 from rig.units import Dimension
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Converter, Faults
+    from rig.protocol.fields import Converter, FieldFaults
     from rig.protocol.yamltree import Node
 
 # A coil that is held longer than this burns; one pulsed shorter does not pull.
@@ -42,7 +42,7 @@ def read_settings(
     )
 
 
-def _release(node: Node, key: str, faults: Faults) -> Release | None:
+def _release(node: Node, key: str, faults: FieldFaults) -> Release | None:
     """Convert to the release actuator."""
     inner = fields.mapping(node, key, faults)
     if inner is None:
@@ -54,7 +54,7 @@ def _release(node: Node, key: str, faults: Faults) -> Release | None:
     return None if channel is None or pulse is None else Release(channel, pulse)
 
 
-def _accept(node: Node, key: str, faults: Faults) -> Accept | None:
+def _accept(node: Node, key: str, faults: FieldFaults) -> Accept | None:
     """Convert to the limits of a valid run."""
     inner = fields.mapping(node, key, faults)
     if inner is None:
@@ -69,7 +69,7 @@ def _accept(node: Node, key: str, faults: Faults) -> Accept | None:
 def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:
     """Return the converter to the plan."""
 
-    def convert(node: Node, key: str, faults: Faults) -> Plan | None:
+    def convert(node: Node, key: str, faults: FieldFaults) -> Plan | None:
         inner = fields.mapping(node, key, faults)
         if inner is None:
             return None
@@ -111,10 +111,10 @@ def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:
     return convert
 
 
-def _inclines(node: Node, key: str, faults: Faults) -> tuple[float, ...] | None:
+def _inclines(node: Node, key: str, faults: FieldFaults) -> tuple[float, ...] | None:
     """Convert one angle or a list of different angles, degrees."""
     convert = fields.exact(INCLINE)
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         angle = convert(node, key, faults)
         return None if angle is None else (angle,)
     listed = fields.sequence(node, key, faults)

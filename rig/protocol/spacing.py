@@ -13,7 +13,7 @@ from rig.protocol.yamltree import Sequence
 from rig.units import Dimension, Quantity, format_quantity
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Faults, Section
+    from rig.protocol.fields import FieldFaults, Section
     from rig.protocol.yamltree import Node
 
 GAP = Range(Dimension.LENGTH, 1e-6, 10.0, "m")
@@ -28,7 +28,7 @@ class Spacing:
     gaps: tuple[float, ...] = ()
 
 
-def read_spacing(node: Node, key: str, faults: Faults) -> Spacing | None:
+def read_spacing(node: Node, key: str, faults: FieldFaults) -> Spacing | None:
     """Convert a rule or a list of distances."""
     if not isinstance(node, Sequence):
         rule = fields.choice(*_RULES)(node, key, faults)

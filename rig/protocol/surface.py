@@ -10,7 +10,7 @@ from rig.protocol.fields import Range, Section
 from rig.units import Dimension, Quantity
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Faults
+    from rig.protocol.fields import FieldFaults
     from rig.protocol.yamltree import Node
 
 # An effective restitution below zero is a pile that gives way (the paper finds −0.37).
@@ -19,7 +19,7 @@ FRICTION = Range(Dimension.NUMBER, 0.0, 10.0, "1")
 BELOW = Range(Dimension.ANGLE, 0.0, 90.0, "deg", open_low=True)
 
 
-def read_surface(node: Node, faults: Faults, *, needs_restitution: bool) -> Surface | None:
+def read_surface(node: Node, faults: FieldFaults, *, needs_restitution: bool) -> Surface | None:
     """Read the ``surface`` mapping.
 
     Parameters
@@ -52,7 +52,7 @@ def read_surface(node: Node, faults: Faults, *, needs_restitution: bool) -> Surf
     return Surface(restitution, friction, pile)
 
 
-def _pile(node: Node, key: str, faults: Faults) -> Pile | None:
+def _pile(node: Node, key: str, faults: FieldFaults) -> Pile | None:
     """Convert the rule for rods that gather on a nearly level surface."""
     inner = fields.mapping(node, key, faults)
     if inner is None:

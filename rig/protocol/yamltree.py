@@ -42,7 +42,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Scalar:
+class ScalarNode:
     """A scalar as written; `plain` when it stood without quotes."""
 
     text: str
@@ -89,7 +89,7 @@ class Mapping:
         return "a mapping"
 
 
-Node = Scalar | Sequence | Mapping
+Node = ScalarNode | Sequence | Mapping
 
 
 def place_of(root: Node, *path: str | int) -> Place:
@@ -119,7 +119,7 @@ def load(text: str, source: str) -> Node:
 
     Returns
     -------
-    Scalar, Sequence or Mapping
+    ScalarNode, Sequence or Mapping
         The root.
 
     Raises
@@ -204,7 +204,7 @@ class _Builder:
             # "\uD800" in double quotes makes half a character, which no file or database takes.
             if any("\ud800" <= character <= "\udfff" for character in event.value):
                 _fail(self.source, place, "found half of a surrogate pair")
-            scalar = Scalar(event.value, event.style is None, place)
+            scalar = ScalarNode(event.value, event.style is None, place)
             if event.anchor:
                 self.anchors[event.anchor] = scalar
             self._add(scalar, place)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.recover.drops import Fate, Recovered, recover_drops
 from rig.recover.pages import MAGIC, Pages, read_pages
 from rig.recover.rows import Rows, find_rows, gaps
-from rig.recover.snapshot import Snapshot, take_snapshot
+from rig.recover.snapshot import SessionCopy, take_snapshot
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Examined:
         What nothing brings back.
     """
 
-    snapshot: Snapshot
+    snapshot: SessionCopy
     pages: Pages
     rows: Rows
     drops: list[Recovered]
@@ -127,7 +127,7 @@ def describe(found: Examined) -> list[str]:
     return lines
 
 
-def _foreign(snapshot: Snapshot, pages: Pages, rows: Rows) -> str:
+def _foreign(snapshot: SessionCopy, pages: Pages, rows: Rows) -> str:
     if not snapshot.data:
         return "it is empty"
     first = pages.pages.get(1, b"")
@@ -142,7 +142,7 @@ def _foreign(snapshot: Snapshot, pages: Pages, rows: Rows) -> str:
     return ""
 
 
-def _damage(snapshot: Snapshot, pages: Pages, rows: Rows) -> list[str]:
+def _damage(snapshot: SessionCopy, pages: Pages, rows: Rows) -> list[str]:
     damage = []
     if pages.missing:
         damage.append(f"{pages.missing} of {pages.expected} pages are not there: the file is torn")

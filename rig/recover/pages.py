@@ -67,7 +67,7 @@ def read_pages(data: bytes) -> Pages:
     return Pages(size - reserved, expected, pages)
 
 
-class Cell(NamedTuple):
+class PageCell(NamedTuple):
     """One record; `rowid` is `None` in an index, and in a table that is kept as one."""
 
     rowid: int | None
@@ -78,14 +78,14 @@ class BadCellError(ValueError):
     """Bytes that are no record."""
 
 
-class Found(NamedTuple):
+class PageRecords(NamedTuple):
     """The records of a page, and how many of its cells are none."""
 
-    cells: list[Cell]
+    cells: list[PageCell]
     bad: int
 
 
-def read_cells(pages: Pages, number: int) -> Found:
+def read_cells(pages: Pages, number: int) -> PageRecords:
     """Read all records of a page; a page without records has none.
 
     Parameters
@@ -99,11 +99,11 @@ def read_cells(pages: Pages, number: int) -> Found:
     start = _HEADER if number == 1 else 0
     kind = page[start]
     if kind not in {TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR}:
-        return Found([], 0)
+        return PageRecords([], 0)
     count = int.from_bytes(page[start + 3 : start + 5], "big")
     pointers = start + (12 if kind == INDEX_INTERIOR else 8)
     if pointers + 2 * count > pages.usable:
-        return Found([], 1)
+        return PageRecords([], 1)
     found, bad = [], 0
     for n in range(count):
         at = int.from_bytes(page[pointers + 2 * n : pointers + 2 * n + 2], "big")
@@ -111,10 +111,10 @@ def read_cells(pages: Pages, number: int) -> Found:
             found.append(_cell(pages, page, kind, at))
         except (BadCellError, IndexError, struct.error):
             bad += 1
-    return Found(found, bad)
+    return PageRecords(found, bad)
 
 
-def _cell(pages: Pages, page: bytes, kind: int, at: int) -> Cell:
+def _cell(pages: Pages, page: bytes, kind: int, at: int) -> PageCell:
     """Read a cell, sections 1.6 and 2.1."""
     if kind == INDEX_INTERIOR:
         at += 4  # the page to its left
@@ -122,7 +122,7 @@ def _cell(pages: Pages, page: bytes, kind: int, at: int) -> Cell:
     rowid = None
     if kind == TABLE_LEAF:
         rowid, at = _varint(page, at)
-    return Cell(rowid, tuple(_record(_payload(pages, page, kind, at, size))))
+    return PageCell(rowid, tuple(_record(_payload(pages, page, kind, at, size))))
 
 
 def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:

@@ -10,7 +10,7 @@ from rig.recover.pages import read_cells
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from rig.recover.pages import Cell, Pages, Value
+    from rig.recover.pages import PageCell, Pages, Value
 
 Row: TypeAlias = "tuple[Value, ...]"
 
@@ -61,7 +61,7 @@ def gaps(numbers: dict[int, Row]) -> int:
     return max(numbers) - len(numbers) if numbers else 0
 
 
-def _sort(rows: Rows, cell: Cell) -> None:
+def _sort(rows: Rows, cell: PageCell) -> None:
     rowid, values = cell
     if rowid is None:
         match values:

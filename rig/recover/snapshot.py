@@ -14,7 +14,7 @@ from rig.errors import SessionError
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class SessionCopy:
     """A session file.
 
     Attributes
@@ -41,7 +41,7 @@ class Snapshot:
     complaints: tuple[str, ...]
 
 
-def take_snapshot(path: str | os.PathLike[str]) -> Snapshot:
+def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
     """Read a session file and ask SQLite about a copy of it.
 
     Raises
@@ -73,7 +73,7 @@ def take_snapshot(path: str | os.PathLike[str]) -> Snapshot:
             f"cannot read {path}: {error.strerror or error}",
             "check its name and permissions, and that there is room for a copy in TMPDIR",
         ) from error
-    return Snapshot(place, data, logged, writer, os.access(place, os.W_OK), complaints)
+    return SessionCopy(place, data, logged, writer, os.access(place, os.W_OK), complaints)
 
 
 def _writer(place: Path) -> str:

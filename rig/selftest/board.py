@@ -11,7 +11,7 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import watch_gates
 from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
-from rig.selftest.line import Heard, Line
+from rig.selftest.line import Heard, RawLine
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _WATCH_S = 0.4
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class SelftestOptions:
     """What the user allows and has wired.
 
     Attributes
@@ -90,8 +90,8 @@ class BoardUnderTest:
         Longest round trip of the pings; the slack that time limits get.
     """
 
-    def __init__(self, port: Port, clock: Clock, options: Options) -> None:
-        self.line = Line(port, clock)
+    def __init__(self, port: Port, clock: Clock, options: SelftestOptions) -> None:
+        self.line = RawLine(port, clock)
         self.clock = clock
         self.options = options
         self.identity: wire.Identity | None = None

@@ -23,7 +23,7 @@ class Heard(NamedTuple):
     message: wire.Message
 
 
-class Line:
+class RawLine:
     """A port without any of the client's courtesies: nothing is repeated, nothing is added.
 
     Parameters

@@ -9,14 +9,14 @@ from rig.errors import DeviceError
 from rig.link.messages import MessageError
 from rig.selftest import arming, drops, greeting, line_checks
 from rig.selftest.board import BoardUnderTest
-from rig.selftest.verdicts import CheckFailedError, NotPossibleError, Outcome, Verdict
+from rig.selftest.verdicts import CheckFailedError, CheckResult, NotPossibleError, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-    from rig.selftest.board import Options
+    from rig.selftest.board import SelftestOptions
 
 
 class Check(NamedTuple):
@@ -67,7 +67,7 @@ CHECKS = (
 )
 
 
-def selftest(port: Port, clock: Clock, options: Options) -> Iterator[Outcome]:
+def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[CheckResult]:
     """Make every check, one after the other.
 
     Parameters
@@ -79,7 +79,7 @@ def selftest(port: Port, clock: Clock, options: Options) -> Iterator[Outcome]:
 
     Yields
     ------
-    Outcome
+    CheckResult
         As soon as it is known. When the board is silent the rest is not possible.
 
     Raises
@@ -92,7 +92,7 @@ def selftest(port: Port, clock: Clock, options: Options) -> Iterator[Outcome]:
     try:
         for check in CHECKS:
             if silent:
-                yield Outcome(check.name, Verdict.NOT_POSSIBLE, silent)
+                yield CheckResult(check.name, Verdict.NOT_POSSIBLE, silent)
                 continue
             outcome = _made(check, board)
             yield outcome
@@ -107,19 +107,19 @@ def selftest(port: Port, clock: Clock, options: Options) -> Iterator[Outcome]:
             board.settle()
 
 
-def _made(check: Check, board: BoardUnderTest) -> Outcome:
+def _made(check: Check, board: BoardUnderTest) -> CheckResult:
     try:
         if board.identity is not None:
             board.settle()
         if check.idle:
             board.need_idle()
-        return Outcome(check.name, Verdict.OK, check.make(board))
+        return CheckResult(check.name, Verdict.OK, check.make(board))
     except CheckFailedError as failed:
-        return Outcome(check.name, Verdict.FAILED, str(failed))
+        return CheckResult(check.name, Verdict.FAILED, str(failed))
     except NotPossibleError as why:
-        return Outcome(check.name, Verdict.NOT_POSSIBLE, str(why))
+        return CheckResult(check.name, Verdict.NOT_POSSIBLE, str(why))
     except MessageError as error:
-        return Outcome(check.name, Verdict.FAILED, f"it sent what is no message: {error}")
+        return CheckResult(check.name, Verdict.FAILED, f"it sent what is no message: {error}")
 
 
 def _lost(board: BoardUnderTest) -> str:

@@ -20,8 +20,8 @@ from rig.session.timer_table import (
     NUMBER,
     STATE,
     TIME,
-    Cell,
     Row,
+    TableCell,
     cells_of,
     has_number,
     heading_of,
@@ -145,7 +145,7 @@ def _columns(
     return [_Column(0, 1 if len(cells) > 1 else None, 0)]
 
 
-def _power(number: int, cell: Cell, headings: list[Row], n: int, problems: ProblemList) -> int:
+def _power(number: int, cell: TableCell, headings: list[Row], n: int, problems: ProblemList) -> int:
     """Decimal power from the heading's unit to seconds; units may have a line of their own."""
     match = _UNIT.search(cell.text)
     unit = match[1].lower() if match else "s"
@@ -159,11 +159,15 @@ def _power(number: int, cell: Cell, headings: list[Row], n: int, problems: Probl
 
 
 def _row(
-    number: int, cells: list[Cell], columns: list[_Column], separator: str, problems: ProblemList
+    number: int,
+    cells: list[TableCell],
+    columns: list[_Column],
+    separator: str,
+    problems: ProblemList,
 ) -> None:
     """Read one row's value of every run; runs that ended earlier have blanks."""
     for column in columns:
-        cell = cells[column.times] if column.times < len(cells) else Cell(1, "")
+        cell = cells[column.times] if column.times < len(cells) else TableCell(1, "")
         if not cell.text:
             continue
         text = cell.text if separator == "," else cell.text.replace(",", ".", 1)
@@ -175,7 +179,7 @@ def _row(
             continue
         state: bool | None = None
         if column.states is not None:
-            state_cell = cells[column.states] if column.states < len(cells) else Cell(1, "")
+            state_cell = cells[column.states] if column.states < len(cells) else TableCell(1, "")
             value = state_cell.text.lower()
             value = value.rstrip("0").rstrip(".,") or "0" if NUMBER.fullmatch(value) else value
             if value not in BLOCKED | CLEAR:

@@ -24,14 +24,14 @@ _DERIVED = re.compile(r"dist|pos|vel|speed|accel|count|height|^[dvasx]$", re.IGN
 NUMBER = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
 
 
-class Cell(NamedTuple):
+class TableCell(NamedTuple):
     """A value and the column, from 1, at which it stands."""
 
     column: int
     text: str
 
 
-Row = tuple[int, list[Cell]]
+Row = tuple[int, list[TableCell]]
 
 
 def is_logger_table(path: str | os.PathLike[str]) -> bool:
@@ -94,7 +94,7 @@ def separator_of(lines: list[str]) -> str:
     return ","
 
 
-def cells_of(line: str, separator: str) -> list[Cell]:
+def cells_of(line: str, separator: str) -> list[TableCell]:
     """Split a line; quotes hold a value together."""
     found, start, quoted = [], 0, False
     for position, character in enumerate([*line, separator]):
@@ -104,12 +104,12 @@ def cells_of(line: str, separator: str) -> list[Cell]:
             raw = line[start:position]
             text = raw.strip()
             lead = len(raw) - len(raw.lstrip())
-            found.append(Cell(start + lead + 1, text.strip('"').strip()))
+            found.append(TableCell(start + lead + 1, text.strip('"').strip()))
             start = position + 1
     return found
 
 
-def is_data(cells: list[Cell], separator: str) -> bool:
+def is_data(cells: list[TableCell], separator: str) -> bool:
     """Whether a row holds numbers and states only."""
     texts = [cell.text for cell in cells if cell.text]
     numbers = [text for text in texts if is_number(text, separator)]
@@ -118,7 +118,7 @@ def is_data(cells: list[Cell], separator: str) -> bool:
     )
 
 
-def has_number(cells: list[Cell], separator: str) -> bool:
+def has_number(cells: list[TableCell], separator: str) -> bool:
     """Whether any cell is a number and nothing else."""
     return any(is_number(cell.text, separator) for cell in cells)
 

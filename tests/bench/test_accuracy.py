@@ -1,4 +1,4 @@
-"""The benchmark's own arithmetic: dials doubled, rivals on a perfect fall, bias and coverage."""
+"""The benchmark's own arithmetic: dials doubled, baselines on a perfect fall, bias and coverage."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from rig.bench.baselines import plain_fit, two_gate_timer
 from rig.bench.dials import DOUBLED, STACK, doubled, with_setting
 from rig.bench.fast_accuracy import _falls, _sessions, fast_accuracy
 from rig.errors import RigError
+from rig.ports import read_settings
 from rig.protocol.plan import runs
 from sim.dials import Dials, read_dials
-from sim.scene import read_settings
 from tests.analysis.drops import PROTOCOLS, SINGLE, UNIFORM, case
 
 

@@ -6,7 +6,7 @@ import random
 
 from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.selftest.line import Line
+from rig.selftest.line import RawLine
 from tests.link.bench import GATES, LABEL, Bench
 
 ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "record_ms": 150}
@@ -63,7 +63,7 @@ class LossyPort(NoisyPort):
         return b"" if self.clock.now_ns() < self.lose_rx_until_ns else data
 
 
-class Wire(Line):
+class Wire(RawLine):
     """Speaks in single frames, with any seq, once the device has booted."""
 
     def __init__(self, bench: Bench) -> None:

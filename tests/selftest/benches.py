@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.selftest.board import Options
+from rig.selftest.board import SelftestOptions
 from rig.selftest.run import selftest
 from sim.board import VirtualBoard
 from sim.serial_port import SimulatedSerial
@@ -33,7 +33,7 @@ class LoopedBoard(VirtualBoard):
 
 def outcomes(port, loopback=GATE, drops=5, release=True):
     """Test a board; give its outcomes by the name of the check."""
-    found = list(selftest(port, port.clock, Options(loopback, drops, release)))
+    found = list(selftest(port, port.clock, SelftestOptions(loopback, drops, release)))
     assert len({outcome.name for outcome in found}) == len(found)
     return {outcome.name: outcome for outcome in found}
 

@@ -8,7 +8,7 @@ from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
 from rig.link.messages import Reason
-from rig.selftest.board import Options
+from rig.selftest.board import SelftestOptions
 from rig.selftest.requests import BAD_ORDERS
 from rig.selftest.run import CHECKS, selftest
 from rig.selftest.verdicts import Verdict
@@ -116,7 +116,7 @@ def test_what_is_no_message_is_a_failure(monkeypatch):
 
 def test_a_cable_that_is_pulled_is_said(monkeypatch):
     port = port_of(LoopedBoard(Wire()))
-    tests = selftest(port, port.clock, Options())
+    tests = selftest(port, port.clock, SelftestOptions())
     next(tests)
 
     def gone(*_):

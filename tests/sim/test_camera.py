@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rig.model.camera import FRAME_RATE_HZ, SPEED_FRAMES
-from sim.camera import POSITION_NOISE_M, camera_reading
+from sim.camera import FRAME_RATE_HZ, POSITION_NOISE_M, SPEED_FRAMES, camera_reading
 
 HIT = 0.5
 SPEED = 6.93

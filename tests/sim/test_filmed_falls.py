@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.model.camera import FRAME_RATE_HZ, SPEED_FRAMES, frame_times, read_frames
 from rig.model.chain import Chain
 from rig.model.fall import free_fall_speed, kicks
 from rig.model.impact import alpha_inclined, gamma_finite
 from rig.model.motion import Motion
+from sim.camera import FRAME_RATE_HZ, SPEED_FRAMES, frame_times, read_frames
 from tests.examples import examples
 from tests.model.chains import even_chain
 
