@@ -13,12 +13,12 @@ from itertools import groupby
 from pathlib import Path
 from subprocess import PIPE, Popen
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 
 from rig.analysis.session import analyze
 from rig.bench.accuracy import AccuracyTally
-from rig.bench.dials import with_setting
 from rig.clock.calibration import TimeScale
 from rig.errors import RigError
 from rig.protocol import reader
@@ -35,6 +35,27 @@ BLOCK = 4
 HZ = 16_000_000
 CLOCK_U = 1e-6
 """How well the time scale is known, relative: a few minutes of clock samples."""
+DOUBLED = {
+    "skew_sd": "4 ms",
+    "delay_sd": "2 ms",
+    "hang_sd": "0.2 mm",
+    "drop_error": "1",
+    "rod_sd": "0.6 mm",
+    "width_sd": "0.2 mm",
+    "gate_sd": "0.4 mm",
+    "beam_sd": "1 mm",
+    "impulse_sd": "0.04",
+    "jitter_sd": "4 us",
+    "missed": "2 %",
+    "chatter": "1 %",
+    "string": "0.4 %",
+    "bounce": "10 %",
+    "clock": "-2600 ppm",
+    "latency": "0.6 ms",
+}
+"""Dials of the simulated rig at twice their default, as a port's URL takes them."""
+STACK = ("clock", "latency")
+"""Dials that only show where a board and a line stand between the chains and the analysis."""
 
 
 def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
@@ -117,3 +138,13 @@ def _session(
     for result in (*found.runs, *found.superseded):
         key = result.run.number, result.attempt
         tally.add(protocol, result, by_key[key], scale.hz, truths[key])
+
+
+def doubled(url: str, dial: str) -> str:
+    """Set one dial in a port's URL."""
+    return with_setting(url, dial, DOUBLED[dial])
+
+
+def with_setting(url: str, name: str, value: str) -> str:
+    """Add a setting to a port's URL."""
+    return f"{url}{'&' if '?' in url else '?'}{name}={quote(value)}"

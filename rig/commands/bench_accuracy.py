@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.bench.acceptance import acceptance_table
 from rig.bench.accuracy import accuracy
-from rig.bench.dials import DOUBLED, STACK, doubled
-from rig.bench.fast_accuracy import BLOCK, fast_accuracy
+from rig.bench.fast_accuracy import BLOCK, DOUBLED, STACK, doubled, fast_accuracy
 from rig.commands.output import print_json, say
 from rig.measurands import MEASURANDS
 

@@ -10,8 +10,15 @@ import pytest
 from rig.bench.acceptance import acceptance_table, failures
 from rig.bench.accuracy import Errors
 from rig.bench.baselines import plain_fit, two_gate_timer
-from rig.bench.dials import DOUBLED, STACK, doubled, with_setting
-from rig.bench.fast_accuracy import _falls, _sessions, fast_accuracy
+from rig.bench.fast_accuracy import (
+    DOUBLED,
+    STACK,
+    _falls,
+    _sessions,
+    doubled,
+    fast_accuracy,
+    with_setting,
+)
 from rig.errors import RigError
 from rig.ports import read_settings
 from rig.protocol.plan import runs
