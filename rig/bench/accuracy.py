@@ -163,9 +163,9 @@ class AccuracyTally:
         }
         if self.speed_shares:
             found["speed_rms_relative"] = math.sqrt(fmean(one**2 for one in self.speed_shares))
-        for rival, errors in (("camera_480_fps", self.camera), ("two_gate_timer", self.timer)):
+        for baseline, errors in (("camera_480_fps", self.camera), ("two_gate_timer", self.timer)):
             if errors:
-                found[rival] = {name: _plain(one) for name, one in errors.items()}
+                found[baseline] = {name: _plain(one) for name, one in errors.items()}
         found["analysis_ms_per_run"] = 1e3 * self.analysis_s / self.verdicts.total()
         if self.plain_s:
             results = sum(self.verdicts[verdict] for verdict in GOOD)

@@ -25,7 +25,7 @@ RIGS = 260
 
 def main(arguments: Namespace) -> int:
     """Measure accuracy over several simulated sessions."""
-    found = _proof(arguments) if arguments.doubled else _stack(arguments, arguments.port)
+    found = _acceptance(arguments) if arguments.doubled else _stack(arguments, arguments.port)
     if arguments.json:
         print_json(found)
     elif arguments.doubled:
@@ -41,7 +41,7 @@ def _stack(arguments: Namespace, port: str, repeats: int | None = None) -> dict[
     return accuracy(arguments.protocol, port, seeds, say, repeats or arguments.repeats)
 
 
-def _proof(arguments: Namespace) -> dict[str, Any]:
+def _acceptance(arguments: Namespace) -> dict[str, Any]:
     """Measure with each dial of the simulation doubled, many rigs each, several at a time."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
     rigs = arguments.seeds or RIGS
@@ -84,8 +84,8 @@ def _table(found: Mapping[str, Any]) -> list[str]:
             f"{errors['bias_over_U']:8.2f}  {errors['coverage']:.1%}"
             + (f" ± {errors['coverage_se']:.1%}" if "coverage_se" in errors else "")
         )
-    for rival, label in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
-        for name, errors in found.get(rival, {}).items():
+    for baseline, label in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
+        for name, errors in found.get(baseline, {}).items():
             row = MEASURANDS[name]
             rms, bias, worst = (errors[key] * row.fine_scale for key in ("rms", "bias", "worst"))
             lines.append(

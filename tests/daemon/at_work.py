@@ -17,18 +17,22 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def working(stand: ProcessFixture) -> Iterator[tuple[Worker, Callable[..., Any]]]:
+def working(processes: ProcessFixture) -> Iterator[tuple[Worker, Callable[..., Any]]]:
     """Have a worker at a board, with a session open, and a way to ask it; control never lapses."""
     lease = Lease(lambda: 0.0)
     lease.take("me", "a test")
-    worker = Worker(str(stand.port), PublishedState(), lease)
+    worker = Worker(str(processes.port), PublishedState(), lease)
     worker.start()
 
     def ask(work: Callable[..., Any]) -> Any:
         return worker.submit(work, "me").result(PATIENCE_S)
 
     try:
-        ask(lambda controller: controller.open_session(str(stand.protocol), str(stand.session)))
+        ask(
+            lambda controller: controller.open_session(
+                str(processes.protocol), str(processes.session)
+            )
+        )
         yield worker, ask
     finally:
         worker.end()

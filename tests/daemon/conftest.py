@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def stand() -> Iterator[ProcessFixture]:
+def processes() -> Iterator[ProcessFixture]:
     """Have a board and a daemon for a protocol of two runs."""
     with ProcessFixture(runs=2, seed=3) as made:
         made.start_daemon()
@@ -23,12 +23,12 @@ def stand() -> Iterator[ProcessFixture]:
 
 
 @pytest.fixture
-def client(stand: ProcessFixture) -> Iterator[Callable[[str], Client]]:
+def client(processes: ProcessFixture) -> Iterator[Callable[[str], Client]]:
     """Connect clients that are gone at the end of the test."""
     made: list[Client] = []
 
     def connect(name: str) -> Client:
-        made.append(stand.client(name))
+        made.append(processes.client(name))
         return made[-1]
 
     yield connect

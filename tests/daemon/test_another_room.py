@@ -13,15 +13,15 @@ from tests.daemon.far_port import FarPort
 
 @pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
 def test_a_session_survives_a_connection_that_is_lost_while_chains_fall(scheme):
-    with ProcessFixture(1) as stand, FarPort(stand.port, scheme) as far:
-        stand.port = far.url
-        stand.start_daemon()
-        stand.start_runner()
-        stand.await_phase(Phase.RECORDING)
+    with ProcessFixture(1) as processes, FarPort(processes.port, scheme) as far:
+        processes.port = far.url
+        processes.start_daemon()
+        processes.start_runner()
+        processes.await_phase(Phase.RECORDING)
         far.hang_up()
-        assert stand.waited() == 4
-        assert "connection lost" in stand.told
-        assert stand.run() == 0, stand.told
-        assert broken(stand.session, stand.happened(), 1) == []
+        assert processes.waited() == 4
+        assert "connection lost" in processes.told
+        assert processes.run() == 0, processes.told
+        assert broken(processes.session, processes.happened(), 1) == []
         if scheme == "rfc2217":
             assert far.baudrates[0] == BAUDRATE, "as it was asked for over there"

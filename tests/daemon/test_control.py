@@ -23,58 +23,58 @@ from tests.waiting import PATIENCE_S, until
 
 
 @pytest.fixture
-def armed(stand, client):
+def armed(processes, client):
     """Have a client in control that has armed the first run; give it and the token."""
     one = client("one")
     one.take_control()
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     return one, one.arm(1, 1)
 
 
-def states(stand):
-    with Session.open(stand.session, readonly=True) as session:
+def states(processes):
+    with Session.open(processes.session, readonly=True) as session:
         return [(e.run, e.attempt, str(e.state)) for e in session.states()]
 
 
-def talked(stand, *kinds):
+def talked(processes, *kinds):
     """Tell which messages of these kinds went over the line, in order."""
     codes = {code: kind for code, kind in TABLE.items() if kind in kinds}
     decoders = {"tx": Decoder(), "rx": Decoder()}
-    with Session.open(stand.session, readonly=True) as session:
+    with Session.open(processes.session, readonly=True) as session:
         frames = [f for _, way, data in session.byte_log() for f in decoders[way].feed(data)]
     return [codes[frame.type] for frame in frames if frame.type in codes]
 
 
-def gone_on_with(stand):
+def gone_on_with(processes):
     """Let `rig run` finish the session, and look at it as at any other."""
-    assert stand.run() == 0, stand.told
-    assert broken(stand.session, stand.happened(), stand.runs) == []
+    assert processes.run() == 0, processes.told
+    assert broken(processes.session, processes.happened(), processes.runs) == []
 
 
-def test_two_clients_that_race_for_control_do_not_both_get_it(stand, client):
+def test_two_clients_that_race_for_control_do_not_both_get_it(processes, client):
     one, two = client("one"), client("two")
     one.take_control()
     with pytest.raises(ControlError, match="one has control"):
         two.take_control()
     for forbidden in (
-        lambda: two.open_session(str(stand.protocol), str(stand.session)),
+        lambda: two.open_session(str(processes.protocol), str(processes.session)),
         lambda: two.arm(1, 1),
         lambda: two.wait(0.1),
     ):
         with pytest.raises(ControlError):
             forbidden()
-    stand.start_runner()
-    _, told = stand.runner.communicate(timeout=PATIENCE_S)
-    assert stand.runner.returncode == 4
+    processes.start_runner()
+    _, told = processes.runner.communicate(timeout=PATIENCE_S)
+    assert processes.runner.returncode == 4
     assert "one has control" in told
-    assert not stand.session.exists()
+    assert not processes.session.exists()
     one.close()
     two.take_control()
     two.close()
-    gone_on_with(stand)
+    gone_on_with(processes)
 
 
-def test_what_comes_next_is_the_daemons_to_know(stand, armed):
+def test_what_comes_next_is_the_daemons_to_know(processes, armed):
     one, _ = armed
     with pytest.raises(InputError, match="not the moment"):
         one.arm(1, 2)
@@ -86,60 +86,60 @@ def test_what_comes_next_is_the_daemons_to_know(stand, armed):
         one.log_state(1, 1, RunState.ACCEPTED)
     with pytest.raises(StoppedError, match="tried"):
         one.fire(0)
-    assert states(stand) == [(1, 1, "armed"), (1, 1, "interrupted")]
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
-def test_a_client_that_is_lost_while_armed_disarms(stand, armed):
+def test_a_client_that_is_lost_while_armed_disarms(processes, armed):
     one, _ = armed
-    stand.await_phase(Phase.ARMED)
+    processes.await_phase(Phase.ARMED)
     one._socket.close()
-    stand.await_phase(Phase.IDLE)
-    gone_on_with(stand)
-    assert (1, 1, "interrupted") in states(stand)
+    processes.await_phase(Phase.IDLE)
+    gone_on_with(processes)
+    assert (1, 1, "interrupted") in states(processes)
 
 
-def test_a_client_that_hangs_while_armed_disarms(stand, armed):
+def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     """It is connected, and says nothing any more. Until then the daemon keeps the board armed."""
-    stand.await_phase(Phase.ARMED)
-    stand.await_phase(Phase.IDLE)
-    until(lambda: states(stand)[-1] == (1, 1, "interrupted"))
-    with Session.open(stand.session, readonly=True) as session:
+    processes.await_phase(Phase.ARMED)
+    processes.await_phase(Phase.IDLE)
+    until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
+    with Session.open(processes.session, readonly=True) as session:
         assert session.latest_state(1).reasons == ("the client in control was lost",)
 
 
-def test_a_device_that_disarms_itself_is_noticed(stand, armed):
+def test_a_device_that_disarms_itself_is_noticed(processes, armed):
     one, token = armed
-    stand.hand("stop 1")
-    stand.await_phase(Phase.IDLE)
+    processes.hand("stop 1")
+    processes.await_phase(Phase.IDLE)
     with pytest.raises(DeviceRefusedError, match="the emergency stop was opened") as refused:
         one.fire(token)
     assert refused.value.reason is Reason.NOT_ARMED
-    stand.hand("stop 0")
+    processes.hand("stop 0")
     one.close()
-    gone_on_with(stand)
+    gone_on_with(processes)
 
 
-def test_any_client_stops_what_another_has_armed(stand, armed, client):
+def test_any_client_stops_what_another_has_armed(processes, armed, client):
     one, token = armed
     two = client("two")
     two.stop("somebody is under it")
-    stand.await_phase(Phase.IDLE)
+    processes.await_phase(Phase.IDLE)
     with pytest.raises(StoppedError, match="somebody is under it"):
         one.fire(token)
-    with Session.open(stand.session, readonly=True) as session:
+    with Session.open(processes.session, readonly=True) as session:
         assert session.latest_state(1).reasons == ("somebody is under it",)
 
 
-def test_any_client_stops_a_recording_and_what_there_is_is_kept(stand, armed, client):
+def test_any_client_stops_a_recording_and_what_there_is_is_kept(processes, armed, client):
     one, token = armed
     two = client("two")
     one.fire(token)
     two.stop("enough")
-    stand.await_phase(Phase.HOLDING)
-    assert states(stand)[-1] == (1, 1, "recorded")
+    processes.await_phase(Phase.HOLDING)
+    assert states(processes)[-1] == (1, 1, "recorded")
     one.close()
-    gone_on_with(stand)
-    seen = talked(stand, Fire, Abort, DropCertificate)
+    gone_on_with(processes)
+    seen = talked(processes, Fire, Abort, DropCertificate)
     assert seen.index(Fire) < seen.index(Abort) < seen.index(DropCertificate)
 
 
@@ -147,10 +147,10 @@ def test_any_client_stops_a_recording_and_what_there_is_is_kept(stand, armed, cl
 def unheard(monkeypatch):
     """Have a board and a worker that, unless stopped, repeats a request for ever."""
     monkeypatch.setattr("rig.recorder.recorder.Device", partial(Device, tries=10**9))
-    with ProcessFixture(runs=2, seed=3) as stand, working(stand) as (worker, ask):
+    with ProcessFixture(runs=2, seed=3) as processes, working(processes) as (worker, ask):
         token = ask(lambda controller: controller.arm(1, 1))
-        yield stand, worker, token
-        stand.hand("mute 0")  # else a worker that no STOP reaches never ends
+        yield processes, worker, token
+        processes.hand("mute 0")  # else a worker that no STOP reaches never ends
 
 
 def line(worker):
@@ -159,85 +159,85 @@ def line(worker):
 
 def test_a_stop_does_not_wait_for_answers_that_are_lost(unheard):
     """The board hears and is not heard: what is asked is repeated, and ended by what STOP asks."""
-    stand, worker, _ = unheard
-    stand.hand("mute 1")
+    processes, worker, _ = unheard
+    processes.hand("mute 1")
     until(lambda: line(worker)["repeats"])
     asked = line(worker)["requests"]
     stopped = worker.stop("no answer")
     until(lambda: line(worker)["requests"] > asked)
-    stand.await_phase(Phase.IDLE)
-    stand.hand("mute 0")
+    processes.await_phase(Phase.IDLE)
+    processes.hand("mute 0")
     stopped.result(PATIENCE_S)
-    assert states(stand) == [(1, 1, "armed"), (1, 1, "interrupted")]
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
 def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
-    stand, worker, token = unheard
-    stand.hand("mute fall")
+    processes, worker, token = unheard
+    processes.hand("mute fall")
     fired = worker.submit(lambda controller: controller.fire(token), "me")
     until(lambda: line(worker)["repeats"])
-    stand.await_phase(Phase.RECORDING)
+    processes.await_phase(Phase.RECORDING)
     worker.stop("no answer")
-    stand.await_phase(Phase.HOLDING)
+    processes.await_phase(Phase.HOLDING)
     with pytest.raises(StoppedError):
         fired.result(PATIENCE_S)
-    stand.await_phase(Phase.IDLE)
-    until(lambda: states(stand)[-1] == (1, 1, "recorded"))
-    assert states(stand) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
-    seen = talked(stand, Fire, Abort, DropCertificate)
+    processes.await_phase(Phase.IDLE)
+    until(lambda: states(processes)[-1] == (1, 1, "recorded"))
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
+    seen = talked(processes, Fire, Abort, DropCertificate)
     assert seen.index(Abort) < seen.index(DropCertificate)
 
 
-def test_a_stop_ends_a_wait(stand, client):
+def test_a_stop_ends_a_wait(processes, client):
     one, two = client("one"), client("two")
     one.take_control()
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     one._send(b'{"jsonrpc":"2.0","id":99,"method":"wait","params":{"seconds":600}}\n')
     two.stop("no need")
     assert one.arm(1, 1)
 
 
-def test_a_client_that_leaves_after_the_release_leaves_a_recorded_drop(stand, armed):
+def test_a_client_that_leaves_after_the_release_leaves_a_recorded_drop(processes, armed):
     one, token = armed
     one.fire(token)
     one._socket.close()
-    stand.await_phase(Phase.HOLDING)
-    stand.await_phase(Phase.IDLE)
-    assert states(stand) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
-    gone_on_with(stand)
-    assert (1, 1, "accepted") in states(stand), "judged by whoever came next"
+    processes.await_phase(Phase.HOLDING)
+    processes.await_phase(Phase.IDLE)
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
+    gone_on_with(processes)
+    assert (1, 1, "accepted") in states(processes), "judged by whoever came next"
 
 
-def test_a_daemon_that_is_asked_to_end_disarms(stand, armed):
-    stand.daemon.send_signal(signal.SIGTERM)
-    _, told = stand.daemon.communicate(timeout=PATIENCE_S)
-    assert stand.daemon.returncode == 0
+def test_a_daemon_that_is_asked_to_end_disarms(processes, armed):
+    processes.daemon.send_signal(signal.SIGTERM)
+    _, told = processes.daemon.communicate(timeout=PATIENCE_S)
+    assert processes.daemon.returncode == 0
     assert "rig daemon: ended" in told
     assert "Traceback" not in told
-    stand.await_phase(Phase.IDLE)
-    stand.start_daemon()
-    gone_on_with(stand)
+    processes.await_phase(Phase.IDLE)
+    processes.start_daemon()
+    gone_on_with(processes)
 
 
-def test_a_daemon_that_is_asked_to_end_in_the_fall_records_it(stand, armed):
+def test_a_daemon_that_is_asked_to_end_in_the_fall_records_it(processes, armed):
     one, token = armed
     one.fire(token)
-    stand.daemon.send_signal(signal.SIGINT)
-    stand.daemon.communicate(timeout=PATIENCE_S)
-    assert stand.daemon.returncode == 0
-    assert states(stand)[-1] == (1, 1, "recorded")
-    assert not stand.socket.exists()
-    stand.start_daemon()
-    gone_on_with(stand)
-    assert longest_on(stand.happened()) <= 0.08
+    processes.daemon.send_signal(signal.SIGINT)
+    processes.daemon.communicate(timeout=PATIENCE_S)
+    assert processes.daemon.returncode == 0
+    assert states(processes)[-1] == (1, 1, "recorded")
+    assert not processes.socket.exists()
+    processes.start_daemon()
+    gone_on_with(processes)
+    assert longest_on(processes.happened()) <= 0.08
 
 
-def test_a_daemon_that_is_killed_while_armed_leaves_nothing_on(stand, armed):
+def test_a_daemon_that_is_killed_while_armed_leaves_nothing_on(processes, armed):
     one, _ = armed
-    stand.await_phase(Phase.ARMED)
-    stand.kill(stand.daemon)
-    stand.await_phase(Phase.IDLE)
+    processes.await_phase(Phase.ARMED)
+    processes.kill(processes.daemon)
+    processes.await_phase(Phase.IDLE)
     with pytest.raises(DeviceError, match="the daemon is gone"):
         one.wait(1.0)
-    stand.start_daemon()
-    gone_on_with(stand)
+    processes.start_daemon()
+    gone_on_with(processes)

@@ -18,8 +18,8 @@ def test_nothing_is_lost_whatever_dies():
     with ThreadPoolExecutor(len(KINDS) + len(CONTENTION) + 1) as pool:
         noise = pool.submit(disturbed, "daemon", 0, 5, runs=1, dials=NOISE)
         made = [pool.submit(disturbed, kind, 2, 7, runs=1) for kind in KINDS]
-        crowd = [pool.submit(make, 1, 9) for make in CONTENTION.values()]
-        for tally in (one.result() for one in (noise, *made, *crowd)):
+        contention = [pool.submit(make, 1, 9) for make in CONTENTION.values()]
+        for tally in (one.result() for one in (noise, *made, *contention)):
             assert tally.broken == []
             assert tally.longest_on_s <= OFF_S
         assert [sum(one.result().fell_upon.values()) for one in made] == [2] * len(KINDS)
@@ -33,38 +33,38 @@ def test_nothing_is_lost_with_the_real_firmware():
     assert (tally.broken, tally.runs, tally.disturbed) == ([], 1, 1)
 
 
-def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(stand, client):
+def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(processes, client):
     one = client("one")
     one.take_control()
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     one.fire(one.arm(1, 1))
-    full = stand.session.with_name("session-wal").stat().st_size
-    resource.prlimit(stand.daemon.pid, resource.RLIMIT_FSIZE, (full, resource.RLIM_INFINITY))
+    full = processes.session.with_name("session-wal").stat().st_size
+    resource.prlimit(processes.daemon.pid, resource.RLIMIT_FSIZE, (full, resource.RLIM_INFINITY))
     with pytest.raises(SessionError):
         one.collect(1, 1)
     state = one.call("subscribe")["state"]
     assert state["phase"] == "trouble"
     assert state["error"]["kind"] == "SessionError"
-    assert list(stand.happened())[-1]["phase"] == Phase.HOLDING
-    with Session.open(stand.session, readonly=True) as session:
+    assert list(processes.happened())[-1]["phase"] == Phase.HOLDING
+    with Session.open(processes.session, readonly=True) as session:
         assert session.drop(1, 1) is None, "it is readable, and does not claim to have the drop"
     no_limit = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
-    resource.prlimit(stand.daemon.pid, resource.RLIMIT_FSIZE, no_limit)
-    stand.await_phase(Phase.IDLE)  # by itself, as soon as there is room
+    resource.prlimit(processes.daemon.pid, resource.RLIMIT_FSIZE, no_limit)
+    processes.await_phase(Phase.IDLE)  # by itself, as soon as there is room
     assert one.collect(1, 1).faults == ()
     one.close()
-    assert stand.run() == 0, stand.told
-    assert broken(stand.session, stand.happened(), stand.runs) == []
+    assert processes.run() == 0, processes.told
+    assert broken(processes.session, processes.happened(), processes.runs) == []
 
 
 @pytest.mark.parametrize("content", [b"", b"not a session", b"SQLite format 3\0" + bytes(84)])
-def test_a_torn_or_foreign_file_does_not_block_the_next_session(stand, client, content):
+def test_a_torn_or_foreign_file_does_not_block_the_next_session(processes, client, content):
     one = client("one")
     one.take_control()
-    foreign = stand.folder / "foreign"
+    foreign = processes.folder / "foreign"
     foreign.write_bytes(content)
     with pytest.raises(SessionError):
-        one.open_session(str(stand.protocol), str(foreign))
+        one.open_session(str(processes.protocol), str(foreign))
     assert foreign.read_bytes() == content
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     assert one.arm(1, 1)

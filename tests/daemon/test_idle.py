@@ -22,7 +22,7 @@ ALONE = f"no client for {IDLE_S:g} s"
 
 
 @pytest.fixture
-def stand():
+def processes():
     """Have a board and a daemon that ends when it is left alone."""
     with ProcessFixture(runs=2, seed=3, small_disk=True) as made:
         made.start_daemon("--idle-timeout", str(IDLE_S))
@@ -30,18 +30,18 @@ def stand():
 
 
 @pytest.fixture
-def client(stand):
+def client(processes):
     """Connect clients; on a busy machine a daemon may have ended before one was ready to."""
     made = []
 
     def connect(name):
         while True:
             try:
-                made.append(stand.client(name))
+                made.append(processes.client(name))
             except RigError:
-                assert stand.daemon.wait(PATIENCE_S) == 0
-                stand.kill(stand.daemon)
-                stand.start_daemon("--idle-timeout", str(IDLE_S))
+                assert processes.daemon.wait(PATIENCE_S) == 0
+                processes.kill(processes.daemon)
+                processes.start_daemon("--idle-timeout", str(IDLE_S))
             else:
                 return made[-1]
 
@@ -51,45 +51,45 @@ def client(stand):
 
 
 @pytest.fixture
-def driver(stand, client):
+def driver(processes, client):
     """Have a session open and control of it."""
     one = client("the driver")
     one.take_control()
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     return one
 
 
-def ended(stand):
+def ended(processes):
     """Wait until the daemon has ended, and give the lines that it said."""
-    _, told = stand.daemon.communicate(timeout=PATIENCE_S)
-    assert stand.daemon.returncode == 0, told
-    assert not stand.socket.exists()
+    _, told = processes.daemon.communicate(timeout=PATIENCE_S)
+    assert processes.daemon.returncode == 0, told
+    assert not processes.socket.exists()
     return told.splitlines()
 
 
-def states(stand):
-    with Session.open(stand.session, readonly=True) as session:
+def states(processes):
+    with Session.open(processes.session, readonly=True) as session:
         return [(e.run, e.attempt, str(e.state)) for e in session.states()]
 
 
-def test_it_stays_while_a_client_is_there_and_ends_after_it(stand, client):
+def test_it_stays_while_a_client_is_there_and_ends_after_it(processes, client):
     one = client("one")
     time.sleep(3 * IDLE_S)
     assert one.call("renew") == {}
     one.close()
-    assert any(ALONE in line for line in ended(stand))
+    assert any(ALONE in line for line in ended(processes))
 
 
 def test_one_that_was_started_by_hand_stays(tmp_path):
-    with ProcessFixture(runs=1) as stand:
-        stand.start_daemon()
+    with ProcessFixture(runs=1) as processes:
+        processes.start_daemon()
         other = subprocess.run(
             [sys.executable, "-m", "rig", "daemon", "--port", "sim://", "--socket",
-             str(stand.folder / "other" / "rig.sock"), "--idle-timeout", str(IDLE_S)],
+             str(processes.folder / "other" / "rig.sock"), "--idle-timeout", str(IDLE_S)],
             capture_output=True, text=True, timeout=PATIENCE_S, check=True,
         )  # fmt: skip
         assert ALONE in other.stderr
-        stand.client().close()
+        processes.client().close()
 
 
 def test_it_is_not_at_rest_while_a_drop_is_armed(tmp_path):
@@ -104,40 +104,40 @@ def test_it_is_not_at_rest_while_a_drop_is_armed(tmp_path):
         assert worker.at_rest().result(PATIENCE_S)
 
 
-def test_what_was_armed_is_disarmed_before_it_ends(stand, driver):
+def test_what_was_armed_is_disarmed_before_it_ends(processes, driver):
     driver.arm(1, 1)
     driver.close()
-    ended(stand)
-    stand.await_phase(Phase.IDLE)
-    assert states(stand) == [(1, 1, "armed"), (1, 1, "interrupted")]
+    ended(processes)
+    processes.await_phase(Phase.IDLE)
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
-def test_a_drop_that_falls_is_in_the_file_before_it_ends(stand, driver):
+def test_a_drop_that_falls_is_in_the_file_before_it_ends(processes, driver):
     driver.fire(driver.arm(1, 1))
     driver.close()
-    told = ended(stand)
+    told = ended(processes)
     (recorded,) = (n for n, line in enumerate(told) if "attempt 1: recorded" in line)
     (alone,) = (n for n, line in enumerate(told) if ALONE in line)
     assert recorded < alone
-    assert states(stand)[-1] == (1, 1, "recorded")
+    assert states(processes)[-1] == (1, 1, "recorded")
 
 
-def test_a_drop_that_only_the_board_has_is_waited_for(stand, driver):
+def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
     driver.fire(driver.arm(1, 1))
-    stand.hand("pull 4")
+    processes.hand("pull 4")
     driver.close()
-    ended(stand)
-    assert states(stand) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
+    ended(processes)
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
 
 
-def test_it_stays_until_the_disk_has_taken_everything(stand, driver):
-    stand.disk.fill(stand.daemon)
+def test_it_stays_until_the_disk_has_taken_everything(processes, driver):
+    processes.disk.fill(processes.daemon)
     driver.close()
     time.sleep(4 * IDLE_S)
-    assert stand.daemon.poll() is None
-    stand.disk.free(stand.daemon)
-    assert any(line.startswith("trouble: ") for line in ended(stand))
-    with Session.open(stand.session, readonly=True) as session:
+    assert processes.daemon.poll() is None
+    processes.disk.free(processes.daemon)
+    assert any(line.startswith("trouble: ") for line in ended(processes))
+    with Session.open(processes.session, readonly=True) as session:
         assert list(session.pings())
 
 

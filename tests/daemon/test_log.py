@@ -27,24 +27,24 @@ print("not held up", flush=True)
 
 
 def test_a_session_and_a_pulled_cable_are_told_once_each():
-    with ProcessFixture(runs=2, seed=3) as stand:
-        stand.start_daemon()
-        told = [stand.daemon.stderr.readline().rstrip()]
-        client = stand.client("the driver")
+    with ProcessFixture(runs=2, seed=3) as processes:
+        processes.start_daemon()
+        told = [processes.daemon.stderr.readline().rstrip()]
+        client = processes.client("the driver")
         client.take_control()
-        client.open_session(str(stand.protocol), str(stand.session))
+        client.open_session(str(processes.protocol), str(processes.session))
         client.fire(client.arm(1, 1))
         client.collect(1, 1)
         client.arm(2, 1)
         client.stop("enough")
-        stand.hand("pull 1")
-        told += [stand.daemon.stderr.readline().rstrip() for _ in range(5)]
+        processes.hand("pull 1")
+        told += [processes.daemon.stderr.readline().rstrip() for _ in range(5)]
         while not told[-1].startswith("up"):
-            told.append(stand.daemon.stderr.readline().rstrip())
+            told.append(processes.daemon.stderr.readline().rstrip())
         client.close_session()
         client.close()
-        stand.daemon.send_signal(signal.SIGTERM)
-        told += stand.daemon.communicate(timeout=PATIENCE_S)[1].splitlines()
+        processes.daemon.send_signal(signal.SIGTERM)
+        told += processes.daemon.communicate(timeout=PATIENCE_S)[1].splitlines()
     down = [line for line in told if line.startswith("down: ")]
     assert down
     assert len(set(down)) == len(down)
@@ -52,11 +52,11 @@ def test_a_session_and_a_pulled_cable_are_told_once_each():
     expected = [
         up,
         "in control: the driver",
-        f"session: {stand.session}",
+        f"session: {processes.session}",
         r"run 1, attempt 1: recorded, \d+ edges",
         "run 2, attempt 1: interrupted: enough",
         up,
-        f"closed: {stand.session}",
+        f"closed: {processes.session}",
         "in control: nobody",
         "rig daemon: ended",
     ]

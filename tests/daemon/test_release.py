@@ -18,11 +18,11 @@ from tests.waiting import until
 
 
 @pytest.fixture
-def driver(stand, client):
+def driver(processes, client):
     """Have a session open and control of it."""
     one = client("the driver")
     one.take_control()
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     return one
 
 
@@ -30,10 +30,10 @@ def section(client):
     return client.call("subscribe")["state"]["release_test"]
 
 
-def driven(stand):
+def driven(processes):
     """When the release went on and off: not yet at the first time, and by the second, s."""
     changes, on = [], False
-    for one in stand.happened():
+    for one in processes.happened():
         if "outputs" in one and bool(one["outputs"] & 1) != on:
             on = not on
             changes.append((one["after_s"], one["at_s"]))
@@ -50,11 +50,11 @@ def armed(driver):
         return 0
 
 
-def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(stand, driver):
+def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(processes, driver):
     found = driver.call("test_release")
     assert found == section(driver)
     assert (found["pulse_s"], found["edges"], found["faults"]) == (0.08, 0, [])
-    on, off = driven(stand)
+    on, off = driven(processes)
     assert off[0] - on[1] < 0.08 < off[1] - on[0]
     assert driver.call("subscribe")["state"]["phase"] == "idle"
     token = driver.arm(1, 1)
@@ -62,37 +62,37 @@ def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(stand, driver):
     driver.collect(1, 1)
     driver.close_session()
     assert section(driver) == found
-    with Session.open(stand.session, readonly=True) as session:
+    with Session.open(processes.session, readonly=True) as session:
         assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1)]
         assert {entry.run for entry in session.states()} == {1}
         assert "DIFFERENT" not in replay(session).lines[0]
 
 
-def test_it_needs_control_a_session_and_nothing_armed(stand, client):
+def test_it_needs_control_a_session_and_nothing_armed(processes, client):
     one, other = client("one"), client("other")
     one.take_control()
     with pytest.raises(InputError, match="not the moment"):
         one.call("test_release")
-    one.open_session(str(stand.protocol), str(stand.session))
+    one.open_session(str(processes.protocol), str(processes.session))
     with pytest.raises(ControlError):
         other.call("test_release")
     one.arm(1, 1)
     with pytest.raises(InputError, match="not the moment"):
         one.call("test_release")
-    assert not driven(stand)
+    assert not driven(processes)
 
 
-def test_an_open_emergency_stop_refuses_it(stand, driver):
+def test_an_open_emergency_stop_refuses_it(processes, driver):
     driver.arm(1, 1)
-    stand.hand("stop 1")
+    processes.hand("stop 1")
     until(lambda: driver.session.latest_state(1).state is RunState.INTERRUPTED)
     with pytest.raises(DeviceRefusedError) as refused:
         driver.call("test_release")
     assert refused.value.reason is Reason.STOPPED
-    assert not driven(stand)
+    assert not driven(processes)
 
 
-def test_stop_ends_it(stand, driver, client):
+def test_stop_ends_it(processes, driver, client):
     watcher, raised = client("a watcher"), []
 
     def test():
@@ -103,16 +103,16 @@ def test_stop_ends_it(stand, driver, client):
 
     testing = threading.Thread(target=test)
     testing.start()
-    stand.await_phase(Phase.RECORDING)
+    processes.await_phase(Phase.RECORDING)
     watcher.stop("enough")
     testing.join()
     assert raised
     assert section(driver) is None
-    stand.await_phase(Phase.IDLE)
+    processes.await_phase(Phase.IDLE)
     until(lambda: armed(driver))  # nothing is left behind that forbids it
 
 
-def test_a_cable_pulled_during_it_leaves_nothing_behind(stand, driver):
+def test_a_cable_pulled_during_it_leaves_nothing_behind(processes, driver):
     raised = []
 
     def test():
@@ -122,8 +122,8 @@ def test_a_cable_pulled_during_it_leaves_nothing_behind(stand, driver):
 
     testing = threading.Thread(target=test)
     testing.start()
-    stand.await_phase(Phase.RECORDING)
-    stand.hand("pull 0.8")
+    processes.await_phase(Phase.RECORDING)
+    processes.hand("pull 0.8")
     testing.join()
     assert raised
     until(lambda: driver.call("subscribe")["state"]["link"]["state"] == "up")

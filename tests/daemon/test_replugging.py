@@ -35,33 +35,33 @@ def usb(monkeypatch):
 
 
 def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
-    with ProcessFixture(1) as stand:
-        elsewhere = stand.folder / "elsewhere"
-        usb |= {stand.port: "85430", elsewhere: "85430"}
-        with working(stand) as (worker, ask):
-            assert worker.published.get("port")["path"] == str(stand.port)
+    with ProcessFixture(1) as processes:
+        elsewhere = processes.folder / "elsewhere"
+        usb |= {processes.port: "85430", elsewhere: "85430"}
+        with working(processes) as (worker, ask):
+            assert worker.published.get("port")["path"] == str(processes.port)
             ask(lambda controller: controller.fire(controller.arm(1, 1)))
-            stand.hand(f"pull 0.3 {elsewhere}")
+            processes.hand(f"pull 0.3 {elsewhere}")
             until(lambda: worker.published.get("port")["path"] == os.path.realpath(elsewhere))
             drop = ask(lambda controller: controller.collect(1, 1))
         assert drop.faults == ()
         assert drop.edges
-        with Session.open(stand.session, readonly=True) as session:
+        with Session.open(processes.session, readonly=True) as session:
             ports = [(one["port"], one["usb_serial_number"]) for _, one in session.identities()]
-        assert ports == [(str(stand.port), "85430"), (os.path.realpath(elsewhere), "85430")]
+        assert ports == [(str(processes.port), "85430"), (os.path.realpath(elsewhere), "85430")]
 
 
 @pytest.mark.parametrize("numbers", [("85430", "999"), (None, None), ("85430", "85430")])
 def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
-    with ProcessFixture(1, seed=1) as stand, ProcessFixture(1, seed=2) as other:
-        usb |= {stand.port: numbers[0]}
-        with working(stand) as (worker, ask):
+    with ProcessFixture(1, seed=1) as processes, ProcessFixture(1, seed=2) as other:
+        usb |= {processes.port: numbers[0]}
+        with working(processes) as (worker, ask):
             ask(lambda controller: controller.fire(controller.arm(1, 1)))
             until(lambda: worker.published.get("drop")["state"] == "recorded")
-            stand.hand("pull 60")
+            processes.hand("pull 60")
             until(lambda: worker.published.get("link")["state"] == "down")
-            usb[stand.port] = numbers[1]
-            stand.port.symlink_to(other.port)
+            usb[processes.port] = numbers[1]
+            processes.port.symlink_to(other.port)
             until(lambda: "another board" in str(worker.published.get("error")))
             assert "give the same rig run command again" in worker.published.get("error")["hint"]
             with pytest.raises(DeviceError, match="no connection"):
@@ -73,19 +73,19 @@ def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
 
 
 def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
-    with ProcessFixture(1) as stand:
-        elsewhere = stand.folder / "elsewhere"
-        usb |= {stand.port: "85430", elsewhere: "85430"}
-        with closing(Controller(str(stand.port))) as controller:
-            controller.open_session(str(stand.protocol), str(stand.session))
-        stand.hand(f"pull 0 {elsewhere}")
+    with ProcessFixture(1) as processes:
+        elsewhere = processes.folder / "elsewhere"
+        usb |= {processes.port: "85430", elsewhere: "85430"}
+        with closing(Controller(str(processes.port))) as controller:
+            controller.open_session(str(processes.protocol), str(processes.session))
+        processes.hand(f"pull 0 {elsewhere}")
         until(elsewhere.exists)
-        with closing(Controller(str(stand.port))) as controller:
-            controller.open_session(str(stand.protocol), str(stand.session))
+        with closing(Controller(str(processes.port))) as controller:
+            controller.open_session(str(processes.protocol), str(processes.session))
             assert controller.published.get("port")["path"] == os.path.realpath(elsewhere)
         usb[elsewhere] = "999"
         with (
-            closing(Controller(str(stand.port))) as controller,
+            closing(Controller(str(processes.port))) as controller,
             pytest.raises(DeviceError, match="no such"),
         ):
-            controller.open_session(str(stand.protocol), str(stand.session))
+            controller.open_session(str(processes.protocol), str(processes.session))

@@ -243,32 +243,32 @@ def test_over_tcp_the_token_is_asked_for(door):
 
 
 def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
-    with ProcessFixture(runs=1) as stand:
-        stand.start_daemon()
-        first = stand.daemon
+    with ProcessFixture(runs=1) as processes:
+        processes.start_daemon()
+        first = processes.daemon
         with pytest.raises(DeviceError, match="another daemon answers"):
-            stand.start_daemon()
-        stand.kill(stand.daemon)
-        stand.kill(first)
-        assert stand.socket.exists()
-        stand.start_daemon()
-        stand.client().close()
+            processes.start_daemon()
+        processes.kill(processes.daemon)
+        processes.kill(first)
+        assert processes.socket.exists()
+        processes.start_daemon()
+        processes.client().close()
 
 
 def test_over_tcp_too_a_second_daemon_is_refused_and_a_run_goes_through():
-    with ProcessFixture(runs=1) as stand:
-        stand.start_daemon("--tcp")
-        first = stand.daemon
+    with ProcessFixture(runs=1) as processes:
+        processes.start_daemon("--tcp")
+        first = processes.daemon
         for options in (["--tcp"], []):
             with pytest.raises(DeviceError, match="another daemon answers"):
-                stand.start_daemon(*options)
-            stand.kill(stand.daemon)
-        assert stand.run() == 0
-        assert "through the daemon" in stand.told
-        stand.kill(first)
-        assert stand.socket.with_suffix(".tcp").exists()
-        stand.start_daemon()
-        assert not stand.socket.with_suffix(".tcp").exists()
+                processes.start_daemon(*options)
+            processes.kill(processes.daemon)
+        assert processes.run() == 0
+        assert "through the daemon" in processes.told
+        processes.kill(first)
+        assert processes.socket.with_suffix(".tcp").exists()
+        processes.start_daemon()
+        assert not processes.socket.with_suffix(".tcp").exists()
 
 
 def test_no_daemon_is_said_so(tmp_path):

@@ -44,10 +44,10 @@ def lab() -> Iterator[Lab]:
 @pytest.fixture
 def cabled() -> Iterator[tuple[ProcessFixture, Lab]]:
     """A board behind a cable, and a daemon that owns its port."""
-    with ProcessFixture(runs=2, seed=3) as stand:
-        bench = Lab(stand.folder, stand.protocol, str(stand.port))
+    with ProcessFixture(runs=2, seed=3) as processes:
+        bench = Lab(processes.folder, processes.protocol, str(processes.port))
         bench.start()
-        yield stand, bench
+        yield processes, bench
         bench.stop()
 
 

@@ -14,19 +14,19 @@ PULLED = ("✗ the port is lost", "it is found again by itself")
 RESTARTED = ("✗ the port was lost and is back: the board restarted", "check its power supply")
 
 
-def pull(stand, lab):
-    stand.hand("pull 3600")
+def pull(processes, lab):
+    processes.hand("pull 3600")
 
 
-def plug(stand):
-    stand.hand("pull 0")  # and in again at once
+def plug(processes):
+    processes.hand("pull 0")  # and in again at once
 
 
-def reset(stand, lab):
-    stand.hand("reset")
+def reset(processes, lab):
+    processes.hand("reset")
 
 
-def kill(stand, lab):
+def kill(processes, lab):
     lab.kill()
 
 
@@ -43,25 +43,25 @@ async def session_on(op):
 
 
 def test_a_pulled_cable_is_said_on_every_screen(cabled):
-    stand, lab = cabled
+    processes, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
             await op.until(lambda: op.app.state.link == "up")
-            pull(stand, lab)  # before there is a session
+            pull(processes, lab)  # before there is a session
             await op.sees(*PULLED, "PROTOCOL")
-            plug(stand)
+            plug(processes)
             await session_on(op)
-            pull(stand, lab)
+            pull(processes, lab)
             for page in "123456":
                 await op.press(page)
                 await op.sees(*PULLED)
-            plug(stand)
+            plug(processes)
             await mended(op)
             await op.sees("the port was lost and is back")
             await op.press("enter")
             await op.arms(Stage.RESULT)
-            pull(stand, lab)
+            pull(processes, lab)
             await op.sees(*PULLED, "RESULT")
             assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
 
@@ -70,7 +70,7 @@ def test_a_pulled_cable_is_said_on_every_screen(cabled):
 
 @pytest.mark.parametrize("fault", [pull, kill])
 def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fault):
-    stand, lab = cabled
+    processes, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
@@ -78,10 +78,10 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
             await op.press("enter")
             await op.arms(Stage.LIVE)
             job = op.app.flow.job
-            await asyncio.to_thread(fault, stand, lab)
+            await asyncio.to_thread(fault, processes, lab)
             if fault is pull:
                 await op.sees("the port is lost")
-                plug(stand)
+                plug(processes)
             else:
                 await op.sees("no daemon")
             await op.at(Stage.RESULT)
@@ -95,7 +95,7 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
 
 @pytest.mark.parametrize("fault", [reset])
 def test_what_was_armed_is_not_when_the_line_breaks(cabled, fault):
-    stand, lab = cabled
+    processes, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=600.0) as op:
@@ -103,7 +103,7 @@ def test_what_was_armed_is_not_when_the_line_breaks(cabled, fault):
             await op.press("enter")
             await op.arms(Stage.COUNTDOWN)
             attempt = op.app.flow.job.attempt
-            fault(stand, lab)
+            fault(processes, lab)
             await op.at(Stage.PREPARE)  # at once: long before the count is over
             await mended(op)
             await op.sees("nothing fell", f"RUN 1 of 2 · attempt {attempt + 1}")
@@ -112,18 +112,18 @@ def test_what_was_armed_is_not_when_the_line_breaks(cabled, fault):
 
 
 def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(cabled):
-    stand, lab = cabled
+    processes, lab = cabled
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
             await session_on(op)
-            reset(stand, lab)
+            reset(processes, lab)
             await op.sees(*RESTARTED)
             await mended(op)
             await op.press("enter")
             await op.arms(Stage.LIVE)
             attempt = op.app.flow.job.attempt
-            reset(stand, lab)
+            reset(processes, lab)
             await op.sees("restarted")
             await mended(op)
             await op.at(Stage.PREPARE)
