@@ -138,6 +138,7 @@ class Controller:
             raise InputError(f"{protocol} has no gates, so nothing can be measured")
         fresh = completed(self.url, source, path, seed)
         self.close_session()
+        made = not path.exists()
         opened = open_for(scene, source, fresh, path)
         try:
             before = known_before(opened)
@@ -150,8 +151,10 @@ class Controller:
                 opened.put_results([], __version__)  # of less than there will be
                 opened.commit()
             fetched = self.settle()
-        except BaseException:
+        except BaseException as error:
             self._part_with(opened)
+            if made and isinstance(error, InputError):
+                path.unlink()  # with other input it would be another protocol's, and in the way
             raise
         about, plan = shown(opened, scene)
         log.info("session: %s", path)
