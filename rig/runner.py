@@ -33,7 +33,7 @@ from rig.errors import DeviceError, InputError
 from rig.link.refusals import DeviceRefusedError
 from rig.measurands import told
 from rig.protocol import reader
-from rig.protocol.measurable import check_measurable
+from rig.protocol.measurable import check_recordable
 from rig.protocol.plan import runs
 from rig.recorder.interrupts import Interrupts
 from rig.records import Job
@@ -116,7 +116,7 @@ def run_protocol(
             f"{source} has no gates, so nothing can be measured",
             f"rig predict {source} says what the model expects",
         )
-    check_measurable(protocol)
+    check_recordable(protocol)
     interrupts = Interrupts() if interrupts is None else interrupts
     rig = connect(url, operator.say, interrupts, socket)
     try:

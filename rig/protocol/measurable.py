@@ -79,8 +79,6 @@ def check_measurable(protocol: Protocol) -> None:
             f"{protocol.source}: only predicted, never measured, because of {'; '.join(reasons)}",
             "rig predict says what the model expects; to measure, leave these keys out",
         )
-    if (problem := too_long(protocol)) is not None:
-        raise InputError(problems=[problem])
 
 
 def too_long(protocol: Protocol) -> Problem | None:
@@ -122,13 +120,20 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     return sorted(found)
 
 
-def check_board(protocol: Protocol, board: Capabilities) -> None:
-    """Refuse a protocol that wants more than a board has.
+def check_recordable(protocol: Protocol, board: Capabilities | None = None) -> None:
+    """Refuse a protocol whose drops no board, or not this one, can make and record.
+
+    Other timers have no such limits: what they recorded need only be measurable.
 
     Raises
     ------
     InputError
         With every problem.
     """
-    if problems := lacking(protocol, board):
+    check_measurable(protocol)
+    longer = too_long(protocol)
+    problems = [] if longer is None else [longer]
+    if board is not None:
+        problems += lacking(protocol, board)
+    if problems:
         raise InputError(problems=problems)

@@ -16,7 +16,7 @@ from rig.link.messages import TEST_RUN, Reason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
-from rig.protocol.measurable import check_board
+from rig.protocol.measurable import check_recordable
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
@@ -138,20 +138,23 @@ class Controller:
             raise InputError(f"{protocol} has no gates, so nothing can be measured")
         fresh = completed(self.url, source, path, seed)
         self.close_session()
+        made = not path.exists()
         opened = open_for(scene, source, fresh, path)
         try:
             before = known_before(opened)
             self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
             self._locator.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
-            check_board(scene, self.connect().capabilities())
+            check_recordable(scene, self.connect().capabilities())
             self._locator.bound = True
             with self.interrupts.held():
                 opened.put_results([], __version__)  # of less than there will be
                 opened.commit()
             fetched = self.settle()
-        except BaseException:
+        except BaseException as error:
             self._part_with(opened)
+            if made and isinstance(error, InputError):
+                path.unlink()  # with other input it would be another protocol's, and in the way
             raise
         about, plan = shown(opened, scene)
         log.info("session: %s", path)

@@ -6,7 +6,6 @@ import json
 
 import pytest
 
-from rig.session.store import Session
 from tests.cli.lab import short
 
 GATES = """\
@@ -58,12 +57,22 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     assert (done.code, done.out) == (2, "")
     (line,) = done.err.splitlines()
     assert f"{path}:{problem} the board (virtual) has" in line
-    with Session.open(session, readonly=True) as made:
-        assert made.states() == []
+    assert not session.exists()
     said = call("check", path)
     assert said.code == 0
     for word in ("mega", "uno"):
         assert f"note: not with board {word}: {path}:" in said.out
+    path.write_text(changed("", ""), "utf-8")
+    assert call("run", path, "--port", "sim://", "--session", session, "--yes").code == 0
+
+
+def test_a_session_that_was_there_stays_whatever_is_refused(call, tmp_path):
+    path, session = tmp_path / "p.yaml", tmp_path / "p.session"
+    path.write_text(changed("channel: 0, pulse", "channel: 2, pulse"), "utf-8")
+    assert call("run", path, "--port", "sim://", "--session", session, "--yes").code == 0
+    before = session.read_bytes()
+    done = call("run", path, "--port", "sim://?skew=1", "--session", session)
+    assert (done.code, session.read_bytes()) == (2, before)
 
 
 def test_a_fall_that_nothing_can_record_is_refused_before_a_session_is_made(call, tmp_path):

@@ -13,8 +13,8 @@ from rig.model.fall import free_fall
 from rig.protocol.describe import describe
 from rig.protocol.measurable import (
     LEAST_RECORD_MS,
-    check_board,
     check_measurable,
+    check_recordable,
     lacking,
     longest_fall,
     record_ms,
@@ -70,9 +70,10 @@ def test_a_fall_that_no_board_can_record_is_refused_beforehand():
     protocol = parse(ENDLESS, "f")
     assert record_ms(protocol) > LONGEST_RECORD_MS
     with pytest.raises(InputError, match=r"f:7:7: drop: from here .* more than 65.535 s"):
-        check_measurable(protocol)
+        check_recordable(protocol)
+    check_measurable(protocol)  # what another timer recorded is not refused
     assert "note: not run: f:7:7: drop: from here a fall takes up to 63.6 s" in describe(protocol)
-    check_measurable(parse(LONG))
+    check_recordable(parse(LONG))
 
 
 def test_what_a_board_lacks_is_said_at_its_place():
@@ -81,7 +82,7 @@ def test_what_a_board_lacks_is_said_at_its_place():
     text = GOOD.replace("free: [{channel: 8, height: 20 mm}]", gates) + release
     protocol = parse(text, "f")
     with pytest.raises(InputError) as caught:
-        check_board(protocol, UNO)
+        check_recordable(protocol, UNO)
     assert [str(problem).partition(";")[0] for problem in caught.value.problems] == [
         "f:11:49: gates.free[1].channel: found 15",
         "f:13:20: release.channel: found 2",
@@ -102,10 +103,10 @@ def test_what_a_board_lacks_is_said_at_its_place():
 
 def test_what_every_board_has_is_not_remarked_on():
     protocol = parse(GOOD)
-    check_board(protocol, UNO)
+    check_recordable(protocol, UNO)
     assert "not with" not in describe(protocol)
     wide = replace(MEGA, gates=GATES, releases=RELEASES, longest_pulse=2.0)
-    check_board(parse(GOOD + "release: {channel: 7, pulse: 2 s}\n"), wide)
+    check_recordable(parse(GOOD + "release: {channel: 7, pulse: 2 s}\n"), wide)
 
 
 def test_a_place_that_is_not_there_is_that_of_what_is_around_it():

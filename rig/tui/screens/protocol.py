@@ -13,7 +13,7 @@ from rig.errors import InputError
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.measurable import check_measurable
+from rig.protocol.measurable import check_recordable
 from rig.tui.screens.page import Page
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
@@ -127,7 +127,7 @@ class ProtocolPage(Page):
             if self._protocol.gates is None:
                 self._problem = "this scene has no gates: nothing can be measured"
             else:
-                check_measurable(self._protocol)
+                check_recordable(self._protocol)
         except InputError as error:
             lines = [plain(problem, 300) for problem in error.problems]
             self._problem = "\n".join(lines or [plain(error.message), plain(error.hint)])
