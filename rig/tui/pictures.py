@@ -6,16 +6,16 @@ import asyncio
 import re
 from dataclasses import replace
 from time import monotonic
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
+from rig.tui.client import ReconnectingClient
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import State, state_of
-from rig.tui.still import QUIET, Still
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
@@ -32,7 +32,68 @@ _LIVE_SHARE = 0.9
 _FONT = '"DejaVu Sans Mono", "Liberation Mono", Menlo, Consolas, monospace'
 
 
-class Moment(NamedTuple):
+GATES = {"blocked": 0, "age_s": 0.1}
+QUIET: Mapping[str, Any] = {
+    "daemon": {"version": "", "pid": 0, "api": 1},
+    "port": {"url": "sim://", "simulated": True},
+    "link": {"state": "up", "error": None, "retry_s": None},
+    "device": {"board": "virtual", "firmware": "sim", "unique_id": "3be41d96e0299308",
+               "tick_hz": 16_000_000},
+    "statistics": {"rx_frames": 1204, "rx_bad": 0, "rx_unreadable": 0, "repeats": 0,
+                   "round_trip_s": 0.0011},
+    "gates": GATES,
+    "phase": "idle",
+    "drop": None,
+    "session": None,
+    "control": None,
+    "clients": 1,
+    "error": None,
+}  # fmt: skip
+"""Sections of a rig at rest, without a session."""
+
+
+class FakeClient(ReconnectingClient):
+    """Shows one state and carries nothing out.
+
+    Parameters
+    ----------
+    state
+        What the daemon would say.
+    """
+
+    def __init__(self, state: State) -> None:
+        super().__init__(str(state.section("port").get("url", "")), None, self._nothing)
+        self._state = state
+
+    @property
+    def up(self) -> bool:
+        """Always."""
+        return True
+
+    @property
+    def driving(self) -> bool:
+        """Always."""
+        return True
+
+    @property
+    def state(self) -> State:
+        """The one it was given."""
+        return self._state
+
+    async def call(self, method: str, **params: Any) -> Any:
+        """Never answer."""
+        del method, params
+        await asyncio.Event().wait()
+
+    async def keep(self) -> None:
+        """Wait to be cancelled."""
+        await asyncio.Event().wait()
+
+    async def _nothing(self) -> None:
+        return
+
+
+class Screenshot(NamedTuple):
     """One picture: its name, and the moment it shows."""
 
     name: str
@@ -60,14 +121,14 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
     view = LiveAnalysis(session).read()
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for moment in moments(view):
-        path = folder / f"{moment.name}.svg"
-        path.write_text(asyncio.run(_picture(moment, session, keys)), "utf-8")
+    for shot in screenshots(view):
+        path = folder / f"{shot.name}.svg"
+        path.write_text(asyncio.run(_picture(shot, session, keys)), "utf-8")
         written.append(path)
     return written
 
 
-def moments(view: SessionView) -> list[Moment]:
+def screenshots(view: SessionView) -> list[Screenshot]:
     """Choose the moments."""
     job = view.jobs[-1]
     whole = state_of(view)
@@ -85,12 +146,12 @@ def moments(view: SessionView) -> list[Moment]:
         Stage.RESULT, job, verdict=record["verdict"], reasons=tuple(record["reasons"])
     )  # fmt: skip
     return [
-        Moment("device", Flow(Stage.DEVICE), before),
-        Moment("run", Flow(Stage.PREPARE, job), before),
-        Moment("live", Flow(Stage.LIVE, job), _falling(before, view, job)),
-        Moment("result", result, state),
-        Moment("session", Flow(Stage.DONE), state),
-        Moment("history", Flow(Stage.DONE), state),
+        Screenshot("device", Flow(Stage.DEVICE), before),
+        Screenshot("run", Flow(Stage.PREPARE, job), before),
+        Screenshot("live", Flow(Stage.LIVE, job), _falling(before, view, job)),
+        Screenshot("result", result, state),
+        Screenshot("session", Flow(Stage.DONE), state),
+        Screenshot("history", Flow(Stage.DONE), state),
     ]
 
 
@@ -103,21 +164,21 @@ def _falling(state: State, view: SessionView, job: Job) -> State:
     return State(0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges)
 
 
-async def _picture(moment: Moment, session: Path, keys: Mapping[str, str]) -> str:
-    client = Still(moment.state)
+async def _picture(shot: Screenshot, session: Path, keys: Mapping[str, str]) -> str:
+    client = FakeClient(shot.state)
     app = RigApp(Options(session=session), keys, client)
-    app.flow = moment.flow
+    app.driver.flow = shot.flow
     async with app.run_test(size=SIZE) as pilot:
         while app.view is None or app.view.lagging or not app.indicators.known:
             client.changed = True
             await pilot.pause()
-        if moment.name == "history":
+        if shot.name == "history":
             first = app.view.jobs[0]
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             await app.go("history")
         # All edges came at once, which looks like flicker for a while.
-        while len(moment.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
+        while len(shot.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
             gate.flickers(now := monotonic()) or not gate.steady(now)
             for gate in app.indicators.gates
         ):
