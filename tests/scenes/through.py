@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tests.scenes.draw import Scene
 
 LONGEST_S = 60.0
-"""Processor time of one command: a hundred times what the slowest one takes."""
+"""Processor time of one command, far beyond what any of them needs."""
 DONE, BAD_INPUT, VOID = 0, 2, 3
 QUANTITIES = ("separation_m", "separation_raw_m", "separation_strike_m", "speed_m_s",
               "release_skew_s", "gravity_m_s2")  # fmt: skip
