@@ -110,7 +110,14 @@ def _impulses(found: Mapping[str, Any]) -> Picture:
                 fmt=marker, color=color, markerfacecolor=PAPER, markersize=4,
                 label=f"{line['incline_deg']:g}° ± U (95 %)",
             )  # fmt: skip
-        top.set_yscale("log")
+        gains = [
+            gain
+            for line in shown
+            for group in line["groups"]
+            for gain in (group["eq9_m_s"], group["gain_m_s"]["value"])
+        ]
+        if max(gains, default=0.0) > 0.0:  # α may be nothing, and noise less
+            top.set_yscale("log")
         top.set_ylabel("speed gained ΔV (m/s)")
         top.legend(title="lines: Eq. 9")
         low.axhspan(-1, 1, color=MODEL_BAND, alpha=0.6, linewidth=0)

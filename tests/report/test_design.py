@@ -8,10 +8,14 @@ def test_uncertainties_are_plain_numbers():
         "gates": [{"side": "free", "height_m": 0.05}],
         "readable": True,
         "measurands": [
-            {"name": "release_skew_s", "u_run": 1.234e-3},
+            {"name": "speed_m_s", "u_run": 1.234},
             {"name": "gravity_m_s2", "u_run": 0.0256},
         ],
-        "coefficients": [{"name": "friction", "u": 0.0000456, "identified": True}],
+        "coefficients": [
+            {"name": "friction", "u": 0.0000456, "identified": True},
+            {"name": "alpha A", "u": 0.01, "identified": True},
+        ],
     }
     text = design_text({"runs": 4, "scatter": "stated", "current": layout})
     assert [line.split()[-1] for line in text.splitlines()[4:7]] == ["1234", "26", "0.000046"]
+    assert "α of A" in text

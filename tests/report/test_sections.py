@@ -69,6 +69,18 @@ def test_a_part_that_fails_takes_no_other_along(found):
     assert "The picture of the impulses" in sections.failed
 
 
+@pytest.mark.filterwarnings("error")
+def test_impulses_may_be_nothing(found):
+    still = copy.deepcopy(found)
+    for line in still["impulses"]["inclines"]:
+        for group in line["groups"]:
+            group["eq9_m_s"] = 0.0
+            group["gain_m_s"] = {"value": -1e-4, "u": 1e-6, "U95": 2e-6}
+    sections = Sections()
+    assert "impulses" in estimate_pictures(still, sections)
+    assert not sections.failed
+
+
 @pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
 def test_a_posterior_without_spread_has_no_picture(found, what):
     narrow = copy.deepcopy(found)
