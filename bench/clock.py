@@ -10,7 +10,7 @@ from urllib.parse import quote
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.commands.output import print_json, say
-from rig.protocol.scene import PPS_U
+from rig.protocol.protocol import PPS_U
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
 

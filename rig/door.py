@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
 __all__ = ["Edges", "Found", "Line", "Prediction", "Run", "Session", "open", "predict",

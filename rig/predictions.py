@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rig.model.predict import Prediction
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
 
 
 def predictions(protocol: Protocol) -> list[dict[str, Any]]:

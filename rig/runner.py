@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult
     from rig.campaign.events import Effect, Event
     from rig.daemon.connecting import Rig
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.records import Drop
 
 

@@ -26,7 +26,7 @@ from sim.truth import Truth
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rig.protocol.scene import Gate, Protocol, RodChain, Run, Side
+    from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
     from sim.dials import Dials
 
 

@@ -10,7 +10,7 @@ from rig.analysis.student import coverage_factor
 from rig.predictions import beside, predict_incline
 
 if TYPE_CHECKING:
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 _BEYOND = 5.0  # degrees that the curves go on beyond the outermost inclines
 _STEEPEST = 89.0

@@ -17,7 +17,7 @@ from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from rig.clock.calibration import TimeScale
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
 
 

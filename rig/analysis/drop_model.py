@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rig.analysis.pattern import Guess
     from rig.analysis.trains import Side
     from rig.analysis.trajectory import Trajectory
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.trajectory import Trajectory
-    from rig.protocol.scene import Gate
+    from rig.protocol.protocol import Gate
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]

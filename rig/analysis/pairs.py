@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from rig.analysis.result import DropResult
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 SIGNS = (0.5, -0.5, -0.5, 0.5)
 """Of the four runs of a block, in the difference."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rig.analysis.learn import Lesson, Taught
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.records import Drop
 
     Progress = Callable[[int, int], None]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.analysis.pattern import Guess
     from rig.analysis.trains import Train
     from rig.model.chain import Chain
-    from rig.protocol.scene import Protocol, RodChain, Run
+    from rig.protocol.protocol import Protocol, RodChain, Run
     from rig.records import Drop
 
     Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rig.analysis.result import DropResult
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.units import Quantity
 
 T = TypeVar("T")

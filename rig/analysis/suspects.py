@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.pattern import Guess
     from rig.analysis.trains import Side, Train
-    from rig.protocol.scene import Protocol, RodChain, Run
+    from rig.protocol.protocol import Protocol, RodChain, Run
     from rig.records import Drop
 
 CONVINCING = 0.85

@@ -12,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rig.protocol.scene import Gate, RodChain
+    from rig.protocol.protocol import Gate, RodChain
     from rig.records import Drop
 
     Array = NDArray[np.float64]

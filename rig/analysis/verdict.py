@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
     from rig.analysis.pattern import Guess
     from rig.analysis.result import Audit, Measured, Verdict
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.records import Drop
 
 SUPPORT = 0.6

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.result import DropResult
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.records import Drop
 
 _STRAY = -1  # the truth's rod number of what was no rod

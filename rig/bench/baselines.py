@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.result import DropResult
-    from rig.protocol.scene import Gate, Protocol, Side
+    from rig.protocol.protocol import Gate, Protocol, Side
     from rig.records import Drop
 
     Array = NDArray[np.float64]

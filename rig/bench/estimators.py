@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.clock.calibration import TimeScale
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
 
 TRIALS = (10**2, 10**3, 10**4, 10**5, 10**6)

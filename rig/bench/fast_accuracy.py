@@ -28,7 +28,7 @@ from rig.records import Drop, Edge
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 BLOCK = 4
 """Drops in a block: A, B, B, A."""

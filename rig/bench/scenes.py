@@ -24,7 +24,7 @@ from rig.protocol.reader import parse
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 PACKAGES = ("numpy", "yaml", "scipy", "matplotlib")
 """Large packages that a scene may or may not load."""

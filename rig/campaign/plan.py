@@ -9,7 +9,7 @@ from rig.records import Job
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from rig.protocol.scene import Run
+    from rig.protocol.protocol import Run
 
 ATTEMPTS = 3
 """How often a void run is made before it stays void."""

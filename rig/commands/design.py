@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.design.outlook import Outlook
-    from rig.protocol.scene import Protocol, Side
+    from rig.protocol.protocol import Protocol, Side
 
 SPACING_M = 0.01
 

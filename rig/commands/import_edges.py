@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Sequence
 
-    from rig.protocol.scene import Gate, Protocol
+    from rig.protocol.protocol import Gate, Protocol
     from rig.records import Drop
 
 

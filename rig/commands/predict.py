@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Mapping
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 
 def main(arguments: Namespace) -> int:

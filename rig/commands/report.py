@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.analysis.session import Analysis
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.report.embed import Picture
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 INTERRUPTED = 130
 _KINDS = (".csv", ".npz", ".svg")

@@ -17,7 +17,7 @@ from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.errors import InputError
 from rig.model.rods import rod_impacts
 from rig.protocol.plan import runs
-from rig.protocol.scene import Gate, Gates, Run
+from rig.protocol.protocol import Gate, Gates, Run
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.analysis.trains import Side, Train
-    from rig.protocol.scene import Protocol
-    from rig.protocol.scene import Side as Role
+    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Side as Role
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]

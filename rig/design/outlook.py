@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.design.cases import Case, Cases
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]

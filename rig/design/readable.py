@@ -14,8 +14,8 @@ from rig.protocol.plan import runs
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.scene import Protocol
-    from rig.protocol.scene import Side as Role
+    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Side as Role
 
 MARGIN = 0.03
 """Beyond what a verdict asks for: real edges are missed, and flicker."""

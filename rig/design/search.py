@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.design.cases import Cases
-    from rig.protocol.scene import Protocol, Side
+    from rig.protocol.protocol import Protocol, Side
 
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.result import DropResult, Measured
     from rig.model.surface import Surface
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rig.estimate.forms import Form
     from rig.estimate.joint import Hypothesis, Outcome
     from rig.model.chain import Chain
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
 CONTACT_U = 1e-3

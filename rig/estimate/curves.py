@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.drop_model import DropModel
     from rig.analysis.learn import Lesson, Taught
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
 
     Array = NDArray[np.float64]
 

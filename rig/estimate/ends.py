@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rig.estimate.coefficients import Scene
     from rig.estimate.forms import Form
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rig.analysis.shared import Shared
     from rig.analysis.trajectory import Trajectory
     from rig.model.chain import Chain
-    from rig.protocol.scene import Run
+    from rig.protocol.protocol import Run
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rig.estimate.forms import Form
     from rig.estimate.joint import Hypothesis
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
 

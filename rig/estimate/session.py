@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rig.estimate.coefficients import Scene
     from rig.estimate.forms import Form
     from rig.estimate.joint import Outcome
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
 
 
 @one_thread

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
+from rig.protocol.protocol import RodChain
 from rig.protocol.rods import Rods, read_rods
-from rig.protocol.scene import RodChain
 from rig.protocol.spacing import Spacing, fits, place_rods, read_spacing
 from rig.protocol.yamltree import Mapping, Node, Sequence
 from rig.units import Dimension, Quantity, quoted

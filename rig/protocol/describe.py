@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from rig.boards import BOARDS
 from rig.protocol.measurable import lacking, longest_fall, record_ms, too_long, unmeasurable
 from rig.protocol.plan import runs
-from rig.protocol.scene import AT_REST, SIDES
+from rig.protocol.protocol import AT_REST, SIDES
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.scene import Drag, Gate, Protocol, RodChain
+    from rig.protocol.protocol import Drag, Gate, Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
 

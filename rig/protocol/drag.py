@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
-from rig.protocol.scene import Drag
+from rig.protocol.protocol import Drag
 from rig.units import Dimension
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from rig.protocol.fields import FieldFaults
-    from rig.protocol.scene import RodChain
+    from rig.protocol.protocol import RodChain
     from rig.protocol.yamltree import Node
 
 COEFFICIENT = Range(Dimension.NUMBER, 0.0, 10.0, "1", open_low=True)

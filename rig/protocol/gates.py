@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.boards import GATES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
-from rig.protocol.scene import SIDES, Gate, Gates, RodChain, Side
+from rig.protocol.protocol import SIDES, Gate, Gates, RodChain, Side
 from rig.units import Dimension
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from rig.boards import LONGEST_RECORD_MS
 from rig.errors import InputError, Problem
-from rig.protocol.scene import AT_REST, SIDES
+from rig.protocol.protocol import AT_REST, SIDES
 from rig.protocol.yamltree import load, place_of
 
 if TYPE_CHECKING:
     from rig.boards import Capabilities
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 LEAST_RECORD_MS = 1500
 """Long enough for the drops of most labs, and then the same for all."""

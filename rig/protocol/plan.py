@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from rig.protocol.scene import Run
+from rig.protocol.protocol import Run
 
 if TYPE_CHECKING:
-    from rig.protocol.scene import Order, Protocol
+    from rig.protocol.protocol import Order, Protocol
 
 T = TypeVar("T")
 

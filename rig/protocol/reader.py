@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
 from rig.protocol.fields import FieldFaults, Range, Section
-from rig.protocol.scene import AT_REST, PPS_U, Accept, Plan, Protocol, Release
+from rig.protocol.protocol import AT_REST, PPS_U, Accept, Plan, Protocol, Release
 from rig.protocol.yamltree import Mapping, Place, ScalarNode, load
 from rig.units import Dimension, Quantity
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from rig.model.surface import Surface
     from rig.protocol.fields import Converter
-    from rig.protocol.scene import Drag, Gates, RodChain
+    from rig.protocol.protocol import Drag, Gates, RodChain
     from rig.protocol.yamltree import Node
 
 MAX_BYTES = 1_000_000

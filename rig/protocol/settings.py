@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, cast
 from rig.boards import RELEASES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
-from rig.protocol.scene import Accept, Order, Plan, Release
+from rig.protocol.protocol import Accept, Order, Plan, Release
 from rig.protocol.yamltree import ScalarNode
 from rig.units import Dimension
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from rig.link.messages import Identity
     from rig.link.port import Port
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.session.store import Session
 

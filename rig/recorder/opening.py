@@ -12,7 +12,7 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.session.reading import Reader
 
 

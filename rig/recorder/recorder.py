@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rig.link.messages import DisarmReason, Identity
     from rig.link.port import Port
     from rig.link.transcript import Direction, Record
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.recorder.feed import StateFeed
     from rig.recorder.sink import SessionSink
     from rig.records import Drop

@@ -12,7 +12,7 @@ from rig.recorder.interrupts import StoppedError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.recorder.recorder import Recorder
 
 _LABEL = pack_label(TEST_RUN, 1)

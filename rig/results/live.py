@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult, Measured
     from rig.clock.calibration import Calibration, TimeScale
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
     from rig.session.reading import Reader, StateEntry
 

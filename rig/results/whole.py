@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.session.reading import Reader
 

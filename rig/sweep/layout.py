@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rig.model.chain import Chain
     from rig.model.surface import Pile
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 MOST_POINTS = 20_000_000
 """Their results take 17 bytes each, all in memory until the file is written."""

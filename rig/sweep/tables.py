@@ -15,7 +15,7 @@ from rig.sweep.variables import VARIABLES
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.sweep.compute import Swept
     from rig.sweep.layout import Layout
 

@@ -13,7 +13,7 @@ from rig.protocol.surface import FRICTION, RESTITUTION
 
 if TYPE_CHECKING:
     from rig.protocol.fields import Range
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 
 @dataclass(frozen=True, slots=True)

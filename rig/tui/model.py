@@ -10,7 +10,7 @@ from rig.campaign.voids import Voids
 
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.trains import Train
     from rig.analysis.trajectory import Trajectory
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
 
     Array = NDArray[np.float64]
     Table = Iterable[Sequence[int]] | NDArray[np.int64]

@@ -14,7 +14,7 @@ from rig.tui.widgets.figure import Picture, Series
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from rig.protocol.scene import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.results.live import SessionView
     from rig.tui.motion import Motion, Table
 

@@ -19,7 +19,7 @@ from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
 from rig.model.chain import Chain
 from rig.protocol import reader
-from rig.protocol.scene import Protocol, Run
+from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop, Edge
 from sim.dials import Dials
 from sim.lab import ChainLab

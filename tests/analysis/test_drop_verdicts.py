@@ -12,7 +12,7 @@ from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
 from rig.errors import InputError
 from rig.model.chain import Chain
-from rig.protocol.scene import Accept
+from rig.protocol.protocol import Accept
 from rig.records import Certificate, Edge
 from rig.units import Quantity
 from sim.dials import Dials

@@ -13,7 +13,7 @@ from rig.clock.host import HostClocks, HostWatch, SystemClock
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.protocol import reader
-from rig.protocol.scene import PPS_U
+from rig.protocol.protocol import PPS_U
 from rig.recorder.recorder import Recorder
 from rig.results import calibration
 from rig.session.store import Session

@@ -18,7 +18,7 @@ from rig.errors import InputError
 from rig.estimate.coefficients import best, scene
 from rig.estimate.forms import merged
 from rig.protocol.plan import runs
-from rig.protocol.scene import Gate, Gates, Plan, Protocol
+from rig.protocol.protocol import Gate, Gates, Plan, Protocol
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, UNIFORM, Case, case
 from tests.analysis.sessions import analysis as analyzed

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.protocol.plan import runs
+from rig.protocol.protocol import Run
 from rig.protocol.reader import parse
-from rig.protocol.scene import Run
 from rig.protocol.site import gravity_at
 
 TWO = """\

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rig.protocol.reader import parse
 
 if TYPE_CHECKING:
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
 
 TITLES = (
     "",

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
-    from rig.protocol.scene import Protocol
+    from rig.protocol.protocol import Protocol
     from rig.tui.model import Model
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from textual.geometry import Size
 
-    from rig.protocol.scene import Gate, Protocol
+    from rig.protocol.protocol import Gate, Protocol
     from rig.tui.indicators import Indicator, Indicators
 
 _WIDE, _SHORT = 50, 34
