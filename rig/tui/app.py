@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import asyncio
+from importlib import import_module
 from time import monotonic, process_time
 from typing import TYPE_CHECKING, Any, cast
 
 from textual import events
 from textual.app import App, ComposeResult, SystemCommand
 from textual.css.query import NoMatches
-from textual.widgets import ContentSwitcher
+from textual.theme import Theme
+from textual.widgets import ContentSwitcher, Input
 
-from rig.campaign.events import Refused, Stage, Tick
-from rig.campaign.machine import Flow, step
-from rig.tui import doing, effects, keyboard, pages, seen, themes
+from rig.campaign.events import Refused, Stage, Stopped, Tick
+from rig.campaign.machine import BEFORE_RELEASE, Flow
+from rig.tui import commands, selectors
 from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, possible, shown_key
 from rig.tui.client import ReconnectingClient
+from rig.tui.driver import Driver
 from rig.tui.follow import Follower
+from rig.tui.screens.ask import Ask, Confirm, Pick
+from rig.tui.screens.help import Help
 from rig.tui.screens.protocol import ProtocolPage
 from rig.tui.widgets.status import Status
 from rig.tui.widgets.stopbar import StopBar
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterable, Mapping
+    from collections.abc import Callable, Coroutine, Iterable, Mapping
 
-    from textual.screen import Screen
+    from textual.screen import ModalScreen, Screen
 
-    from rig.campaign.events import Event
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators
     from rig.tui.model import Model
@@ -36,6 +40,8 @@ if TYPE_CHECKING:
     from rig.tui.state import State
 
 TICK_S = 0.1
+_REPEAT_S = 0.7
+"""A key that is held down repeats itself: that is no wish to stop."""
 _SHARE = 0.17  # of a core, that this may take on a slow machine
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
@@ -44,6 +50,64 @@ _PAGE_OF = {
     Stage.HALTED: "result",
     Stage.DONE: "session",
 }
+
+
+THEMES = (
+    Theme(
+        name="rig-dark",
+        primary="#5aa9e6",
+        secondary="#f2a65a",
+        accent="#c3a6ff",
+        success="#6fcf97",
+        warning="#f2c94c",
+        error="#ff6b6b",
+        foreground="#dfe6ee",
+        background="#10151c",
+        surface="#161d27",
+        panel="#1e2733",
+        dark=True,
+        variables={"border": "#33465c", "border-blurred": "#33465c"},
+    ),
+    Theme(
+        name="rig-light",
+        primary="#0b5cad",
+        secondary="#a8480c",
+        accent="#6a3fb5",
+        success="#1b6e3c",
+        warning="#7a5900",
+        error="#b3161d",
+        foreground="#1b232c",
+        background="#fbfaf7",
+        surface="#f3f1ec",
+        panel="#e6e3dc",
+        dark=False,
+        variables={"border": "#9aa5b1", "border-blurred": "#9aa5b1"},
+    ),
+    Theme(
+        name="rig-contrast",
+        primary="#00ffff",
+        secondary="#ffff00",
+        accent="#ffffff",
+        success="#00ff00",
+        warning="#ffff00",
+        error="#ff9d9d",
+        foreground="#ffffff",
+        background="#000000",
+        surface="#000000",
+        panel="#000000",
+        dark=True,
+        variables={"border": "#ffffff", "border-blurred": "#ffffff"},
+    ),
+)
+"""Colours: dark, light, and the two extremes only."""
+_PAGES = ("protocol", "device", "run", "result", "session", "history")
+
+
+def _page(name: str) -> type[Page]:
+    """Load a page, which the first paint may not need; safe in any thread."""
+    module = import_module(f"rig.tui.screens.{name}")
+    kind: type[Page] = getattr(module, f"{name.title()}Page")
+    return kind
 
 
 class RigApp(App[None]):
@@ -74,26 +138,23 @@ class RigApp(App[None]):
         self.options = options
         self.keys: Mapping[str, str] = keys
         self.action_of = {key: name for name, given in keys.items() for key in given.split(",")}
-        start = Stage.DONE if options.offline else Stage.PROTOCOL
-        self.flow = Flow(stage=start, countdown_s=options.countdown_s)
-        self.since = 0.0
-        """When the flow came to its stage."""
         self.page: str = ""
-        self.asked: tuple[str, str] | None = None
-        """Protocol and session that were opened from here."""
         self.client = client
         if client is None and not options.offline:
             self.client = ReconnectingClient(options.port, options.socket, self._reached)
-        self.follower = Follower(self.client, self._begin)
+        self.follower = Follower(self.client, self.begin)
+        start = Stage.DONE if options.offline else Stage.PROTOCOL
+        flow = Flow(stage=start, countdown_s=options.countdown_s)
+        self.driver = Driver(flow, self.client, self.follower, self.begin)
         self.protocols = ProtocolPage(options.files, options.session)
         self.pages: dict[str, Page] = {ProtocolPage.NAME: self.protocols}
         self._turning = asyncio.Lock()
         self._last = monotonic()
         self._spent = process_time()
         self._followed = ""
-        for theme in themes.THEMES:
+        for theme in THEMES:
             self.register_theme(theme)
-        self.theme = themes.NAMES[0]
+        self.theme = THEMES[0].name
 
     # ------------------------------------------------------------------ life
 
@@ -110,10 +171,11 @@ class RigApp(App[None]):
         await self._follow()
         self.set_timer(TICK_S, self._tick)
         self.draw()
-        self.call_after_refresh(lambda: self._begin(self._load_pages()))
+        self.call_after_refresh(lambda: self.begin(self._load_pages()))
 
-    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
-        self.run_worker(work, group="read")
+    def begin(self, work: Coroutine[Any, Any, None]) -> None:
+        """Do something beside the screens."""
+        self.run_worker(work, group="beside")
 
     async def _tick(self) -> None:
         # Ten times a second, and down to five where that takes too much of the machine.
@@ -125,14 +187,14 @@ class RigApp(App[None]):
         now = monotonic()
         passed, self._last = now - self._last, now
         if self.flow.stage is Stage.COUNTDOWN:
-            self.event(Tick(passed))
+            self.driver.take(Tick(passed))
         if "history" in self.pages:
             self.history.tick(passed)
         if self.client is not None and self.client.changed:
             self.client.changed = False
-            reopens = self.asked is not None
+            reopens = self.driver.asked is not None
             for event in self.follower.absorb(self.flow.stage, now, reopens=reopens):
-                self.event(event)
+                self.driver.take(event)
         await self._follow()
         self.draw()
 
@@ -158,6 +220,11 @@ class RigApp(App[None]):
     # ------------------------------------------------------------------ what is known
 
     @property
+    def flow(self) -> Flow:
+        """Where the campaign is."""
+        return self.driver.flow
+
+    @property
     def state(self) -> State:
         """What the daemon said last."""
         return self.follower.state
@@ -180,26 +247,15 @@ class RigApp(App[None]):
     @property
     def model(self) -> Model:
         """What the pages are drawn from, now."""
-        return seen.model(self)
+        return selectors.model(self.client, self.follower, self.flow, self.page)
 
     # ------------------------------------------------------------------ flow and pages
 
     async def _reached(self) -> None:
         """Go on where the daemon, or a new one, is."""
         assert self.client is not None
-        if self.asked and self.client.driving and not self.client.state.section("session"):
-            await doing.open_session(self, *self.asked)
-
-    def event(self, event: Event) -> None:
-        """Let the flow take an event, and have its effects carried out."""
-        before = self.flow.stage
-        self.flow, wanted = step(self.flow, event)
-        if self.flow.stage is not before:
-            self.since = monotonic()
-        if self.flow.stage is Stage.RESULT and self.flow.job is not None:
-            self.follower.judged.add(self.flow.job)
-        for effect in wanted:
-            self.run_worker(effects.carry_out(self, effect, self.flow.ticket), group="effects")
+        if self.driver.asked and self.client.driving and not self.client.state.section("session"):
+            await self.driver.open_session(*self.driver.asked, self.options.seed)
 
     async def _follow(self) -> None:
         """Show the page of the stage when the stage has changed."""
@@ -213,22 +269,22 @@ class RigApp(App[None]):
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""
-        for name in pages.NAMES:
-            await asyncio.to_thread(pages.load, name)
-        await asyncio.to_thread(pages.load_rest)
+        for name in _PAGES:
+            await asyncio.to_thread(_page, name)
+        await asyncio.to_thread(import_module, "rig.results.live")
 
     @property
     def history(self) -> HistoryPage:
         """The page with the tape."""
         if "history" not in self.pages:
-            self.pages["history"] = pages.load("history")()
+            self.pages["history"] = _page("history")()
         return cast("HistoryPage", self.pages["history"])
 
     async def go(self, page: str) -> None:
         """Show a page."""
         async with self._turning:  # the flow and a key may want a page at the same time
             if page not in self.pages:
-                self.pages[page] = (await asyncio.to_thread(pages.load, page))()
+                self.pages[page] = (await asyncio.to_thread(_page, page))()
             if not self._open():
                 return
             switcher = self.screen_stack[0].query_one("#pages", ContentSwitcher)
@@ -240,15 +296,60 @@ class RigApp(App[None]):
             self.page = page
         self.draw()
 
+    def ask(
+        self, question: ModalScreen[Any], answered: Callable[[Any], None] | None = None
+    ) -> None:
+        """Ask the operator."""
+        self.push_screen(question, answered)
+
+    def next_theme(self) -> None:
+        """Change the colours."""
+        names = [theme.name for theme in THEMES]
+        at = names.index(self.theme) if self.theme in names else -1
+        self.theme = names[(at + 1) % len(names)]
+
     # ------------------------------------------------------------------ keys and mouse
 
     async def on_event(self, event: events.Event) -> None:
         """Take keys before anybody else: STOP must work with focus anywhere."""
         key = event.key if isinstance(event, events.Key) and not event.is_forwarded else None
-        if key is not None and keyboard.takes(self, key):
+        if key is not None and self._takes(key):
             event.stop()
             return
         await super().on_event(event)
+
+    def _takes(self, key: str) -> bool:
+        """Do what a key means now, STOP first; say whether it meant anything."""
+        name, screen = self.action_of.get(key), self.screen
+        if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
+            self.action_do("stop")
+            if isinstance(screen, (Help, Confirm, Pick)):
+                screen.dismiss(None)
+            return True
+        if self.flow.stage in BEFORE_RELEASE:
+            held = name == "go_on" and monotonic() - self.driver.since < _REPEAT_S
+            if not held:
+                self.driver.take(Stopped())
+            return True
+        if isinstance(screen, Ask) and key == "escape":
+            screen.dismiss(None)
+            return True
+        if isinstance(screen, Pick) and key == "backspace":
+            screen.dismiss(None)
+            return True
+        if isinstance(screen, Confirm):
+            screen.dismiss(key == "enter")
+            return True
+        if isinstance(screen, Help):
+            if name in {"previous", "next"}:
+                screen.move(1 if name == "next" else -1)
+            else:
+                screen.dismiss(None)
+            return True
+        if len(self.screen_stack) > 1 or name is None:
+            return False
+        self.action_do(name)
+        return True
 
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
@@ -257,10 +358,10 @@ class RigApp(App[None]):
             return
         if not possible(action, self.flow.stage, driving=self.driving):
             if action.driving and not self.driving:
-                self.event(Refused(self.flow.ticket, "this screen only watches\n"
+                self.driver.take(Refused(self.flow.ticket, "this screen only watches\n"
                                    "c takes control when it is free"))  # fmt: skip
             return
-        self.run_worker(doing.do(self, name), group="actions")
+        self.begin(commands.do(self, name))
 
     def action_choose(self, page: str, at: int) -> None:
         """Choose a line of a page's list by mouse."""

@@ -66,8 +66,8 @@ class Follower:
         self._client = client
         self._begin = begin
         self._path: Path | None = None
-        self._book: LiveAnalysis | None = None
-        self._reading = self._learning = False
+        self._live: LiveAnalysis | None = None
+        self._reading = self._fitting = False
         self._wanted: object = None
         self._read: object = None
         self._lost: Mapping[str, Any] = {}  # why the port was
@@ -76,7 +76,7 @@ class Follower:
     @property
     def done(self) -> int:
         """How many drops of the file were analysed so far."""
-        return self._book.done if self._book else 0
+        return self._live.done if self._live else 0
 
     def look_at(self, path: Path) -> None:
         """Look at a file that nobody records."""
@@ -84,7 +84,7 @@ class Follower:
         self._begin(self._read_quietly())
 
     def _forget(self, path: Path | None = None) -> None:
-        self._path, self._book, self.view, self.voids = path, None, None, Voids()
+        self._path, self._live, self.view, self.voids = path, None, None, Voids()
 
     def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
         """Take what the daemon says now.
@@ -149,7 +149,7 @@ class Follower:
     def _look_at_session(self, session: Mapping[str, object], state: State, now: float) -> None:
         path = Path(str(session["path"]))
         if self._path != path:
-            self._path, self._book, self.indicators = path, None, Indicators()
+            self._path, self._live, self.indicators = path, None, Indicators()
         self._wanted = (path, state.runs, int(now / _CLOCK_S))
         if self._wanted != self._read and not self._reading:
             self._reading = True
@@ -170,17 +170,17 @@ class Follower:
             raise RigError("no session is open")
         self._reading = True
         try:
-            if self._book is None:
-                self._book = await asyncio.to_thread(_opened, path)
-            book = self._book
-            found = await asyncio.to_thread(book.read)
+            if self._live is None:
+                self._live = await asyncio.to_thread(_opened, path)
+            live = self._live
+            found = await asyncio.to_thread(live.read)
         finally:
             self._reading, self._read = False, wanted
         if path == self._path:
             self._take(found)
-        if found.lagging and not self._learning:
-            self._learning = True
-            self._begin(self._learn(book, found))
+        if found.lagging and not self._fitting:
+            self._fitting = True
+            self._begin(self._fit_jointly(live, found))
         return found
 
     def _take(self, found: SessionView) -> None:
@@ -198,12 +198,12 @@ class Follower:
         except RigError as error:
             self.unreadable = f"{error.message}\n{error.hint}"
 
-    async def _learn(self, book: LiveAnalysis, found: SessionView) -> None:
+    async def _fit_jointly(self, live: LiveAnalysis, found: SessionView) -> None:
         try:
-            await asyncio.to_thread(book.fit_jointly, found)
+            await asyncio.to_thread(live.fit_jointly, found)
         finally:
-            self._learning = False
-        if book is self._book:
+            self._fitting = False
+        if live is self._live:
             await self._read_quietly()
 
 

@@ -4,48 +4,85 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from textual.content import Content
 
-from rig.campaign.events import refused
 from rig.errors import RigError
+from rig.results import protocol_of
 from rig.results.live import LiveAnalysis
+from rig.session.store import Session
 from rig.tui.actions import shown_key
 from rig.tui.replay import Player
 from rig.tui.screens.ask import Pick
-from rig.tui.shelf import shelf
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.words import plain
 
 if TYPE_CHECKING:
-    from rig.tui.app import RigApp
-    from rig.tui.shelf import Volume
+    from rig.tui.terminal import Terminal
 
 
-async def sessions(app: RigApp) -> None:
+_MOST = 200
+"""Files that are listed, the newest."""
+
+
+class SessionEntry(NamedTuple):
+    """One session file; `trouble` says why it cannot be read."""
+
+    path: Path
+    title: str = ""
+    created: str = ""
+    drops: int = 0
+    simulated: bool = False
+    trouble: str = ""
+
+
+def session_list(folder: Path) -> list[SessionEntry]:
+    """List the sessions of a folder, the newest first."""
+    found = []
+    for path in folder.glob("*.session"):
+        try:
+            found.append((path.stat().st_mtime_ns, path))
+        except OSError:
+            continue  # gone meanwhile
+    return [_look(path) for _, path in sorted(found, reverse=True)[:_MOST]]
+
+
+def _look(path: Path) -> SessionEntry:
+    try:
+        with Session.open(path, readonly=True) as session:
+            title = protocol_of(session).title
+            drops = len({entry[:2] for entry in session.states() if entry.state == "recorded"})
+            return SessionEntry(path, title, session.meta["created"], drops, session.simulated)
+    except RigError as error:
+        return SessionEntry(path, trouble=error.message)
+
+
+async def sessions(app: Terminal) -> None:
     """Let one session of the folder be chosen, and play it."""
-    mine = app.view.path if app.view else app.options.session
+    view = app.model.view
+    mine = view.path if view else app.options.session
     folder = mine.parent if mine else Path()
-    volumes = await asyncio.to_thread(shelf, folder)
+    entries = await asyncio.to_thread(session_list, folder)
     await app.go("history")
     now = app.history.view.path if app.history.view else mine
-    at = next((n for n, one in enumerate(volumes) if now and _same(one.path, now)), 0)
+    at = next((n for n, one in enumerate(entries) if now and _same(one.path, now)), 0)
 
     def chosen(number: int | None) -> None:
-        if number is not None and volumes:
-            app.run_worker(_open(app, volumes[number]), group="actions")
+        if number is not None and entries:
+            app.begin(_open(app, entries[number]))
 
     title = f"Sessions in {plain(folder.resolve(), 80)}, the newest first"
-    app.push_screen(Pick(title, [_line(one) for one in volumes], at, _stop_key(app)), chosen)
+    app.ask(Pick(title, [_line(one) for one in entries], at, _stop_key(app)), chosen)
 
 
-def drops(app: RigApp) -> None:
+def drops(app: Terminal) -> None:
     """Let one drop of the session that is played be chosen."""
     found, history = app.history.view, app.history
     if found is None:
         return
-    hidden = app.flow.job if app.model.blindfold and history.other is None else None
+    model = app.model
+    hidden = model.flow.job if model.blindfold and history.other is None else None
     lines = []
     for job in found.jobs:
         verdict = "recorded" if job == hidden else found.results[job].verdict
@@ -61,30 +98,30 @@ def drops(app: RigApp) -> None:
         if number is not None:
             history.choose(number)
 
-    app.push_screen(Pick("Drops of this session", lines, history.player.at, _stop_key(app)), chosen)
+    app.ask(Pick("Drops of this session", lines, history.player.at, _stop_key(app)), chosen)
 
 
-async def _open(app: RigApp, volume: Volume) -> None:
-    history, live = app.history, app.view
-    if live is not None and _same(live.path, volume.path):
+async def _open(app: Terminal, entry: SessionEntry) -> None:
+    history, live = app.history, app.model.view
+    if live is not None and _same(live.path, entry.path):
         history.other = None
     else:
         try:
-            history.other = await asyncio.to_thread(LiveAnalysis(volume.path).read)
+            history.other = await asyncio.to_thread(LiveAnalysis(entry.path).read)
         except RigError as error:
-            app.event(refused(app.flow.ticket, error))
+            app.driver.refuse(error)
             return
     history.player = Player(speed=history.player.speed)
 
 
-def _line(volume: Volume) -> Content:
-    name = f"{plain(volume.path.name, 26):28}"
-    if volume.trouble:
-        return Content.assemble(name, ("✗ ", "bold $error"), plain(volume.trouble, 60))
-    stamp = "▲ SIMULATED" if volume.simulated else ""
+def _line(entry: SessionEntry) -> Content:
+    name = f"{plain(entry.path.name, 26):28}"
+    if entry.trouble:
+        return Content.assemble(name, ("✗ ", "bold $error"), plain(entry.trouble, 60))
+    stamp = "▲ SIMULATED" if entry.simulated else ""
     return Content.assemble(
-        name, f"{volume.created[:16].replace('T', ' '):18}{volume.drops:4} drops  ",
-        (f"{stamp:13}", "bold $warning"), (plain(volume.title, 60), "$foreground 70%"),
+        name, f"{entry.created[:16].replace('T', ' '):18}{entry.drops:4} drops  ",
+        (f"{stamp:13}", "bold $warning"), (plain(entry.title, 60), "$foreground 70%"),
     )  # fmt: skip
 
 
@@ -92,5 +129,5 @@ def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
 
 
-def _stop_key(app: RigApp) -> str:
+def _stop_key(app: Terminal) -> str:
     return shown_key(app.keys["stop"])

@@ -6,16 +6,16 @@ import asyncio
 import re
 from dataclasses import replace
 from time import monotonic
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
+from rig.tui.client import ReconnectingClient
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import State, state_of
-from rig.tui.still import QUIET, Still
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
@@ -30,6 +30,67 @@ if TYPE_CHECKING:
 SIZE = (120, 36)
 _LIVE_SHARE = 0.9
 _FONT = '"DejaVu Sans Mono", "Liberation Mono", Menlo, Consolas, monospace'
+
+
+GATES = {"blocked": 0, "age_s": 0.1}
+QUIET: Mapping[str, Any] = {
+    "daemon": {"version": "", "pid": 0, "api": 1},
+    "port": {"url": "sim://", "simulated": True},
+    "link": {"state": "up", "error": None, "retry_s": None},
+    "device": {"board": "virtual", "firmware": "sim", "unique_id": "3be41d96e0299308",
+               "tick_hz": 16_000_000},
+    "statistics": {"rx_frames": 1204, "rx_bad": 0, "rx_unreadable": 0, "repeats": 0,
+                   "round_trip_s": 0.0011},
+    "gates": GATES,
+    "phase": "idle",
+    "drop": None,
+    "session": None,
+    "control": None,
+    "clients": 1,
+    "error": None,
+}  # fmt: skip
+"""Sections of a rig at rest, without a session."""
+
+
+class FakeClient(ReconnectingClient):
+    """Shows one state and carries nothing out.
+
+    Parameters
+    ----------
+    state
+        What the daemon would say.
+    """
+
+    def __init__(self, state: State) -> None:
+        super().__init__(str(state.section("port").get("url", "")), None, self._nothing)
+        self._state = state
+
+    @property
+    def up(self) -> bool:
+        """Always."""
+        return True
+
+    @property
+    def driving(self) -> bool:
+        """Always."""
+        return True
+
+    @property
+    def state(self) -> State:
+        """The one it was given."""
+        return self._state
+
+    async def call(self, method: str, **params: Any) -> Any:
+        """Never answer."""
+        del method, params
+        await asyncio.Event().wait()
+
+    async def keep(self) -> None:
+        """Wait to be cancelled."""
+        await asyncio.Event().wait()
+
+    async def _nothing(self) -> None:
+        return
 
 
 class Moment(NamedTuple):
@@ -104,9 +165,9 @@ def _falling(state: State, view: SessionView, job: Job) -> State:
 
 
 async def _picture(moment: Moment, session: Path, keys: Mapping[str, str]) -> str:
-    client = Still(moment.state)
+    client = FakeClient(moment.state)
     app = RigApp(Options(session=session), keys, client)
-    app.flow = moment.flow
+    app.driver.flow = moment.flow
     async with app.run_test(size=SIZE) as pilot:
         while app.view is None or app.view.lagging or not app.indicators.known:
             client.changed = True

@@ -21,7 +21,9 @@ async def listening(op):
 
     async def call(method, **params):
         called.append(method)
-        return await real(method, **params)
+        answer = await real(method, **params)
+        called.append(f"{method} answered")
+        return answer
 
     op.app.client.call = call
     yield called
@@ -29,10 +31,10 @@ async def listening(op):
 
 
 async def stops(op, key):
-    """Press a key and see that the daemon is asked to stop."""
+    """Press a key and see that the daemon is asked to stop, and has done so."""
     async with listening(op) as called:
         await op.press(key)
-        await op.until(lambda: "stop" in called)
+        await op.until(lambda: "stop answered" in called)
 
 
 def test_stop_works_in_every_dialog(lab):
@@ -82,7 +84,7 @@ def test_stop_works_in_every_state_that_lasts(lab):
                 await op.at(Stage.PREPARE)
                 await op.sees(said)
             await op.until(lambda: op.app.state.phase == "idle")
-            op.app.flow = replace(op.app.flow, countdown_s=0.1)
+            op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
             await op.arms(Stage.LIVE)
             await stops(op, "escape")
             await op.at(Stage.RESULT)  # what there is is kept and judged

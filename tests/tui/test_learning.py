@@ -1,4 +1,4 @@
-"""The session page says what ``rig analyze`` says; and the shelf of sessions."""
+"""The session page says what ``rig analyze`` says; and the list of sessions."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.options import Options
+from rig.tui.picking import session_list
 from rig.tui.plots import control_pictures
-from rig.tui.shelf import shelf
 from tests.cli.lab import rig, short
 from tests.tui.lab import KEYS, Operator, run
 
@@ -33,16 +33,16 @@ def recorded(tmp_path_factory) -> Path:
 
 
 def test_what_is_learned_is_what_rig_analyze_says(recorded):
-    book = LiveAnalysis(recorded)
-    alone = book.read()
+    live = LiveAnalysis(recorded)
+    alone = live.read()
     assert (alone.fitted, alone.lagging) == (0, True)
-    book.fit_jointly(alone)
-    learned = book.read()
+    live.fit_jointly(alone)
+    fitted = live.read()
     with Session.open(recorded, readonly=True) as session:
         expected = detailed(session)[0]
-    assert (learned.fitted, learned.lagging) == (len(expected.lesson.drops), False)
-    assert learned.analysis == expected.json()
-    assert learned.analysis["summary"] != alone.analysis["summary"]
+    assert (fitted.fitted, fitted.lagging) == (len(expected.lesson.drops), False)
+    assert fitted.analysis == expected.json()
+    assert fitted.analysis["summary"] != alone.analysis["summary"]
 
 
 def test_both_control_charts_are_there_and_hide_a_blind_run(recorded):
@@ -61,10 +61,10 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
     other = recorded.with_name("zero.session")
     Session.create(other, short(), "zero.yaml", simulated=True, origin="sim://").close()
     (recorded.parent / "broken.session").write_bytes(b"nothing")
-    volumes = {volume.path.name: volume for volume in shelf(recorded.parent)}
-    assert list(volumes) == ["broken.session", "zero.session", "abba.session"]  # newest first
-    assert (volumes["abba.session"].drops, volumes["zero.session"].drops) == (4, 0)
-    assert volumes["broken.session"].trouble
+    entries = {entry.path.name: entry for entry in session_list(recorded.parent)}
+    assert list(entries) == ["broken.session", "zero.session", "abba.session"]  # newest first
+    assert (entries["abba.session"].drops, entries["zero.session"].drops) == (4, 0)
+    assert entries["broken.session"].trouble
 
     async def work():
         app = RigApp(Options(session=other, offline=True), KEYS)

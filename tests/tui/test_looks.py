@@ -15,16 +15,15 @@ from rig.campaign.machine import Flow, Stage
 from rig.records import Job
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
-from rig.tui.app import RigApp
+from rig.tui.app import THEMES, RigApp
 from rig.tui.options import Options
-from rig.tui.pictures import at_rest
+from rig.tui.pictures import QUIET, FakeClient, at_rest
 from rig.tui.state import state_of
-from rig.tui.still import QUIET, Still
-from rig.tui.themes import NAMES
 from tests.cli.lab import short
 from tests.tui.lab import KEYS, run
 from tests.tui.screen import colours_of, text_of
 
+THEME_NAMES = [theme.name for theme in THEMES]
 GOLDENS = Path(__file__).parent / "goldens"
 SIZES = ((80, 24), (120, 36), (200, 60))
 BLOCKED = {"gates": {"blocked": 1 << 3, "age_s": 0.1}}
@@ -75,8 +74,8 @@ def luminance(colour) -> float:
 
 @pytest.mark.parametrize("moment", ["device", "run", "trouble", "session"])
 def test_all_text_can_be_read_in_every_theme(moment, looks):
-    found = run(_screens(moment, (120, 36), looks, colours_of, NAMES))
-    assert len(found) > 20 * len(NAMES)
+    found = run(_screens(moment, (120, 36), looks, colours_of, THEME_NAMES))
+    assert len(found) > 20 * len(THEME_NAMES)
     for text, ink, paper in found:
         if not any(map(str.isalnum, text)):
             continue  # lines and marks
@@ -84,13 +83,13 @@ def test_all_text_can_be_read_in_every_theme(moment, looks):
         assert (bright + 0.05) / (dark + 0.05) >= READABLE, (text, ink, paper)
 
 
-async def _screens(moment, size, path, look, themes=NAMES[:1]):
+async def _screens(moment, size, path, look, themes=THEME_NAMES[:1]):
     """Look at a moment in each theme; everything that was seen."""
     flow, more = MOMENTS[moment]
     whole = state_of(LiveAnalysis(path).read())
     state = replace(whole, sections={**QUIET, **more, "session": whole.sections["session"]})
-    app = RigApp(Options(session=path), KEYS, Still(state))
-    app.flow = flow
+    app = RigApp(Options(session=path), KEYS, FakeClient(state))
+    app.driver.flow = flow
     found = []
     async with app.run_test(size=size) as pilot:
         while app.view is None or not app.indicators.known:

@@ -1,4 +1,4 @@
-"""What the operator's actions do."""
+"""The operator's commands: what each action of the table does."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rig.campaign.events import Again, GoOn, Note, Reject, Stage, Stopped, Try, refused
+from rig.campaign.events import Again, GoOn, Note, Reject, Stage, Stopped, Try
 from rig.campaign.plan import again
 from rig.errors import RigError
-from rig.tui import seen, themes
+from rig.tui import selectors
 from rig.tui.actions import shown_key
 from rig.tui.screens.ask import Ask, Confirm
 from rig.tui.screens.help import Help
@@ -17,10 +17,10 @@ from rig.tui.screens.help import Help
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-    from rig.tui.app import RigApp
+    from rig.tui.terminal import Terminal
 
 
-async def do(app: RigApp, name: str) -> None:
+async def do(app: Terminal, name: str) -> None:
     """Do one action of the table; whether it makes sense now was asked before."""
     if name.startswith("page_"):
         await app.go(name.removeprefix("page_"))
@@ -37,30 +37,19 @@ async def do(app: RigApp, name: str) -> None:
             await _SLOW[name](app)
 
 
-async def open_session(app: RigApp, protocol: str, session: str) -> None:
-    """Have the daemon open a session, now and whenever it had to be started again."""
-    assert app.client is not None
-    try:
-        await app.client.call(
-            "open_session", protocol=protocol, session=session, seed=app.options.seed
-        )
-    except RigError as error:
-        _refused(app, error)
-    else:
-        app.asked = protocol, session
-
-
-async def _go_on(app: RigApp) -> None:
+async def _go_on(app: Terminal) -> None:
     """Take the next step of the flow."""
-    if app.flow.stage is not Stage.PROTOCOL:
-        app.event(GoOn(seen.next_job(app), seen.settle_s(app)))
+    if app.driver.flow.stage is not Stage.PROTOCOL:
+        model = app.model
+        app.driver.take(GoOn(selectors.next_job(model), model.settle_s))
         return
     page = app.protocols
     if page.file is not None and page.usable and page.session is not None:
-        await open_session(app, str(page.file.resolve()), str(page.session.resolve()))
+        files = str(page.file.resolve()), str(page.session.resolve())
+        await app.driver.open_session(*files, app.options.seed)
 
 
-async def _control(app: RigApp) -> None:
+async def _control(app: Terminal) -> None:
     """Take control, or give it back; who has it instead is said."""
     client = app.client
     assert client is not None
@@ -70,20 +59,20 @@ async def _control(app: RigApp) -> None:
     try:
         await client.take_control()
     except RigError as error:
-        _refused(app, error)
+        app.driver.refuse(error)
 
 
-async def _close(app: RigApp) -> None:
+async def _close(app: Terminal) -> None:
     """Close the session, so that another can be chosen."""
     assert app.client is not None
-    app.asked = None
+    app.driver.asked = None
     await app.client.call("close_session")
 
 
-async def _try_release(app: RigApp) -> None:
+async def _try_release(app: Terminal) -> None:
     """Ask, then drive the release once."""
     await app.go("device")
-    view = app.view
+    view = app.model.view
     if view is None:
         return
     pulse_ms = view.protocol.release.pulse * 1e3
@@ -94,64 +83,58 @@ async def _try_release(app: RigApp) -> None:
 
     def answered(yes: bool | None) -> None:
         if yes:
-            app.event(Try())
+            app.driver.take(Try())
 
     confirm = Confirm("TEST OF THE RELEASE", question, "drive it", _stop_key(app))
-    app.push_screen(confirm, answered)
+    app.ask(confirm, answered)
 
 
-async def _sessions(app: RigApp) -> None:
+async def _sessions(app: Terminal) -> None:
     """Let another session be chosen."""
     from rig.tui import picking  # noqa: PLC0415 - brings the analysis along
 
     await picking.sessions(app)
 
 
-async def _drops(app: RigApp) -> None:
+async def _drops(app: Terminal) -> None:
     """Let another drop be chosen."""
     from rig.tui import picking  # noqa: PLC0415 - brings the analysis along
 
     picking.drops(app)
 
 
-def _refused(app: RigApp, error: RigError) -> None:
-    app.event(refused(app.flow.ticket, error))
-
-
-def _ask(app: RigApp, question: str, answer: type[Reject | Note]) -> None:
+def _ask(app: Terminal, question: str, answer: type[Reject | Note]) -> None:
     def given(text: str | None) -> None:
         if text:
-            app.event(answer(text))
+            app.driver.take(answer(text))
 
-    app.push_screen(Ask(question, _stop_key(app)), given)
+    app.ask(Ask(question, _stop_key(app)), given)
 
 
-def _stop_key(app: RigApp) -> str:
+def _stop_key(app: Terminal) -> str:
     return shown_key(app.keys["stop"])
 
 
-def _repeat(app: RigApp) -> None:
+def _repeat(app: Terminal) -> None:
     """Go back to a run for another attempt."""
-    job = app.flow.job or seen.job(app)
-    wanted = again(seen.runs(app), job.run) if job else None
+    model = app.model
+    job = model.flow.job or model.job
+    wanted = again(selectors.runs(model), job.run) if job else None
     if wanted is not None:
-        app.event(Again(wanted))
+        app.driver.take(Again(wanted))
 
 
-def _toggle_blind(app: RigApp) -> None:
-    app.flow = replace(app.flow, blind=not app.flow.blind)
+def _toggle_blind(app: Terminal) -> None:
+    flow = app.driver.flow
+    app.driver.flow = replace(flow, blind=not flow.blind)
 
 
-def _begin_check(app: RigApp) -> None:
-    app.follower.indicators = app.indicators.reset()
+def _begin_check(app: Terminal) -> None:
+    app.follower.indicators = app.follower.indicators.reset()
 
 
-def _next_theme(app: RigApp) -> None:
-    app.theme = themes.after(app.theme)
-
-
-_SIMPLE: dict[str, Callable[[RigApp], object]] = {
-    "stop": lambda app: app.event(Stopped()),
+_SIMPLE: dict[str, Callable[[Terminal], object]] = {
+    "stop": lambda app: app.driver.take(Stopped()),
     "reject": lambda app: _ask(app, "Why is this drop rejected?", Reject),
     "note": lambda app: _ask(app, "Note on this drop:", Note),
     "again": _repeat,
@@ -160,11 +143,11 @@ _SIMPLE: dict[str, Callable[[RigApp], object]] = {
     "control_chart": lambda app: app.pages[app.page].other_chart(),
     "previous": lambda app: app.pages[app.page].move(-1),
     "next": lambda app: app.pages[app.page].move(1),
-    "theme": _next_theme,
-    "help": lambda app: app.push_screen(Help(app.page, app.keys)),
+    "theme": lambda app: app.next_theme(),
+    "help": lambda app: app.ask(Help(app.page, app.keys)),
     "palette": lambda app: app.action_command_palette(),
 }
-_SLOW: dict[str, Callable[[RigApp], Awaitable[None]]] = {
+_SLOW: dict[str, Callable[[Terminal], Awaitable[None]]] = {
     "go_on": _go_on,
     "control": _control,
     "close": _close,
@@ -172,7 +155,7 @@ _SLOW: dict[str, Callable[[RigApp], Awaitable[None]]] = {
     "sessions": _sessions,
     "drops": _drops,
 }
-_HISTORY: dict[str, Callable[[RigApp], object]] = {
+_HISTORY: dict[str, Callable[[Terminal], object]] = {
     "play": lambda app: app.history.play(),
     "turn_round": lambda app: app.history.turn_round(),
     "earlier": lambda app: app.history.turn(-1),

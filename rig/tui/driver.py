@@ -1,0 +1,133 @@
+"""The asynchronous driver of a campaign: has effects carried out beside the screens."""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from rig.campaign.events import (
+    Answered,
+    Arm,
+    Collect,
+    Drive,
+    Fire,
+    GiveUp,
+    Judge,
+    Judged,
+    Log,
+    Stage,
+    Stop,
+    Wait,
+    refused,
+)
+from rig.campaign.machine import step
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
+
+    from rig.campaign.events import Effect, Event
+    from rig.campaign.machine import Flow
+    from rig.tui.client import ReconnectingClient
+    from rig.tui.follow import Follower
+
+
+class Driver:
+    """Takes what happens, one event after the other.
+
+    Parameters
+    ----------
+    flow
+        Where the campaign is at first.
+    client
+        What carries effects out; `None` where a file is only looked at.
+    follower
+        What reads and analyses the session.
+    begin
+        Runs a coroutine beside the screens.
+
+    Attributes
+    ----------
+    flow
+        Where the campaign is.
+    since
+        When it came there, by a clock that only goes on, s.
+    asked
+        Protocol and session that were opened from here; `None` when they were closed.
+    """
+
+    def __init__(
+        self,
+        flow: Flow,
+        client: ReconnectingClient | None,
+        follower: Follower,
+        begin: Callable[[Coroutine[Any, Any, None]], object],
+    ) -> None:
+        self.flow = flow
+        self.since = 0.0
+        self.asked: tuple[str, str] | None = None
+        self._client = client
+        self._follower = follower
+        self._begin = begin
+
+    def take(self, event: Event) -> None:
+        """Take an event, and have its effects carried out."""
+        before = self.flow.stage
+        self.flow, wanted = step(self.flow, event)
+        if self.flow.stage is not before:
+            self.since = monotonic()
+        if self.flow.stage is Stage.RESULT and self.flow.job is not None:
+            self._follower.judged.add(self.flow.job)
+        for effect in wanted:
+            self._begin(self._carry_out(effect, self.flow.ticket))
+
+    def refuse(self, error: RigError) -> None:
+        """Say what is wrong and what to do."""
+        self.take(refused(self.flow.ticket, error))
+
+    async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
+        """Have the daemon open a session, now and whenever it had to be started again."""
+        assert self._client is not None
+        try:
+            await self._client.call("open_session", protocol=protocol, session=session, seed=seed)
+        except RigError as error:
+            self.refuse(error)
+        else:
+            self.asked = protocol, session
+
+    async def _carry_out(self, effect: Effect, ticket: int) -> None:
+        """Do what is wanted, and take what came of it."""
+        client = self._client
+        assert client is not None
+        token = None
+        try:
+            match effect:
+                case GiveUp():
+                    return  # what is wrong is shown, and the operator goes on from there
+                case Stop(reason):
+                    await client.call("stop", reason=reason)
+                    return
+                case Wait(seconds):
+                    await client.call("wait", seconds=seconds)
+                case Arm(job):
+                    answer = await client.call("arm", run=job.run, attempt=job.attempt)
+                    token = int(answer["token"])
+                case Fire(armed):
+                    await client.call("fire", token=armed)
+                case Drive():
+                    await client.call("test_release")
+                case Collect(job):
+                    await client.call("collect", run=job.run, attempt=job.attempt)
+                case Log(job, state, reasons):
+                    await client.call(
+                        "log_state", run=job.run, attempt=job.attempt, state=state,
+                        reasons=list(reasons),
+                    )  # fmt: skip
+                case Judge(job):
+                    result = (await self._follower.read()).results[job]
+                    self.take(Judged(ticket, result.verdict, tuple(result.reasons)))
+                    return
+        except RigError as error:
+            self.take(refused(ticket, error))
+        else:
+            self.take(Answered(ticket, token))
