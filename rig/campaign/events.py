@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 from rig.link.refusals import DeviceRefusedError
 
 if TYPE_CHECKING:
+    from rig.campaign.voids import VoidRow
     from rig.errors import RigError
     from rig.link.messages import Reason
     from rig.records import Job
@@ -61,11 +62,19 @@ class Answered(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """The drop was analysed."""
+    """The drop was analysed.
+
+    Attributes
+    ----------
+    row
+        Voids in a row before it by the session's log, to which others may have added; `None` for
+        those that were counted here.
+    """
 
     ticket: int
     verdict: str
     reasons: tuple[str, ...]
+    row: VoidRow | None = None
 
 
 class Refused(NamedTuple):

@@ -43,7 +43,7 @@ from rig.records import Job
 
 if TYPE_CHECKING:
     from rig.campaign.events import Effect, Event
-    from rig.campaign.voids import Row
+    from rig.campaign.voids import VoidRow
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""
@@ -116,7 +116,7 @@ class Flow:
     not_armed: int = 0
     not_fired: int = 0
     attended: bool = True
-    row: Row = ()
+    row: VoidRow = ()
 
     def to(self, stage: Stage, trouble: str = "") -> Flow:
         """Go to another stage; answers to earlier effects count no more."""
@@ -247,7 +247,8 @@ def _judged(flow: Flow, event: Judged) -> Outcome:
     job, verdict, reasons = flow.job, event.verdict, event.reasons
     assert job is not None
     flow = replace(flow, verdict=verdict, reasons=reasons, shown=not flow.blind, logged=False)
-    row = after(flow.row, job, verdict, reasons)
+    before = flow.row if event.row is None else event.row
+    row = after(before, job, verdict, reasons)
     return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
 
 

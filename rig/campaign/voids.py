@@ -28,11 +28,11 @@ class Void(NamedTuple):
     reasons: tuple[str, ...]
 
 
-Row = tuple[Void, ...]
+VoidRow = tuple[Void, ...]
 """The latest voids with no good drop between them, at most `MANY`."""
 
 
-def after(row: Row, job: Job, verdict: str, reasons: tuple[str, ...]) -> Row:
+def after(row: VoidRow, job: Job, verdict: str, reasons: tuple[str, ...]) -> VoidRow:
     """Take one more verdict; a second one of the same drop replaces the first."""
     if row and row[-1].job == job:
         row = row[:-1]
@@ -41,7 +41,7 @@ def after(row: Row, job: Job, verdict: str, reasons: tuple[str, ...]) -> Row:
     return row if verdict == "rejected" else ()
 
 
-def in_common(row: Row) -> tuple[str, ...]:
+def in_common(row: VoidRow) -> tuple[str, ...]:
     """Name the reasons that the last `MANY` voids share; none where there are fewer.
 
     Reasons are of a kind when they are the same without their numbers. A number that is not the
@@ -62,7 +62,7 @@ def in_common(row: Row) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def why_halted(row: Row) -> str:
+def why_halted(row: VoidRow) -> str:
     """Say why nothing more is dropped, and on a second line what to do; empty while all is well."""
     reasons = in_common(row)
     if not reasons:
@@ -87,7 +87,7 @@ class Voids:
         Those for which the campaign halted: not the run was at fault, and it is tried again.
     """
 
-    row: Row = ()
+    row: VoidRow = ()
     held: frozenset[Job] = frozenset()
     forgiven: frozenset[Job] = frozenset()
 
@@ -99,7 +99,7 @@ class Voids:
 
 def voids_of(entries: Iterable[StateEntry]) -> Voids:
     """Go through the log of a session."""
-    row: Row = ()
+    row: VoidRow = ()
     held: set[Job] = set()
     forgiven: set[Job] = set()
     for entry in entries:

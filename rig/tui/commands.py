@@ -17,10 +17,10 @@ from rig.tui.screens.help import Help
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-    from rig.tui.terminal import Terminal
+    from rig.tui.context import CommandContext
 
 
-async def do(app: Terminal, name: str) -> None:
+async def do(app: CommandContext, name: str) -> None:
     """Do one action of the table; whether it makes sense now was asked before."""
     if name.startswith("page_"):
         await app.go(name.removeprefix("page_"))
@@ -37,7 +37,7 @@ async def do(app: Terminal, name: str) -> None:
             await _SLOW[name](app)
 
 
-async def _go_on(app: Terminal) -> None:
+async def _go_on(app: CommandContext) -> None:
     """Take the next step of the flow."""
     if app.driver.flow.stage is not Stage.PROTOCOL:
         model = app.model
@@ -49,7 +49,7 @@ async def _go_on(app: Terminal) -> None:
         await app.driver.open_session(*files, app.options.seed)
 
 
-async def _control(app: Terminal) -> None:
+async def _control(app: CommandContext) -> None:
     """Take control, or give it back; who has it instead is said."""
     client = app.client
     assert client is not None
@@ -62,14 +62,14 @@ async def _control(app: Terminal) -> None:
         app.driver.refuse(error)
 
 
-async def _close(app: Terminal) -> None:
+async def _close(app: CommandContext) -> None:
     """Close the session, so that another can be chosen."""
     assert app.client is not None
     app.driver.asked = None
     await app.client.call("close_session")
 
 
-async def _try_release(app: Terminal) -> None:
+async def _try_release(app: CommandContext) -> None:
     """Ask, then drive the release once."""
     await app.go("device")
     view = app.model.view
@@ -89,21 +89,21 @@ async def _try_release(app: Terminal) -> None:
     app.ask(confirm, answered)
 
 
-async def _sessions(app: Terminal) -> None:
+async def _sessions(app: CommandContext) -> None:
     """Let another session be chosen."""
     from rig.tui import picking  # noqa: PLC0415 - brings the analysis along
 
     await picking.sessions(app)
 
 
-async def _drops(app: Terminal) -> None:
+async def _drops(app: CommandContext) -> None:
     """Let another drop be chosen."""
     from rig.tui import picking  # noqa: PLC0415 - brings the analysis along
 
     picking.drops(app)
 
 
-def _ask(app: Terminal, question: str, answer: type[Reject | Note]) -> None:
+def _ask(app: CommandContext, question: str, answer: type[Reject | Note]) -> None:
     def given(text: str | None) -> None:
         if text:
             app.driver.take(answer(text))
@@ -111,11 +111,11 @@ def _ask(app: Terminal, question: str, answer: type[Reject | Note]) -> None:
     app.ask(Ask(question, _stop_key(app)), given)
 
 
-def _stop_key(app: Terminal) -> str:
+def _stop_key(app: CommandContext) -> str:
     return shown_key(app.keys["stop"])
 
 
-def _repeat(app: Terminal) -> None:
+def _repeat(app: CommandContext) -> None:
     """Go back to a run for another attempt."""
     model = app.model
     job = model.flow.job or model.job
@@ -124,16 +124,16 @@ def _repeat(app: Terminal) -> None:
         app.driver.take(Again(wanted))
 
 
-def _toggle_blind(app: Terminal) -> None:
+def _toggle_blind(app: CommandContext) -> None:
     flow = app.driver.flow
     app.driver.flow = replace(flow, blind=not flow.blind)
 
 
-def _begin_check(app: Terminal) -> None:
+def _begin_check(app: CommandContext) -> None:
     app.follower.indicators = app.follower.indicators.reset()
 
 
-_SIMPLE: dict[str, Callable[[Terminal], object]] = {
+_SIMPLE: dict[str, Callable[[CommandContext], object]] = {
     "stop": lambda app: app.driver.take(Stopped()),
     "reject": lambda app: _ask(app, "Why is this drop rejected?", Reject),
     "note": lambda app: _ask(app, "Note on this drop:", Note),
@@ -147,7 +147,7 @@ _SIMPLE: dict[str, Callable[[Terminal], object]] = {
     "help": lambda app: app.ask(Help(app.page, app.keys)),
     "palette": lambda app: app.action_command_palette(),
 }
-_SLOW: dict[str, Callable[[Terminal], Awaitable[None]]] = {
+_SLOW: dict[str, Callable[[CommandContext], Awaitable[None]]] = {
     "go_on": _go_on,
     "control": _control,
     "close": _close,
@@ -155,7 +155,7 @@ _SLOW: dict[str, Callable[[Terminal], Awaitable[None]]] = {
     "sessions": _sessions,
     "drops": _drops,
 }
-_HISTORY: dict[str, Callable[[Terminal], object]] = {
+_HISTORY: dict[str, Callable[[CommandContext], object]] = {
     "play": lambda app: app.history.play(),
     "turn_round": lambda app: app.history.turn_round(),
     "earlier": lambda app: app.history.turn(-1),

@@ -125,7 +125,8 @@ class Driver:
                     )  # fmt: skip
                 case Judge(job):
                     result = (await self._follower.read()).results[job]
-                    self.take(Judged(ticket, result.verdict, tuple(result.reasons)))
+                    row = self._follower.voids.row
+                    self.take(Judged(ticket, result.verdict, tuple(result.reasons), row))
                     return
         except RigError as error:
             self.take(refused(ticket, error))

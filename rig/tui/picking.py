@@ -19,7 +19,7 @@ from rig.tui.widgets.banner import LOOKS
 from rig.tui.words import plain
 
 if TYPE_CHECKING:
-    from rig.tui.terminal import Terminal
+    from rig.tui.context import CommandContext
 
 
 _MOST = 200
@@ -58,7 +58,7 @@ def _look(path: Path) -> SessionEntry:
         return SessionEntry(path, trouble=error.message)
 
 
-async def sessions(app: Terminal) -> None:
+async def sessions(app: CommandContext) -> None:
     """Let one session of the folder be chosen, and play it."""
     view = app.model.view
     mine = view.path if view else app.options.session
@@ -76,7 +76,7 @@ async def sessions(app: Terminal) -> None:
     app.ask(Pick(title, [_line(one) for one in entries], at, _stop_key(app)), chosen)
 
 
-def drops(app: Terminal) -> None:
+def drops(app: CommandContext) -> None:
     """Let one drop of the session that is played be chosen."""
     found, history = app.history.view, app.history
     if found is None:
@@ -101,7 +101,7 @@ def drops(app: Terminal) -> None:
     app.ask(Pick("Drops of this session", lines, history.player.at, _stop_key(app)), chosen)
 
 
-async def _open(app: Terminal, entry: SessionEntry) -> None:
+async def _open(app: CommandContext, entry: SessionEntry) -> None:
     history, live = app.history, app.model.view
     if live is not None and _same(live.path, entry.path):
         history.other = None
@@ -129,5 +129,5 @@ def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
 
 
-def _stop_key(app: Terminal) -> str:
+def _stop_key(app: CommandContext) -> str:
     return shown_key(app.keys["stop"])

@@ -93,7 +93,7 @@ class FakeClient(ReconnectingClient):
         return
 
 
-class Moment(NamedTuple):
+class Screenshot(NamedTuple):
     """One picture: its name, and the moment it shows."""
 
     name: str
@@ -121,14 +121,14 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
     view = LiveAnalysis(session).read()
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for moment in moments(view):
-        path = folder / f"{moment.name}.svg"
-        path.write_text(asyncio.run(_picture(moment, session, keys)), "utf-8")
+    for shot in screenshots(view):
+        path = folder / f"{shot.name}.svg"
+        path.write_text(asyncio.run(_picture(shot, session, keys)), "utf-8")
         written.append(path)
     return written
 
 
-def moments(view: SessionView) -> list[Moment]:
+def screenshots(view: SessionView) -> list[Screenshot]:
     """Choose the moments."""
     job = view.jobs[-1]
     whole = state_of(view)
@@ -146,12 +146,12 @@ def moments(view: SessionView) -> list[Moment]:
         Stage.RESULT, job, verdict=record["verdict"], reasons=tuple(record["reasons"])
     )  # fmt: skip
     return [
-        Moment("device", Flow(Stage.DEVICE), before),
-        Moment("run", Flow(Stage.PREPARE, job), before),
-        Moment("live", Flow(Stage.LIVE, job), _falling(before, view, job)),
-        Moment("result", result, state),
-        Moment("session", Flow(Stage.DONE), state),
-        Moment("history", Flow(Stage.DONE), state),
+        Screenshot("device", Flow(Stage.DEVICE), before),
+        Screenshot("run", Flow(Stage.PREPARE, job), before),
+        Screenshot("live", Flow(Stage.LIVE, job), _falling(before, view, job)),
+        Screenshot("result", result, state),
+        Screenshot("session", Flow(Stage.DONE), state),
+        Screenshot("history", Flow(Stage.DONE), state),
     ]
 
 
@@ -164,21 +164,21 @@ def _falling(state: State, view: SessionView, job: Job) -> State:
     return State(0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges)
 
 
-async def _picture(moment: Moment, session: Path, keys: Mapping[str, str]) -> str:
-    client = FakeClient(moment.state)
+async def _picture(shot: Screenshot, session: Path, keys: Mapping[str, str]) -> str:
+    client = FakeClient(shot.state)
     app = RigApp(Options(session=session), keys, client)
-    app.driver.flow = moment.flow
+    app.driver.flow = shot.flow
     async with app.run_test(size=SIZE) as pilot:
         while app.view is None or app.view.lagging or not app.indicators.known:
             client.changed = True
             await pilot.pause()
-        if moment.name == "history":
+        if shot.name == "history":
             first = app.view.jobs[0]
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             await app.go("history")
         # All edges came at once, which looks like flicker for a while.
-        while len(moment.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
+        while len(shot.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
             gate.flickers(now := monotonic()) or not gate.steady(now)
             for gate in app.indicators.gates
         ):

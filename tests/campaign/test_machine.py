@@ -281,6 +281,17 @@ def test_two_of_a_kind_or_three_of_others_do_not():
     assert flow.stage is Stage.PREPARE, "the operator knows why"
 
 
+def test_voids_that_others_logged_count_too():
+    row = voids(SKEW, SKEW).row
+    judged = Judged(-1, "void", (SKEW.format(9),), row)
+    flow, _ = through(Flow(stage=Stage.PREPARE), Found(Job(1, 3)), judged, DONE, GoOn(NEXT))
+    assert flow.stage is Stage.HALTED
+    judged = judged._replace(row=())
+    flow = voids(SKEW, SKEW)
+    flow, _ = through(flow, GoOn(NEXT), Found(Job(1, 3)), judged, DONE, GoOn(NEXT))
+    assert flow.stage is Stage.PREPARE
+
+
 def test_blind_it_halts_after_the_decision():
     flow, _ = through(voids(SKEW, SKEW), GoOn(NEXT))
     flow = replace(flow, blind=True)

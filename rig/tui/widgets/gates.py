@@ -22,7 +22,7 @@ _MOST = 8
 """Indicators above each other: more would not fit a low screen."""
 
 
-class Cell(NamedTuple):
+class Span(NamedTuple):
     """Text and its component class; none for the board's own look."""
 
     text: str
@@ -47,7 +47,7 @@ class GateBoard(Widget):
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
         super().__init__(id=id)
-        self._rows: list[list[Cell]] = []
+        self._rows: list[list[Span]] = []
 
     def show(self, protocol: Protocol | None, indicators: Indicators, now_s: float) -> None:
         """Draw what the gates do now."""
@@ -57,7 +57,7 @@ class GateBoard(Widget):
         """Draw nothing."""
         self._take([])
 
-    def _take(self, rows: list[list[Cell]]) -> None:
+    def _take(self, rows: list[list[Span]]) -> None:
         if rows != self._rows:
             higher = len(rows) != len(self._rows)
             self._rows = rows
@@ -81,10 +81,10 @@ class GateBoard(Widget):
 
 def board(
     protocol: Protocol | None, indicators: Indicators, now_s: float, width: int
-) -> list[list[Cell]]:
+) -> list[list[Span]]:
     """Draw the indicators in a width of characters."""
     if protocol is None or protocol.gates is None:
-        return [[Cell("no gates in this scene")]]
+        return [[Span("no gates in this scene")]]
     by_channel = {one.channel: one for one in indicators.gates}
     columns: list[tuple[str, list[Gate]]] = []
     for side in ("impact", "free"):
@@ -93,22 +93,22 @@ def board(
             title = "" if begin else f"{side} side"
             columns.append((title, gates[begin : begin + _MOST]))
     wide = width // len(columns)
-    rows = [[Cell("".join(title.ljust(wide) for title, _ in columns), "gate--title")]]
+    rows = [[Span("".join(title.ljust(wide) for title, _ in columns), "gate--title")]]
     for at in range(max(len(gates) for _, gates in columns)):
-        row: list[Cell] = []
+        row: list[Span] = []
         for _, gates in columns:
             if at < len(gates):
                 indicator = by_channel.get(gates[at].channel)
                 row += _indicator(gates[at], indicator, indicators, now_s, wide)
             else:
-                row.append(Cell(" " * wide))
+                row.append(Span(" " * wide))
         rows.append(row)
     return rows
 
 
 def _indicator(
     gate: Gate, indicator: Indicator | None, indicators: Indicators, now_s: float, width: int
-) -> list[Cell]:
+) -> list[Span]:
     if indicator is None or not indicators.known:
         symbol, look, word = "?", "gate--unknown", "unknown"
     elif indicator.blocked:
@@ -130,7 +130,7 @@ def _indicator(
         text = f" {where} ch{gate.channel:<2} {word:7}{edges:4} {quiet}"
     else:
         text = f" {where} {word:7}{edges:4}"
-    return [Cell(symbol, look), Cell(text[: width - 2].ljust(width - 1))]
+    return [Span(symbol, look), Span(text[: width - 2].ljust(width - 1))]
 
 
 def named(gates: Sequence[Gate], channel: int) -> str:

@@ -1,4 +1,4 @@
-"""What commands may use of the app; it knows them, and they know only this."""
+"""What commands may use of the app: it knows them, and they know only this."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rig.tui.screens.protocol import ProtocolPage
 
 
-class Terminal(Protocol):
+class CommandContext(Protocol):
     """The screens, and what is behind them. `rig.tui.app.RigApp` says what each of these is."""
 
     options: Options
