@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
+from rig.link.messages import Reason
+from rig.link.refusals import DeviceRefusedError
 from rig.recorder.published import PublishedState
 from tests.waiting import PATIENCE_S
 
@@ -14,6 +16,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from bench.process_fixture import ProcessFixture
+
+
+def let_fall(ask: Callable[..., Any], run: int = 1) -> int:
+    """Arm and fire; again where a starved board has disarmed itself. Returns the attempt."""
+    for attempt in range(1, 100):
+        try:
+            ask(lambda controller, at=attempt: controller.fire(controller.arm(run, at)))
+        except DeviceRefusedError as refusal:
+            if refusal.reason is not Reason.NOT_ARMED:
+                raise
+            ask(lambda controller: controller.stop("disarmed by itself"))
+        else:
+            return attempt
+    raise AssertionError("the board never stays armed")
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from bench.process_fixture import ProcessFixture
 from rig.errors import DeviceError
 from rig.recorder.controller import Controller
 from rig.session.store import Session
-from tests.daemon.at_work import working
+from tests.daemon.at_work import let_fall, working
 from tests.waiting import until
 
 
@@ -40,10 +40,10 @@ def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
         usb |= {processes.port: "85430", elsewhere: "85430"}
         with working(processes) as (worker, ask):
             assert worker.published.get("port")["path"] == str(processes.port)
-            ask(lambda controller: controller.fire(controller.arm(1, 1)))
+            attempt = let_fall(ask)
             processes.hand(f"pull 0.3 {elsewhere}")
             until(lambda: worker.published.get("port")["path"] == os.path.realpath(elsewhere))
-            drop = ask(lambda controller: controller.collect(1, 1))
+            drop = ask(lambda controller: controller.collect(1, attempt))
         assert drop.faults == ()
         assert drop.edges
         with Session.open(processes.session, readonly=True) as session:
@@ -56,7 +56,7 @@ def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
     with ProcessFixture(1, seed=1) as processes, ProcessFixture(1, seed=2) as other:
         usb |= {processes.port: numbers[0]}
         with working(processes) as (worker, ask):
-            ask(lambda controller: controller.fire(controller.arm(1, 1)))
+            let_fall(ask)
             until(lambda: worker.published.get("drop")["state"] == "recorded")
             processes.hand("pull 60")
             until(lambda: worker.published.get("link")["state"] == "down")
