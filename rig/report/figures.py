@@ -84,9 +84,11 @@ def incline_figure(
                 axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
             elif row.name == "speed_m_s":
                 _free_fall_line(axes, value_of(curves.get("free_fall_speed_m_s")))
-        # The empty corner: both quantities fall towards steep surfaces.
+        # The empty corner: both quantities fall towards steep surfaces, but for a chain whose α is
+        # given beside one whose α is not.
         if drawing.axes[0].get_legend_handles_labels()[0]:
-            drawing.axes[0].legend(loc="upper right")
+            several = any(", " in str(name) for name in curves.get("segments") or ())
+            drawing.axes[0].legend(loc="best" if several else "upper right")
         _incline_axis(drawing.axes[-1])
     return drawing.svg
 
