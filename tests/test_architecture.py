@@ -1,0 +1,145 @@
+"""docs/architecture.md says what contracts, imports and tree say; papers name what there is."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs/architecture.md").read_text("utf-8")
+SECTIONS = dict(re.findall(r"^## (.+)\n((?:(?!^## ).*\n)*)", PAGE, re.MULTILINE))
+PAPERS = [
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs/decisions").glob("*.md")),
+]
+WAYS = [title for title in SECTIONS if title.startswith("The way of")]
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+    "contracts"
+]
+(LAYERS,) = (one["layers"] for one in CONTRACTS if one.get("containers") == ["rig"])
+
+
+def rooms_of(layer: str) -> list[str]:
+    return [name.strip() for name in re.split(r"[|:]", layer)]
+
+
+LEVEL = {room: level for level, layer in enumerate(LAYERS) for room in rooms_of(layer)}
+
+
+def may_import(one: str, other: str) -> bool:
+    """Whether the contracts let one room import another."""
+    level = LEVEL[one]
+    below = level < LEVEL[other] or (level == LEVEL[other] and ":" in LAYERS[level])
+    return below and not any(
+        contract["type"] == "forbidden"
+        and {f"rig.{one}", "rig"} & set(contract["source_modules"])
+        and f"rig.{other}" in contract["forbidden_modules"]
+        for contract in CONTRACTS
+    )
+
+
+def arrows(title: str) -> list[tuple[str, str]]:
+    """Steps from place to place of a way's line."""
+    (line,) = re.findall(r"^```text\n(.+)\n```", SECTIONS[title], re.MULTILINE)
+    return list(pairwise(line.split(" → ")))
+
+
+def steps(title: str) -> list[tuple[str, str]]:
+    """Steps from room to room of a way's table."""
+    places = [name.removeprefix("rig/").partition("/")[0] for name in files(title)]
+    rooms = [place.removesuffix(".py") for place in places]
+    return [step for step in pairwise(rooms) if step[0] != step[1]]
+
+
+def files(title: str) -> list[str]:
+    """Files of a way's table, in order; each with its folder."""
+    rows = re.findall(r"^\| `([\w/]+)` \| (`[^|]+`) \|", SECTIONS[title], re.MULTILINE)
+    return [f"{where}/{name}" for where, names in rows for name in re.findall(r"`(.+?)`", names)]
+
+
+@pytest.fixture(scope="module")
+def imports() -> set[tuple[str, str]]:
+    """Which room really imports which."""
+    graph = grimp.build_graph("rig", cache_dir=None)
+    found = set()
+    for module in graph.modules - {"rig"}:
+        for other in graph.find_modules_directly_imported_by(module) - {"rig"}:
+            found.add((module.split(".")[1], other.split(".")[1]))
+    return found
+
+
+def test_the_rooms_stand_as_the_contract_has_them():
+    layers = re.findall(r"^\| `(.+?)` \|", SECTIONS["Rooms"], re.MULTILINE)
+    assert [layer.replace("\\", "") for layer in layers] == LAYERS
+
+
+def test_every_room_is_on_the_page():
+    found = {
+        path.stem
+        for path in (ROOT / "rig").iterdir()
+        if path.suffix == ".py" or (path.is_dir() and any(path.rglob("*.py")))
+    } - {"__init__"}
+    assert found == set(LEVEL)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "allowed"),
+    [
+        ("recorder", "link", True),
+        ("link", "recorder", False),
+        ("session", "link", False),  # | between them
+        ("runner", "report", True),  # : between them
+        ("report", "link", False),  # above it, but forbidden
+        ("daemon", "results", False),  # likewise
+    ],
+)
+def test_what_the_contracts_allow(one, other, allowed):
+    assert may_import(one, other) is allowed
+
+
+@pytest.mark.parametrize("title", WAYS)
+def test_every_step_is_an_import_that_the_contracts_allow(title, imports):
+    for one, other in (*arrows(title), *steps(title)):
+        known = {one, other} & set(LEVEL)
+        for place in {one, other} - known:
+            assert (ROOT / place).is_dir(), place
+        if len(known) == 2:
+            # What goes from room to room is handed over by the one that knows the other.
+            ways = {(one, other), (other, one)}
+            assert any(may_import(*way) and way in imports for way in ways), (one, other)
+
+
+@pytest.mark.parametrize("title", WAYS)
+def test_files_of_a_way_are_there_and_counted(title):
+    named = files(title)
+    assert len(named) == len(set(named))
+    for name in named:
+        assert (ROOT / name).is_file(), name
+    (stated,) = re.findall(r"\*\*(\d+) files", SECTIONS[title])
+    assert int(stated) == len(named)
+
+
+@pytest.mark.parametrize("paper", PAPERS, ids=lambda path: path.name)
+def test_files_and_links_of_a_paper_lead_somewhere(paper):
+    text = paper.read_text("utf-8")
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
+        assert "://" in target or (paper.parent / target).exists(), target
+    for name in re.findall(r"`((?:rig|sim|tests|firmware|protocols)/[\w./-]+\.\w+)`", text):
+        assert (ROOT / name).is_file(), name
+    for name in re.findall(r"`(\w+\.py)`", text):
+        assert any(path for top in ("rig", "tests") for path in (ROOT / top).rglob(name)), name
+
+
+def test_a_commit_is_checked_as_the_tests_begin():
+    entries = re.findall(
+        r"entry: \.venv/(.+)", (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
+    )
+    run = (ROOT / "run").read_text("utf-8")
+    checks = re.findall(r'^    "\$bin/((?:ruff|mypy|lint).*)$', run, re.MULTILINE)
+    assert [f"bin/{check.replace(chr(34), '', 1)}" for check in checks] == entries
