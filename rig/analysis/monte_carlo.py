@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.adjust import adjust
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.joint import Joint, joint_step
 from rig.analysis.quantities import measurands
-from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from rig.analysis.student import coverage_factor
+from rig.analysis.distributions import coverage_factor
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.fit import Fit
 from rig.analysis.legs import squared_after
-from rig.analysis.student import coverage_factor
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
 from rig.model.rods import rod_impacts

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import Measured
 from rig.estimate.coefficients import nuisances
 from rig.estimate.hypotheses import END, ended, one_alpha
 from rig.estimate.joint import fit
-from rig.estimate.tail import chi2_tail
 from rig.model.rods import rod_impacts
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
 from rig.estimate.joint import fit
-from rig.estimate.tail import chi2_tail
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.shared import Shared
 from rig.errors import InputError
@@ -16,7 +17,6 @@ from rig.estimate.hypotheses import AIR, one_alpha
 from rig.estimate.joint import fit
 from rig.estimate.posterior import posterior
 from rig.estimate.rods import impulses
-from rig.estimate.tail import chi2_tail
 from rig.sections import Sections
 from rig.threads import one_thread
 
