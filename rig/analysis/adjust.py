@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.normal import normal
+from rig.analysis.equations import normal_equations
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -108,7 +108,7 @@ def adjust(
     inflation = 1.0
     settled = False
     for step in range(_STEPS):
-        found = normal(model, matches, scaled * sd, sd, inflation)
+        found = normal_equations(model, matches, scaled * sd, sd, inflation)
         data = found.matrix
         information = data + identity
         right = data @ scaled - found.vector + prior

@@ -61,15 +61,15 @@ def main(arguments: Namespace) -> int:
 
 
 def _learned(path: str) -> Components:
-    """How much everything scatters, as an earlier session of the same rig taught."""
+    """How much everything scatters, as an earlier session of the same rig found."""
     from rig.results import detailed  # noqa: PLC0415 - only with --learned
     from rig.session.store import Session  # noqa: PLC0415
 
     with Session.open(path, readonly=True) as session:
-        lesson = detailed(session)[0].lesson
-    if lesson is None:
+        joint = detailed(session)[0].joint
+    if joint is None:
         raise InputError(f"{path}: too few good drops to learn from", "leave out --learned")
-    return lesson.components
+    return joint.components
 
 
 def _length(option: str, text: str | None) -> float | None:

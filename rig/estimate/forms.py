@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.equations import HUBER, STRAY
 from rig.analysis.fit import Fit
-from rig.analysis.normal import HUBER, STRAY
 from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.learn import Taught
-    from rig.analysis.shared import Shared
+    from rig.analysis.joint_fit import JointDrop
     from rig.analysis.trajectory import Trajectory
+    from rig.analysis.unknowns import SharedUnknowns
     from rig.model.chain import Chain
     from rig.protocol.protocol import Run
 
@@ -76,7 +76,7 @@ class Form:
     edges: int
 
 
-def form(run: Run, drop: Fit | Taught, shared: Shared) -> Form:
+def form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Form:
     """Reduce a drop to what it says of its impacts.
 
     Parameters
@@ -89,8 +89,8 @@ def form(run: Run, drop: Fit | Taught, shared: Shared) -> Form:
         Where the shared unknowns are.
     """
     model, x = drop.model, drop.x
-    at, side = model.unknowns, model.sides["impact"]
-    assert side.ratios is not None
+    at, record = model.unknowns, model.records["impact"]
+    assert record.ratios is not None
     common, here = shared.places(model)
     alphas = model.guesses["impact"].alpha + x[at["alpha"]] + x[at["impulses"]]
     inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
@@ -112,20 +112,22 @@ def form(run: Run, drop: Fit | Taught, shared: Shared) -> Form:
     path = model.trajectory("impact", x)
     return Form(
         run,
-        side.chain.chain,
-        side.ratios,
+        record.chain.chain,
+        record.ratios,
         here,
         normal[np.ix_(kept, kept)] * np.outer(scale[kept], scale[kept]) - cross.T @ gain[:, :-1],
         vector[kept] * scale[kept] - cross.T @ gain[:, -1],
         constant - float(vector[own] * sd[own] @ gain[:, -1]),
         float(at.sd[impulses[0]]),
         alphas,
-        path.speed[1:] / (1.0 + alphas * side.ratios),
+        path.speed[1:] / (1.0 + alphas * record.ratios),
         edges,
     )
 
 
-def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array, Array, float, int]:
+def _normal(
+    drop: Fit | JointDrop, alphas: Array, inflation: float
+) -> tuple[Array, Array, float, int]:
     """‖r/σ‖² about a point, as in `Form`, in the drop's unknowns and `EXTRA`, all in SI.
 
     The impulses stand for whole α, and the unknown α for nothing.
@@ -165,7 +167,7 @@ def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple
     if role == "free":
         return np.zeros(times.size), slopes[:, DRAG]
     # A contact point higher up is met as if every rod hung that much lower.
-    rods = len(model.sides["impact"].chain.widths)
+    rods = len(model.records["impact"].chain.widths)
     return -slopes[:, COMMON + rods :].sum(axis=1), slopes[:, DRAG]
 
 

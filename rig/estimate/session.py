@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.shared import Shared
+from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.estimate import coefficients as of
 from rig.estimate.agreement import agreement
@@ -61,7 +61,9 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
         raise InputError("no good drop in this session", "rig analyze SESSION says why")
-    shared = analysis.lesson.shared if analysis.lesson else Shared(d.model for d in drops.values())
+    shared = (
+        analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
+    )
     forms = [form(good[key], drop, shared) for key, drop in drops.items()]
     like = merged(forms)
     said: dict[str, Any] = {"drops": len(forms), "edges": sum(one.edges for one in forms)}
@@ -85,7 +87,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     with sections.alone("The curves"):
         first = {_case(protocol, good[key]): key for key in reversed(drops)}
         said["curves"] = [
-            drop_curves(protocol, good[key], drops[key], analysis.lesson)
+            drop_curves(protocol, good[key], drops[key], analysis.joint)
             for _, key in sorted(first.items())
         ]
     if sections.failed:

@@ -56,7 +56,7 @@ def expected():
     )
     protocol = replace(UNIFORM, surface=true, plan=Plan(INCLINES, 2))
     beams = beams_of(protocol)
-    learned = analysis(INCLINES).lesson.components
+    learned = analysis(INCLINES).joint.components
     return outlook(protocol, cases(protocol, beams, learned), range(len(beams)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from rig.analysis.session import Analysis
-from rig.analysis.shared import Shared
+from rig.analysis.unknowns import SharedUnknowns
 from rig.estimate.forms import Form, form
 from rig.protocol.plan import runs
 from sim.dials import Dials
@@ -35,5 +35,5 @@ def analysis(
 def forms(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> tuple[Form, ...]:
     found = analysis(inclines, each, seed)
     by_number = {run.number: run for run in runs(SCENES["uniform"])}
-    shared = Shared(drop.model for drop in found.adjusted.values())
+    shared = SharedUnknowns(drop.model for drop in found.adjusted.values())
     return tuple(form(by_number[run], drop, shared) for (run, _), drop in found.adjusted.items())
