@@ -39,7 +39,7 @@ EXTRA = ("contact", "drag")
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class QuadraticForm:
     """zᵀMz + 2 vᵀz + c, z being the shared unknowns of the drop, then its impacts.
 
     Attributes
@@ -76,7 +76,7 @@ class Form:
     edges: int
 
 
-def form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Form:
+def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> QuadraticForm:
     """Reduce a drop to what it says of its impacts.
 
     Parameters
@@ -110,7 +110,7 @@ def form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Form:
     cross = normal[np.ix_(own, kept)] * np.outer(sd[own], scale[kept])
     gain = np.linalg.solve(left, np.column_stack([cross, vector[own] * sd[own]]))
     path = model.trajectory("impact", x)
-    return Form(
+    return QuadraticForm(
         run,
         record.chain.chain,
         record.ratios,
@@ -128,7 +128,7 @@ def form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Form:
 def _normal(
     drop: Fit | JointDrop, alphas: Array, inflation: float
 ) -> tuple[Array, Array, float, int]:
-    """‖r/σ‖² about a point, as in `Form`, in the drop's unknowns and `EXTRA`, all in SI.
+    """‖r/σ‖² about a point, as in `QuadraticForm`, in the drop's unknowns and `EXTRA`, all in SI.
 
     The impulses stand for whole α, and the unknown α for nothing.
     """
@@ -171,12 +171,12 @@ def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple
     return -slopes[:, COMMON + rods :].sum(axis=1), slopes[:, DRAG]
 
 
-def merged(forms: Sequence[Form]) -> list[Form]:
+def merged(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
     """Add up the forms of like drops: all that is wanted of them is the same function of them.
 
     Drops are alike where the same chain strikes at the same incline. The run kept is the first.
     """
-    like: dict[tuple[object, ...], list[Form]] = {}
+    like: dict[tuple[object, ...], list[QuadraticForm]] = {}
     for one in forms:
         like.setdefault((one.run.incline_deg, one.run.impact, one.run.free), []).append(one)
     return [
