@@ -10,13 +10,12 @@ from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
-from rig.report.air import air_lines
-from rig.report.clock import clock_lines
-from rig.report.effects import effects_parts
 from rig.report.estimate import page_parts
 from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
+from rig.report.parts import effects_parts
 from rig.report.pictures import pictures
+from rig.report.remarks import air_lines, clock_lines
 from rig.results import protocol_of, with_analysis
 from rig.sections import Sections
 from rig.session.store import Session
