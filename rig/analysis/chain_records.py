@@ -66,7 +66,7 @@ class EdgeTrain:
 
 
 @dataclass(frozen=True)
-class Edges:
+class EdgeArrays:
     """A drop's edges as arrays, shape ``(edges,)`` each."""
 
     times: Array
@@ -91,7 +91,7 @@ class Edges:
         return found
 
     @classmethod
-    def of(cls, drop: Drop, hz: float) -> Edges:
+    def of(cls, drop: Drop, hz: float) -> EdgeArrays:
         """Take them from a drop whose ticks come at a rate in Hz."""
         flat = itertools.chain.from_iterable(drop.edges)  # much faster than an array of rows
         table = np.fromiter(flat, np.int64, 3 * len(drop.edges)).reshape(-1, 3)
@@ -127,7 +127,7 @@ class ChainRecord:
 
 
 def edge_train(
-    number: int, gate: Gate, chain: RodChain, edges: Edges, start: float, struck: bool
+    number: int, gate: Gate, chain: RodChain, edges: EdgeArrays, start: float, struck: bool
 ) -> EdgeTrain:
     """Collect what one gate saw and what it should see.
 
@@ -184,12 +184,12 @@ def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[C
         ChainRecord(
             role, chain, trains, _ratios(protocol, chain.chain) if role == "impact" else None
         )
-        for role, chain, trains in edge_trains(protocol, run, Edges.of(drop, hz))
+        for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop, hz))
     ]
 
 
 def edge_trains(
-    protocol: Protocol, run: Run, edges: Edges
+    protocol: Protocol, run: Run, edges: EdgeArrays
 ) -> Iterator[tuple[Literal["impact", "free"], RodChain, tuple[EdgeTrain, ...]]]:
     """Sort edges by side: its role, the chain that hung there, and the train of each of its gates.
 

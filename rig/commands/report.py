@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.protocol.protocol import Protocol
-    from rig.report.embed import Picture
+    from rig.report.embed import PageFigure
 
 
 def main(arguments: Namespace) -> int:
@@ -93,7 +93,7 @@ def _estimated(protocol: Protocol, analysis: Analysis, *, simulated: bool) -> di
     return {"simulated": simulated} | estimate(protocol, analysis)
 
 
-def _write_figures(folder: Path, figures: Sequence[Picture]) -> None:
+def _write_figures(folder: Path, figures: Sequence[PageFigure]) -> None:
     """Write ``figure-1.svg`` and on, numbered as in the report."""
     make_folder(folder)
     for number, picture in enumerate(figures, 1):

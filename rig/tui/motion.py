@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.chain_records import Edges, edge_trains
+from rig.analysis.chain_records import EdgeArrays, edge_trains
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.model.fall import kicks
 from rig.predictions import air_of, predict_incline
@@ -108,7 +108,7 @@ def as_table(edges: Iterable[Sequence[int]]) -> NDArray[np.int64]:
     return np.array([tuple(edge) for edge in edges], dtype=np.int64).reshape(-1, 3)
 
 
-def _table(edges: Table, hz: float, *, thin: bool) -> Edges:
+def _table(edges: Table, hz: float, *, thin: bool) -> EdgeArrays:
     """Take edges as arrays; of very many only as many as a picture can show."""
     table = edges if isinstance(edges, np.ndarray) else as_table(edges)
     if thin and len(table) > _MOST:
@@ -116,7 +116,7 @@ def _table(edges: Table, hz: float, *, thin: bool) -> Edges:
         for channel in np.unique(table[:, 1]):  # where counting has to begin
             kept[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
         table = table[kept]
-    return Edges(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
+    return EdgeArrays(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
 
 
 def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Array, Array]:

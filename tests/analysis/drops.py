@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.analysis.align import align
-from rig.analysis.chain_records import ChainRecord, Edges, edge_train
+from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import STATED, Components
 from rig.analysis.drop import analyze_drop
 from rig.analysis.drop_model import DropModel
@@ -61,7 +61,7 @@ class Case:
         """One chain with the trains of its gates."""
         struck = role == "impact"
         chain = self.protocol.chains[self.run.impact if struck else self.run.free]
-        edges = Edges.of(self.drop, self.scale.hz)
+        edges = EdgeArrays.of(self.drop, self.scale.hz)
         trains = [
             edge_train(number, gate, chain, edges, self.protocol.drop.value, struck)
             for number, gate in enumerate(self.protocol.gates.gates)
