@@ -16,6 +16,7 @@ import numpy as np
 
 from rig.analysis.align import align, possible
 from rig.analysis.chain_records import EdgeTrain, chain_records
+from rig.analysis.equations import scaled
 from rig.analysis.pattern import guess
 
 if TYPE_CHECKING:
@@ -120,8 +121,7 @@ class _Seen(NamedTuple):
 
 def _gates(fit: Fit) -> list[_Seen]:
     beams = fit.model.unknowns["beams"]
-    x, sd = np.abs(fit.estimate.x[beams]), fit.model.unknowns.sd[beams]
-    off = np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
+    off = np.abs(scaled(fit.estimate.x[beams], fit.model.unknowns.sd[beams]))
     return [
         _Seen(role, train, match, int((match >= 0).sum()), float(off[train.gate]))
         for role, record in fit.model.records.items()

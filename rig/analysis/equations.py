@@ -154,6 +154,24 @@ class Expected(NamedTuple):
         )
 
 
+def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
+    """What the square of each standardized residual counts: less beyond 4 σ (Huber 1964).
+
+    Parameters
+    ----------
+    cut
+        Standard deviations beyond which an edge does not count at all.
+    """
+    far = np.maximum(np.abs(residuals), np.finfo(float).tiny)
+    found: Array = np.where(far > cut, 0.0, np.minimum(1.0, HUBER / far))
+    return found
+
+
+def scaled(x: Array, sd: Array) -> Array:
+    """In units of the prior uncertainty; what is known exactly stays."""
+    return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class NormalEquations:
     """½‖r/σ‖² about a point, to second order.
@@ -201,8 +219,7 @@ def normal_equations(
         (values, sigma, *_), slopes, columns, _ = model.equations(role, x, match)
         sigma = sigma * inflation
         residuals = values / sigma
-        far = np.maximum(np.abs(residuals), 1e-300)
-        weight = np.where(far > cut, 0.0, np.sqrt(np.minimum(1.0, HUBER / far)))
+        weight = np.sqrt(robust_weights(residuals, cut))
         residuals *= weight
         slopes *= (weight / sigma)[:, None]  # in place: nobody else has them
         matrix[np.ix_(columns, columns)] += slopes.T @ slopes

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.components import STATED
-from rig.analysis.equations import STRAY
+from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
-from rig.analysis.joint_step import DropState, joint_step, scaled
+from rig.analysis.joint_step import DropState, joint_step
 from rig.analysis.unknowns import SharedUnknowns
 from rig.threads import one_thread
 

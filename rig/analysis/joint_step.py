@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.equations import STRAY, NormalEquations, normal_equations
+from rig.analysis.equations import STRAY, NormalEquations, normal_equations, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -127,8 +127,3 @@ def _eliminate(drop: DropState, found: NormalEquations) -> Reduced:
         -found.vector[common] - gain.T @ pull,
         inverse @ pull,
     )
-
-
-def scaled(x: Array, sd: Array) -> Array:
-    """In units of the prior uncertainty; what is known exactly stays."""
-    return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)

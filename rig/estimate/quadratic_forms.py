@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import HUBER, STRAY
+from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
 from rig.analysis.trajectory import COMMON, DRAG
 
@@ -150,8 +150,7 @@ def _normal(
         if "drag" in at:
             slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
         sigma = rows.residuals.sigma * inflation
-        far = np.maximum(np.abs(rows.residuals.values / sigma), np.finfo(float).tiny)
-        weight = np.where(far > STRAY, 0.0, np.minimum(1.0, HUBER / far)) / sigma**2
+        weight = robust_weights(rows.residuals.values / sigma, STRAY) / sigma**2
         weighted = slopes * weight[:, None]
         left = rows.residuals.values - slopes @ point[place]
         matrix[np.ix_(place, place)] += slopes.T @ weighted
