@@ -19,6 +19,7 @@ from rig.commands.output import print_json, say
 from rig.errors import DeviceError, SessionError
 from rig.link.transcript import Transcript
 from rig.session.store import Session
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -255,21 +256,15 @@ def main(arguments: Namespace) -> int:
 
 def _print(board: str, kinds: dict[str, FaultTally]) -> None:
     names = ("times", *STATES, "sessions", "runs", "drops", "bad frames", "on ms", "off ms", "lost")
-    print(f"{board:<7}" + "".join(f"{name:>{_width(name)}}" for name in names))
+    rows = [[board, *names]]
     for kind, one in kinds.items():
         share = f"{one.bad_frames / max(1, one.frames):.1%}"
-        cells: list[object] = [one.disturbed, *(one.fell_upon[state] for state in STATES)]
-        cells += [one.sessions, one.runs, one.drops, share]
-        cells += [round(one.longest_on_s * 1e3), round(one.off_after_s * 1e3), len(one.broken)]
-        print(
-            f"{kind:<7}"
-            + "".join(f"{cell:>{_width(name)}}" for name, cell in zip(names, cells, strict=True))
-        )
+        counts = (one.disturbed, *(one.fell_upon[state] for state in STATES))
+        kept = (one.sessions, one.runs, one.drops)
+        ends = (round(one.longest_on_s * 1e3), round(one.off_after_s * 1e3), len(one.broken))
+        rows.append([kind, *map(str, counts), *map(str, kept), share, *map(str, ends)])
+    print("\n".join(text_table(rows, left={0})))
     if "disk" in kinds:
         print(f"a full disk: {kinds['disk'].full_disk}")
     if "deaf" in kinds:
         print(f"a daemon nobody read from grew by {kinds['deaf'].memory_bytes / 1e6:.1f} MB")
-
-
-def _width(name: str) -> int:
-    return max(6, len(name)) + 1

@@ -18,8 +18,8 @@ from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.predictions import predictions
 from rig.protocol import reader
+from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
-from rig.report.table import summary_table
 from rig.results import calibration, protocol_of, with_analysis
 from rig.session.export import flatten
 from rig.session.store import Session as SessionFile

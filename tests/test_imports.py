@@ -16,6 +16,7 @@ from rig.cli import OPTIONAL
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[1]
+PROTOCOL = "protocols/inclined-uniform.yaml"
 LAST_LINE = """
 import json, sys
 print()
@@ -59,6 +60,19 @@ def test_an_import_does_show(package):
 def test_help_loads_neither_numpy_nor_yaml():
     heavy = {"numpy", "scipy", "yaml", "matplotlib", "textual"}
     assert packages_loaded_by(HELP).isdisjoint(heavy)
+
+
+@pytest.mark.parametrize("command", ["predict", "check"])
+def test_what_expands_no_uncertainty_loads_no_scipy(command):
+    program = f"import rig.cli\nassert rig.cli.main([{command!r}, {PROTOCOL!r}]) == 0"
+    assert "scipy" not in packages_loaded_by(program)
+
+
+def test_the_analysis_loads_scipy_only_when_it_is_used():
+    rooms = "import rig.analysis.session, rig.estimate.session, rig.design.search"
+    assert "scipy" not in packages_loaded_by(rooms)
+    used = "from rig.analysis.distributions import coverage_factor; coverage_factor(3.0)"
+    assert "scipy" in packages_loaded_by(used)
 
 
 def test_the_runner_loads_neither_textual_nor_matplotlib():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.normal import normal
+from rig.analysis.equations import normal_equations, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -64,9 +64,7 @@ class Estimate:
 
     def beyond(self, x: Array) -> float:
         """How far this is from other unknowns, see `length`."""
-        step = np.zeros(x.size)
-        np.divide(self.x - x, self.sd, out=step, where=self.sd > 0.0)
-        return length(step, self.information)
+        return length(scaled(self.x - x, self.sd), self.information)
 
     @property
     def degrees(self) -> float:
@@ -97,24 +95,21 @@ def adjust(
         How short a step is the last, see `length`.
     """
     sd = model.unknowns.sd
-    free = sd > 0.0
-    scaled = np.divide(x, sd, out=np.zeros_like(x), where=free)
-    prior = np.zeros_like(x)
-    if centre is not None:
-        prior = np.divide(centre, sd, out=prior, where=free)
+    y = scaled(x, sd)
+    prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
     identity = np.eye(x.size)
     information = data = identity
     chi2, edges, moved = 0.0, 0, 0.0
     inflation = 1.0
     settled = False
     for step in range(_STEPS):
-        found = normal(model, matches, scaled * sd, sd, inflation)
+        found = normal_equations(model, matches, y * sd, sd, inflation)
         data = found.matrix
         information = data + identity
-        right = data @ scaled - found.vector + prior
-        before = scaled
-        scaled = np.linalg.solve(information, right).astype(np.float64, copy=False)
-        last, moved = moved, length(scaled - before, information)
+        right = data @ y - found.vector + prior
+        before = y
+        y = np.linalg.solve(information, right).astype(np.float64, copy=False)
+        last, moved = moved, length(y - before, information)
         previous, chi2, edges = chi2, found.chi2, found.size
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
         calm = chi2 <= edges - x.size
@@ -128,7 +123,7 @@ def adjust(
             elif moved < done or moved**2 < done * last:
                 settled = True
                 break
-    return Estimate(scaled * sd, sd, information, data, chi2, edges, inflation, settled)
+    return Estimate(y * sd, sd, information, data, chi2, edges, inflation, settled)
 
 
 def length(step: Array, information: Array) -> float:

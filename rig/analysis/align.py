@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.trains import Train
+    from rig.analysis.chain_records import EdgeTrain
     from rig.analysis.trajectory import Trajectory
 
     Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 
 
 def align(
-    trains: Sequence[Train],
+    trains: Sequence[EdgeTrain],
     levels: Sequence[Array],
     trajectory: Trajectory,
     scale: float,
@@ -64,14 +64,14 @@ def align(
     return [row[:size] for row, size in zip(matched, sizes[0], strict=True)]
 
 
-def possible(train: Train, trajectory: Trajectory, scale: float, clock: float) -> int:
+def possible(train: EdgeTrain, trajectory: Trajectory, scale: float, clock: float) -> int:
     """Most expected edges that any matching could match at the nominal levels, see `align`."""
     costs, _ = _costs([train], [train.levels], trajectory, scale, clock)
     return int(_worth(costs).any(axis=0).sum())
 
 
 def _costs(
-    trains: Sequence[Train],
+    trains: Sequence[EdgeTrain],
     levels: Sequence[Array],
     trajectory: Trajectory,
     scale: float,

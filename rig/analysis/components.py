@@ -1,4 +1,4 @@
-"""How much each kind of nuisance scatters: stated beforehand, or taught by a session."""
+"""How much each kind of nuisance scatters: stated beforehand, or found by a joint fit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Components:
 
 STATED = Components()
 LEAST_SHARE = 0.01
-"""Of what is stated, below which nothing is learned: no rod is round to less than a micrometre, no
+"""Of what is stated, below which nothing is believed: no rod is round to less than a micrometre, no
 stamp better than 20 ns, and a perfect simulation must not make the edges infinitely sure."""
 FEWEST_DEGREES = 4.0
-"""Degrees of freedom below which scatter is not learned and what is stated stands."""
+"""Degrees of freedom below which scatter is not estimated and what is stated stands."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.student import coverage_factor
+from rig.analysis.distributions import coverage_factor
 from rig.predictions import beside, predict_incline
 
 if TYPE_CHECKING:

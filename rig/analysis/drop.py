@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.analysis.causes import causes
+from rig.analysis.chain_records import chain_records
 from rig.analysis.components import STATED, Components
+from rig.analysis.diagnoses import diagnose_pattern
 from rig.analysis.drop_model import DropModel
+from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.fit import Fit, settle
+from rig.analysis.pattern import first_guesses
 from rig.analysis.quantities import quantities
 from rig.analysis.result import Audit, DropResult
-from rig.analysis.sides import guesses_of, sides_of
-from rig.analysis.suspects import suspects
 from rig.analysis.verdict import judge, pattern_faults
 from rig.threads import one_thread
 
@@ -54,22 +55,22 @@ def fit_drop(
     scale: TimeScale,
     components: Components = STATED,
 ) -> tuple[DropResult, Fit | None]:
-    """Like `analyze_drop`; keep what a session can learn from, too."""
-    sides = sides_of(protocol, run, drop, scale.hz)
-    received = sum(part.times.size for side in sides for part in side.trains)
-    expected = sum(side.expected for side in sides)
+    """Like `analyze_drop`; keep what a joint fit begins with, too."""
+    records = chain_records(protocol, run, drop, scale.hz)
+    received = sum(part.times.size for record in records for part in record.trains)
+    expected = sum(record.expected for record in records)
     lost = 0
     if drop.certificate is not None:
         lost = drop.certificate.overflows
-    guesses = guesses_of(protocol, sides)
+    guesses = first_guesses(protocol, records)
     blank = Audit(received, 0, expected, received, lost)
     early = judge(protocol, drop, guesses, blank, {}, None)
     if early.verdict == "void":
         unlike = [role for role, one in guesses.items() if pattern_faults(role, one)]
-        faults = suspects(protocol, run, drop, scale.hz, sides, unlike)
+        faults = diagnose_pattern(protocol, run, drop, scale.hz, records, unlike)
         reasons = (*early.reasons, *faults)
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
-    fit = settle(DropModel(protocol, sides, guesses, scale.u, components))
+    fit = settle(DropModel(protocol, records, guesses, scale.u, components))
     audit = blank.after(fit.matched)
     found = quantities(fit.model, fit.estimate)
     end = judge(protocol, drop, guesses, audit, found, fit)
@@ -82,6 +83,6 @@ def fit_drop(
         found,
         fit.rods,
         fit.estimate.scatter,
-        causes=causes(fit),
+        unmatched=unmatched_edges(fit),
     )
     return result, fit

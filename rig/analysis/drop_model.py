@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.analysis.components import STATED, Components
 from rig.analysis.equations import Equations, Expected, Residuals, Seen
-from rig.analysis.sides import air_is_told
+from rig.analysis.pattern import air_is_told
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord
     from rig.analysis.pattern import Guess
-    from rig.analysis.trains import Side
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol
 
@@ -78,22 +78,22 @@ class DropModel:
     def __init__(
         self,
         protocol: Protocol,
-        sides: Sequence[Side],
+        records: Sequence[ChainRecord],
         guesses: Mapping[str, Guess],
         clock_u: float,
         components: Components = STATED,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
-        self.sides: dict[str, Side] = {side.role: side for side in sides}
+        self.records: dict[str, ChainRecord] = {record.role: record for record in records}
         self.guesses = guesses
         self.clock_u = clock_u
         self.components = components
         self.expected: dict[str, Expected] = {
-            role: Expected.of(side.trains) for role, side in self.sides.items()
+            role: Expected.of(record.trains) for role, record in self.records.items()
         }
         slopes: dict[str, float] = {
-            side.role: math.tan(math.radians(side.chain.tilt_deg)) for side in sides
+            record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
         }
         self._steepest = max(slopes.values(), default=0.0)
         # A beam is off by as much for a chain of less tilted rods, which shows less.
@@ -101,7 +101,7 @@ class DropModel:
             role: slope / (self._steepest or 1.0) for role, slope in slopes.items()
         }
         self.unknowns = self._unknowns()
-        self._local = {role: self._columns(role) for role in self.sides}
+        self._local = {role: self._columns(role) for role in self.records}
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
         self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
 
@@ -115,22 +115,22 @@ class DropModel:
         unknowns.add("clock", "clock", self.clock_u)
         unknowns.add("gravity", "gravity", ANY_GRAVITY if free_only else protocol.gravity.u)
         unknowns.add("drop", "drop height", protocol.drop.u)
-        if len(self.sides) > 1:
+        if len(self.records) > 1:
             unknowns.add("side", "hanging height", SIDE_U)
-        if air_is_told([*self.sides.values()]):
+        if air_is_told([*self.records.values()]):
             unknowns.add("drag", "air", DRAG_U)
         unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
         if self._steepest:
             unknowns.add("ripple", "beam offsets", [components.beam * self._steepest] * gates)
-        for role, side in self.sides.items():
-            chain = side.chain
+        for role, record in self.records.items():
+            chain = record.chain
             places = [components.rods * chain.position_u] * chain.chain.rods
             unknowns.add(f"{role} release", "edges", ANYTHING)
             unknowns.add(f"{role} hang", "hanging height", components.hang)
             unknowns.add(f"{role} rods", "rod places", places)
             unknowns.add(f"{role} width", "rod width", chain.width_u)
-        if "impact" in self.sides:
-            rods = self.sides["impact"].chain.chain.rods
+        if "impact" in self.records:
+            rods = self.records["impact"].chain.chain.rods
             scatter = components.impulses(abs(self.guesses["impact"].alpha))
             unknowns.add("alpha", "edges", ANYTHING)
             unknowns.add("impulses", "single impulses", [scatter] * rods)
@@ -138,7 +138,7 @@ class DropModel:
 
     def _columns(self, role: str) -> _Local:
         """Leave out what the other side alone depends on."""
-        others = [f"{name} " for name in self.sides if name != role]
+        others = [f"{name} " for name in self.records if name != role]
         if role == "free":
             others += ["alpha", "impulses"]
         assert self.protocol.gates is not None
@@ -146,11 +146,11 @@ class DropModel:
         for name, block in self.unknowns.blocks.items():
             mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
         elsewhere = np.ones(len(self.protocol.gates.gates), dtype=np.bool_)
-        elsewhere[[train.gate for train in self.sides[role].trains]] = False
+        elsewhere[[train.gate for train in self.records[role].trains]] = False
         for name in ("beams", "ripple"):
             if name in self.unknowns:
                 mine[self.unknowns[name]] &= ~elsewhere
-        parameters = COMMON + (2 * len(self.sides[role].chain.widths) if role == "impact" else 0)
+        parameters = COMMON + (2 * len(self.records[role].chain.widths) if role == "impact" else 0)
         path = self.spread(role, np.eye(parameters))
         moves = mine & path.any(axis=0)
         moving = np.flatnonzero(moves)
@@ -217,11 +217,11 @@ class DropModel:
         kappa = float(x[at["drag"]][0]) if "drag" in at else 0.0
         if role == "free":
             return free_trajectory(release, start, gravity, kappa)
-        side = self.sides["impact"]
-        assert side.ratios is not None
-        places = np.array(side.chain.chain.heights) + x[at["impact rods"]]
+        record = self.records["impact"]
+        assert record.ratios is not None
+        places = np.array(record.chain.chain.heights) + x[at["impact rods"]]
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        return struck_trajectory(release, start, gravity, gains, side.ratios, places, kappa)
+        return struck_trajectory(release, start, gravity, gains, record.ratios, places, kappa)
 
     def spread(self, role: str, derivatives: Array) -> Array:
         """Derivatives by a trajectory's parameters → by all unknowns.
@@ -246,7 +246,7 @@ class DropModel:
         if role == "free" and "side" in at:
             found[..., at["side"]] = derivatives[..., [START]]
         if role == "impact":
-            rods = self.sides["impact"].chain.chain.rods
+            rods = self.records["impact"].chain.chain.rods
             by_gain = derivatives[..., COMMON : COMMON + rods]
             found[..., at["alpha"]] = by_gain.sum(axis=-1, keepdims=True)
             found[..., at["impulses"]] = by_gain

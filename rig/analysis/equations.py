@@ -1,21 +1,30 @@
-"""One side's observation equations, and the edges they are made of."""
+"""One chain's observation equations, the edges they are made of, and a drop's normal equations."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.analysis.trains import Train
+    from rig.analysis.chain_records import EdgeTrain
+    from rig.analysis.drop_model import DropModel
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
+    Matches = Mapping[str, Sequence[Index]]
+
+HUBER = 4.0
+"""Standard deviations beyond which an edge counts less."""
+STRAY = 6.0
+"""Standard deviations: no rod is that far off once everything was adjusted."""
 
 
 class Residuals(NamedTuple):
@@ -85,7 +94,7 @@ class Expected(NamedTuple):
     Attributes
     ----------
     times, burst
-        Of every observed edge, see `rig.analysis.trains.Train`.
+        Of every observed edge, see `rig.analysis.chain_records.EdgeTrain`.
     rods, gate, levels
         Of every expected edge.
     sign
@@ -107,7 +116,7 @@ class Expected(NamedTuple):
     ends: Index
 
     @classmethod
-    def of(cls, trains: Sequence[Train]) -> Expected:
+    def of(cls, trains: Sequence[EdgeTrain]) -> Expected:
         """Join the gates of a side."""
         observed = np.array([train.times.size for train in trains])
         expected = [train.rods.size for train in trains]
@@ -143,3 +152,80 @@ class Expected(NamedTuple):
             self.sign[pick],
             self.turn[pick],
         )
+
+
+def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
+    """What the square of each standardized residual counts: less beyond 4 σ (Huber 1964).
+
+    Parameters
+    ----------
+    cut
+        Standard deviations beyond which an edge does not count at all.
+    """
+    far = np.maximum(np.abs(residuals), np.finfo(float).tiny)
+    found: Array = np.where(far > cut, 0.0, np.minimum(1.0, HUBER / far))
+    return found
+
+
+def scaled(x: Array, sd: Array) -> Array:
+    """In units of the prior uncertainty; what is known exactly stays."""
+    return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class NormalEquations:
+    """½‖r/σ‖² about a point, to second order.
+
+    Attributes
+    ----------
+    matrix
+        JᵀWJ in units of the prior uncertainties, shape ``(unknowns, unknowns)``.
+    vector
+        JᵀWr likewise, shape ``(unknowns,)``.
+    chi2, size
+        Weighted sum of squares, and number of edges.
+    """
+
+    matrix: Array
+    vector: Array
+    chi2: float
+    size: int
+
+
+def normal_equations(
+    model: DropModel,
+    matches: Matches,
+    x: Array,
+    sd: Array,
+    inflation: float = 1.0,
+    cut: float = math.inf,
+) -> NormalEquations:
+    """Set up the normal equations; residuals beyond 4 σ weigh less (Huber).
+
+    A side knows nothing of the other's unknowns: only its own are multiplied.
+
+    Parameters
+    ----------
+    sd
+        Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
+    inflation
+        How much more the edges scatter than the model assumes.
+    cut
+        Standard deviations beyond which an edge does not count.
+    """
+    matrix, vector = np.zeros((x.size, x.size)), np.zeros(x.size)
+    chi2, size = 0.0, 0
+    for role, match in matches.items():
+        (values, sigma, *_), slopes, columns, _ = model.equations(role, x, match)
+        sigma = sigma * inflation
+        residuals = values / sigma
+        weight = np.sqrt(robust_weights(residuals, cut))
+        residuals *= weight
+        slopes *= (weight / sigma)[:, None]  # in place: nobody else has them
+        matrix[np.ix_(columns, columns)] += slopes.T @ slopes
+        vector[columns] += slopes.T @ residuals
+        chi2 += float(residuals @ residuals)
+        size += residuals.size
+    # A column's unit is applied to few numbers instead of to each edge.
+    matrix *= np.outer(sd, sd)
+    return NormalEquations(matrix, vector * sd, chi2, size)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.components import FEWEST_DEGREES, LEAST_SHARE, STATED
-from rig.analysis.normal import STRAY
+from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -76,7 +76,7 @@ class Evidence:
     def drop(self, model: DropModel, y: Array, v: Array) -> None:
         """Count the unknowns of one drop, in units of their prior uncertainties."""
         at = model.unknowns
-        for role in model.sides:
+        for role in model.records:
             self._count("hang", y[at[f"{role} hang"]], v[at[f"{role} hang"]])
         if "impulses" in at:
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)

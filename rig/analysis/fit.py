@@ -1,4 +1,4 @@
-"""One drop matched and adjusted by itself, ready to be judged, or to learn from."""
+"""One drop matched and adjusted by itself, ready to be judged, or to be fitted with others."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
 from rig.analysis.align import align
-from rig.analysis.normal import STRAY
+from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,8 +45,8 @@ class Matched:
     def rods(self) -> dict[int, int]:
         """Rod of every matched edge of the drop."""
         found: dict[int, int] = {}
-        for role, side in self.model.sides.items():
-            for part, match in zip(side.trains, self.matches[role], strict=True):
+        for role, record in self.model.records.items():
+            for part, match in zip(record.trains, self.matches[role], strict=True):
                 seen = match >= 0
                 edges = part.edge[match[seen]]
                 found.update(zip(edges.tolist(), part.rods[seen].tolist(), strict=True))
@@ -89,8 +89,8 @@ def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
     """
     clock = float(x[model.unknowns["clock"]][0])
     return {
-        role: align(side.trains, model.levels(role, x), model.trajectory(role, x), width, clock)
-        for role, side in model.sides.items()
+        role: align(record.trains, model.levels(role, x), model.trajectory(role, x), width, clock)
+        for role, record in model.records.items()
     }
 
 

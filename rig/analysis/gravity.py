@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.legs import leg_slopes
+from rig.analysis.distributions import coverage_factor
+from rig.analysis.free_flight import leg_slopes
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import DRAG_U
 from rig.threads import one_thread
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.adjust import adjust
-from rig.analysis.joint import Joint, joint_step
+from rig.analysis.distributions import coverage_factor
+from rig.analysis.joint_step import DropState, joint_step
 from rig.analysis.quantities import measurands
-from rig.analysis.student import coverage_factor
 from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
-    from rig.analysis.learn import Lesson, Taught
+    from rig.analysis.joint_fit import JointDrop, JointFit
 
     Array = NDArray[np.float64]
 
@@ -92,33 +92,33 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
 
 
 @one_thread
-def session_monte_carlo(lesson: Lesson, trials: int, seed: int) -> list[dict[str, Propagated]]:
+def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[str, Propagated]]:
     """Draw everything that is uncertain about a session, and adjust all drops together again.
 
     As `monte_carlo`, with what drops have in common drawn once a trial. How much everything
-    scatters is taken as the session taught it.
+    scatters is taken as the joint fit found it.
 
     Returns
     -------
     list
-        For each drop of the lesson, by JSON name.
+        For each jointly fitted drop, by JSON name.
     """
     rng = np.random.default_rng(seed)
-    shifts = [_scatter(drop) for drop in lesson.drops]
-    found: list[dict[str, list[float]]] = [{} for _ in lesson.drops]
+    shifts = [_scatter(drop) for drop in joint.drops]
+    found: list[dict[str, list[float]]] = [{} for _ in joint.drops]
     for _ in range(trials):
-        centre = _stated(lesson.sd) * rng.normal(size=lesson.sd.size)
-        joint, x = [], lesson.x
-        for drop, shift in zip(lesson.drops, shifts, strict=True):
+        centre = _stated(joint.sd) * rng.normal(size=joint.sd.size)
+        states, x = [], joint.x
+        for drop, shift in zip(joint.drops, shifts, strict=True):
             sd = drop.model.unknowns.sd[drop.own]
             own = _stated(sd) * rng.normal(size=sd.size)
             model = _shaken(drop.model, shift, rng)
             places = drop.own, drop.common, drop.here
-            joint.append(Joint(model, drop.matches, drop.x.copy(), *places, own))
+            states.append(DropState(model, drop.matches, drop.x.copy(), *places, own))
         for _step in range(_SESSION_STEPS):
-            _, step = joint_step(joint, x, lesson.sd, centre)
-            x = x + step * lesson.sd
-        for one, values in zip(joint, found, strict=True):
+            _, step = joint_step(states, x, joint.sd, centre)
+            x = x + step * joint.sd
+        for one, values in zip(states, found, strict=True):
             for name, (value, _gradient) in measurands(one.model, one.x).items():
                 values.setdefault(name, []).append(value)
     return [
@@ -174,7 +174,7 @@ def _shaken(model: DropModel, shifts: dict[str, Array], rng: np.random.Generator
     return model.shaken({role: one * rng.normal(size=one.size) for role, one in shifts.items()})
 
 
-def _scatter(drop: Fit | Taught) -> dict[str, Array]:
+def _scatter(drop: Fit | JointDrop) -> dict[str, Array]:
     """Standard deviation of every observed edge of each side, s; 0 where it is not matched."""
     found = {}
     for role, matches in drop.matches.items():

@@ -13,12 +13,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import STATED
-from rig.analysis.legs import fall_for, fall_through, leg_slopes
+from rig.analysis.free_flight import fall_for, fall_through, leg_slopes
+from rig.analysis.unknowns import DRAG_U
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from rig.analysis.trains import Side
+    from rig.analysis.chain_records import ChainRecord
+    from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
     Array = NDArray[np.float64]
@@ -45,6 +49,8 @@ class Air(NamedTuple):
 NO_AIR = Air()
 _AIRS = tuple(0.02 * n for n in range(1, 11))  # of which one brings a chain near enough
 _CLEAR = 0.9  # share of the expected edges with which no other κ is tried
+
+_FELT = 2e-3  # 1/m: less than a millimetre in a first guess
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +81,7 @@ class Guess:
     kappa: float = 0.0
 
 
-def guess(side: Side, start: Quantity, gravity: float, air: Air = NO_AIR) -> Guess:
+def guess(record: ChainRecord, start: Quantity, gravity: float, air: Air = NO_AIR) -> Guess:
     """Guess the release time, κ of the air, and α where the chain is struck.
 
     Parameters
@@ -85,25 +91,48 @@ def guess(side: Side, start: Quantity, gravity: float, air: Air = NO_AIR) -> Gue
     air
         What is known of κ.
     """
-    places = np.array(side.chain.chain.heights)
+    places = np.array(record.chain.chain.heights)
     pitch = float(np.diff(places).min()) if places.size > 1 else start.value
     slack = pitch / 6
     # An impact chain falls freely until its bottom rod is down.
-    lowest = -np.inf if side.ratios is None else 0.0
-    free = guess_release(side, start, gravity, lowest, slack, air)
+    lowest = -np.inf if record.ratios is None else 0.0
+    free = guess_release(record, start, gravity, lowest, slack, air)
     for kappa in _AIRS if air.u and free.share < _CLEAR else ():
-        other = guess_release(side, start, gravity, lowest, slack, Air(kappa, air.u))
+        other = guess_release(record, start, gravity, lowest, slack, Air(kappa, air.u))
         free = max(free, other, key=lambda one: one.share)
-    if side.ratios is None or free.share == 0.0:
+    if record.ratios is None or free.share == 0.0:
         return free
-    return _alpha(side, gravity, side.ratios, slack, pitch, free)
+    return _alpha(record, gravity, record.ratios, slack, pitch, free)
+
+
+def first_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
+    """Guess each side's fall."""
+    gravity, start = protocol.gravity.value, protocol.drop
+    # The free chain tells what the air does to both.
+    air = Air(0.0, DRAG_U) if air_is_told(records) else NO_AIR
+    found: dict[str, Guess] = {}
+    for record in reversed(records):
+        found[record.role] = guess(record, start, gravity, air)
+        kappa = found[record.role].kappa
+        air = Air(kappa) if abs(kappa) > _FELT else NO_AIR
+    return {record.role: found[record.role] for record in records}
+
+
+def air_is_told(records: Sequence[ChainRecord]) -> bool:
+    """Whether κ can be told from what is struck: by a free chain, of rods that are all alike."""
+    return len(records) > 1 and all(record.chain.chain.alike for record in records)
 
 
 def guess_release(
-    side: Side, start: Quantity, gravity: float, lowest: float, slack: float, air: Air = NO_AIR
+    record: ChainRecord,
+    start: Quantity,
+    gravity: float,
+    lowest: float,
+    slack: float,
+    air: Air = NO_AIR,
 ) -> Guess:
     """Let all pairs vote and count at the moment that most of them agree on."""
-    times, levels, _ = _pairs(side, lowest)
+    times, levels, _ = _pairs(record, lowest)
     if times.size == 0:
         return Guess(0.0, start.value)
     speed, tau = fall_through(start.value - levels, np.zeros_like(levels), gravity, air.kappa)
@@ -117,7 +146,7 @@ def guess_release(
     best = int(np.argmax(votes))
     release = 0.5 * float(moments[best] + moments[best + 1])
     voters = np.abs(middle - release) <= half
-    expected = sum(int((train.levels > lowest).sum()) for train in side.trains)
+    expected = sum(int((train.levels > lowest).sum()) for train in record.trains)
     elsewhere = votes[np.abs(moments - release) > _APART].max(initial=0)
     most = float(votes[best])
     release, height, kappa = _refine(times[voters], levels[voters], release, start, gravity, air)
@@ -148,10 +177,10 @@ class Pairs(NamedTuple):
     expected: Index
 
 
-def _pairs(side: Side, lowest: float) -> Pairs:
+def _pairs(record: ChainRecord, lowest: float) -> Pairs:
     """Pair up everything whose level is above `lowest`."""
     times, levels, numbers, first = [], [], [], 0
-    for train in side.trains:
+    for train in record.trains:
         same = train.blocked[:, None] == train.blocks[None, :]
         observed, expected = np.nonzero(same & (train.levels > lowest)[None, :])
         times.append(train.times[observed])
@@ -182,12 +211,12 @@ def _refine(
 
 
 def _alpha(
-    side: Side, gravity: float, ratios: Array, slack: float, pitch: float, free: Guess
+    record: ChainRecord, gravity: float, ratios: Array, slack: float, pitch: float, free: Guess
 ) -> Guess:
     """Try one α after another."""
-    places = np.array(side.chain.chain.heights)
+    places = np.array(record.chain.chain.heights)
     time, height, speed = _paths(free, gravity, ratios, places)
-    scores = _scores(side, time, height, speed, gravity, slack, free.kappa)
+    scores = _scores(record, time, height, speed, gravity, slack, free.kappa)
     # The middle of a plateau, not its left end.
     plateau = np.flatnonzero(scores == scores.max())
     best = int(plateau[plateau.size // 2])
@@ -200,8 +229,8 @@ def _alpha(
     return replace(
         free,
         alpha=float(ALPHAS[best]),
-        share=min(free.share, float(scores[best]) / side.expected),
-        runner_up=float(scores[different].max(initial=0)) / side.expected,
+        share=min(free.share, float(scores[best]) / record.expected),
+        runner_up=float(scores[different].max(initial=0)) / record.expected,
     )
 
 
@@ -220,7 +249,7 @@ def _paths(free: Guess, gravity: float, ratios: Array, places: Array) -> tuple[A
 
 
 def _scores(
-    side: Side,
+    record: ChainRecord,
     time: Array,
     height: Array,
     speed: Array,
@@ -229,10 +258,10 @@ def _scores(
     kappa: float,
 ) -> Index:
     """Count for every α the expected edges that have an observed one where the chain would be."""
-    levels = np.concatenate([train.levels for train in side.trains])
+    levels = np.concatenate([train.levels for train in record.trains])
     soonest = _passages(levels + slack, time, height, speed, gravity, kappa)
     latest = _passages(levels - slack, time, height, speed, gravity, kappa)
-    times, _, expected = _pairs(side, -np.inf)
+    times, _, expected = _pairs(record, -np.inf)
     # The larger α, the sooner: most pairs are beyond what any of them reaches.
     near = np.flatnonzero((soonest[expected, -1] < times) & (times < latest[expected, 0]))
     near = near[np.argsort(expected[near], kind="stable")]

@@ -42,7 +42,7 @@ def _measured(model: DropModel, estimate: Estimate, value: float, gradient: Arra
 
 def _gravity(model: DropModel, x: Array) -> Value | None:
     """The acceleration of a chain that strikes nothing."""
-    if "impact" in model.sides:
+    if "impact" in model.records:
         return None
     gradient = np.zeros(x.size)
     gradient[model.unknowns["gravity"]] = 1.0
@@ -51,7 +51,7 @@ def _gravity(model: DropModel, x: Array) -> Value | None:
 
 def _speed(model: DropModel, x: Array) -> Value | None:
     """V just before the top rod strikes."""
-    if "impact" not in model.sides:
+    if "impact" not in model.records:
         return None
     path = model.trajectory("impact", x)
     return path.arrival, model.spread("impact", path.d_arrival)
@@ -59,7 +59,7 @@ def _speed(model: DropModel, x: Array) -> Value | None:
 
 def _fall_time(model: DropModel, x: Array) -> Value | None:
     """How long it takes until the top rod strikes."""
-    if "impact" not in model.sides:
+    if "impact" not in model.records:
         return None
     path = model.trajectory("impact", x)
     duration = model.spread("impact", path.d_time[-1])
@@ -97,13 +97,13 @@ def _separation(model: DropModel, x: Array) -> Value | None:
 
 
 def _both(model: DropModel) -> bool:
-    return {"impact", "free"} <= set(model.sides)
+    return {"impact", "free"} <= set(model.records)
 
 
 def _apart(model: DropModel, x: Array, when: float, d_when: Array) -> Value:
     """Height of the free chain's top rod above the contact point at a moment."""
     free, at = model.trajectory("free", x), model.unknowns
-    top = model.sides["free"].chain.chain.length + float(x[at["free rods"]][-1])
+    top = model.records["free"].chain.chain.length + float(x[at["free rods"]][-1])
     height, speed = free.heights(np.array([when]))
     gradient = model.spread("free", free.derivatives(np.array([when])))[0]
     gradient[at["free rods"].stop - 1] += 1.0

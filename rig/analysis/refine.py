@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.learn import Lesson, Taught
+    from rig.analysis.joint_fit import JointDrop, JointFit
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -42,22 +42,22 @@ class Budgets:
 
     Parameters
     ----------
-    lesson
+    joint
         Of all drops.
     """
 
-    def __init__(self, lesson: Lesson) -> None:
-        self.lesson = lesson
-        size = len(lesson.shared)
-        self._root = np.linalg.cholesky(lesson.covariance)
+    def __init__(self, joint: JointFit) -> None:
+        self.joint = joint
+        size = len(joint.shared)
+        self._root = np.linalg.cholesky(joint.covariance)
         self._others: dict[str, Array] = {}
-        for drop in lesson.drops:
+        for drop in joint.drops:
             place = np.ix_(drop.here, drop.here)
             for name, rows in _groups(drop).items():
                 total = self._others.setdefault(name, np.zeros((size, size)))
                 total[place] += drop.gain[rows].T @ drop.gain[rows]
 
-    def measured(self, drop: Taught) -> dict[str, Measured]:
+    def measured(self, drop: JointDrop) -> dict[str, Measured]:
         """Everything the scene lets one measure, by its JSON name."""
         lines = _groups(drop), _common(drop)
         return {
@@ -66,13 +66,13 @@ class Budgets:
         }
 
     def _measured(
-        self, drop: Taught, places: tuple[Places, Places], value: float, gradient: Array
+        self, drop: JointDrop, places: tuple[Places, Places], value: float, gradient: Array
     ) -> Measured:
         """Put value and uncertainty together; `gradient` is in units of the prior uncertainties."""
         alone = drop.inverse @ gradient[drop.own]
-        h = np.zeros(len(self.lesson.shared))
+        h = np.zeros(len(self.joint.shared))
         h[drop.here] = gradient[drop.common] - drop.gain.T @ gradient[drop.own]
-        common = self.lesson.covariance @ h
+        common = self.joint.covariance @ h
         own = alone - drop.gain @ common[drop.here]
         shared = h @ self._root
         variance = float(gradient[drop.own] @ alone) + float(shared @ shared)
@@ -90,7 +90,7 @@ class Budgets:
 
     def _degrees(self, u: float, budget: dict[str, float]) -> float:
         """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4)."""
-        degrees = self.lesson.degrees
+        degrees = self.joint.degrees
         share = sum(
             (line / u) ** 4 / degrees[_DEGREES[name]]
             for name, line in budget.items()
@@ -99,21 +99,21 @@ class Budgets:
         return 1.0 / share if share > 0.0 else math.inf
 
 
-def _common(drop: Taught) -> Places:
+def _common(drop: JointDrop) -> Places:
     """Places in the session's vector of each line of the budget."""
     places = np.full(drop.x.size, -1)
     places[drop.common] = drop.here
     return _lines(drop, places)
 
 
-def _groups(drop: Taught) -> Places:
+def _groups(drop: JointDrop) -> Places:
     """Rows of a drop's own unknowns that each line of the budget has."""
     row = np.full(drop.x.size, -1)
     row[drop.own] = np.arange(drop.own.size)
     return _lines(drop, row)
 
 
-def _lines(drop: Taught, places: Index) -> Places:
+def _lines(drop: JointDrop, places: Index) -> Places:
     """Sort places that there are, one an unknown, by line of the budget."""
     found = {
         name: np.concatenate([places[block] for block in blocks])

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from rig.analysis.student import coverage_factor
+from rig.analysis.distributions import coverage_factor
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rig.analysis.causes import Cause
+    from rig.analysis.edge_classes import UnmatchedEdge
     from rig.protocol.protocol import Run
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
@@ -103,7 +103,7 @@ class DropResult:
         How much more than assumed the edges scatter, at least 1; `None` when nothing was fitted.
     learned
         Whether the quantities are in the light of the whole session.
-    causes
+    unmatched
         Every edge that is missing or belongs to no rod, and why.
     limits
         The verdict that a rejected drop has by its limits.
@@ -118,7 +118,7 @@ class DropResult:
     matches: Mapping[int, int] = field(default_factory=dict)
     scatter: float | None = None
     learned: bool = False
-    causes: tuple[Cause, ...] = ()
+    unmatched: tuple[UnmatchedEdge, ...] = ()
     limits: Verdict | None = None
 
     def json(self) -> dict[str, Any]:
@@ -132,7 +132,7 @@ class DropResult:
         found |= {name: value.json() for name, value in self.quantities.items()}
         found["edges"] = self.audit.json()
         if self.matches:
-            found["causes"] = [cause.json() for cause in self.causes]
+            found["causes"] = [edge.json() for edge in self.unmatched]
         if self.scatter is not None:
             found["scatter"] = self.scatter
         found["learned"] = self.learned

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.causes import causes
 from rig.analysis.drop import fit_drop
-from rig.analysis.learn import FEWEST, learn
-from rig.analysis.lesson_json import lesson_json
+from rig.analysis.edge_classes import unmatched_edges
+from rig.analysis.joint_fit import FEWEST, joint_fit
 from rig.analysis.pairs import Effects, effects
 from rig.analysis.refine import Budgets
 from rig.analysis.result import GOOD
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.fit import Fit
-    from rig.analysis.learn import Lesson, Taught
+    from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol
@@ -47,10 +46,11 @@ class Analysis:
         Earlier attempts, by run and attempt.
     summary
         One line an incline.
-    lesson
-        What all good drops together teach; `None` where there are too few of them.
+    joint
+        The joint fit of all good drops; `None` where there are too few of them.
     adjusted
-        Good drops with their unknowns, in the light of all where there is a lesson, by run and
+        Good drops with their unknowns, in the light of all where there is a joint fit, by run
+        and
         attempt.
     effects
         Of chains and sides, by incline; none where the plan has no blocks of A, B, B, A.
@@ -62,8 +62,8 @@ class Analysis:
     runs: tuple[DropResult, ...]
     superseded: tuple[DropResult, ...]
     summary: tuple[Incline, ...]
-    lesson: Lesson | None = None
-    adjusted: Mapping[tuple[int, int], Fit | Taught] = field(default_factory=dict)
+    joint: JointFit | None = None
+    adjusted: Mapping[tuple[int, int], Fit | JointDrop] = field(default_factory=dict)
     effects: tuple[Effects, ...] = ()
     with_rejected: tuple[Incline, ...] = ()
 
@@ -79,8 +79,8 @@ class Analysis:
             found["summary_with_rejected"] = [line.json() for line in self.with_rejected]
         if self.effects:
             found["effects"] = [one.json() for one in self.effects]
-        if self.lesson is not None:
-            found["learned"] = lesson_json(self.lesson)
+        if self.joint is not None:
+            found["learned"] = self.joint.json()
         return found
 
 
@@ -148,7 +148,7 @@ def overruled(result: DropResult, causes: Sequence[str] | None) -> DropResult:
 def gather(
     protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
 ) -> Analysis:
-    """Let drops that were analysed one by one teach each other, and sum up.
+    """Fit drops together that were analysed one by one, and sum up.
 
     Parameters
     ----------
@@ -157,14 +157,14 @@ def gather(
     results, fits
         Of each drop, as `rig.analysis.drop.fit_drop` gives them.
     """
-    return sum_up(protocol, *_taught(results, fits))
+    return sum_up(protocol, *_fit_jointly(results, fits))
 
 
 def sum_up(
     protocol: Protocol,
     results: Iterable[DropResult],
-    lesson: Lesson | None = None,
-    adjusted: Mapping[tuple[int, int], Fit | Taught] | None = None,
+    joint: JointFit | None = None,
+    adjusted: Mapping[tuple[int, int], Fit | JointDrop] | None = None,
 ) -> Analysis:
     """Sum drops up as they are.
 
@@ -174,7 +174,7 @@ def sum_up(
         The scene and its plan.
     results
         Of each drop.
-    lesson, adjusted
+    joint, adjusted
         As in `Analysis`.
     """
     found = sorted(results, key=lambda result: (result.run.number, result.attempt))
@@ -185,17 +185,17 @@ def sum_up(
     spared = any(result.limits in GOOD for result in latest)
     whole = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
     paired = effects(protocol, latest)
-    return Analysis(latest, earlier, summary, lesson, adjusted or {}, paired, whole)
+    return Analysis(latest, earlier, summary, joint, adjusted or {}, paired, whole)
 
 
-def _taught(
+def _fit_jointly(
     results: Sequence[DropResult], fits: Sequence[Fit | None]
-) -> tuple[list[DropResult], Lesson | None, dict[tuple[int, int], Fit | Taught]]:
+) -> tuple[list[DropResult], JointFit | None, dict[tuple[int, int], Fit | JointDrop]]:
     """Give good drops the numbers that they have in the light of all of them.
 
-    A verdict is on a drop by itself, by limits fixed beforehand: what others teach about the rig
+    A verdict is on a drop by itself, by limits fixed beforehand: what others say of the rig
     changes its numbers and never whether they count. One that loses its edges among the others
-    keeps the numbers that it has by itself, and teaches nothing.
+    keeps the numbers that it has by itself, and is left out.
     """
     good = {
         n: fit
@@ -203,29 +203,29 @@ def _taught(
         if fit is not None and result.verdict in GOOD and fit.estimate.settled
     }
     found = list(results)
-    lesson = None
-    while lesson is None and len(good) >= FEWEST:
-        lesson = learn(list(good.values()))
-        if not lesson.settled:  # nobody is to blame for edges that such an adjustment loses
-            lesson = None
+    joint = None
+    while joint is None and len(good) >= FEWEST:
+        joint = joint_fit(list(good.values()))
+        if not joint.settled:  # nobody is to blame for edges that such an adjustment loses
+            joint = None
             break
-        for (n, fit), drop in zip(list(good.items()), lesson.drops, strict=True):
+        for (n, fit), drop in zip(list(good.items()), joint.drops, strict=True):
             if drop.matched < _KEPT * fit.matched:
                 why = f"only {drop.matched} of its {fit.matched} edges go with the other runs"
                 found[n] = replace(found[n], reasons=(*found[n].reasons, f"{why}: {_MOVED}"))
                 del good[n]
-                lesson = None
+                joint = None
     keys = [(results[n].run.number, results[n].attempt) for n in good]
-    if lesson is None:
+    if joint is None:
         return found, None, dict(zip(keys, good.values(), strict=True))
-    budgets = Budgets(lesson)
-    for n, drop in zip(good, lesson.drops, strict=True):
+    budgets = Budgets(joint)
+    for n, drop in zip(good, joint.drops, strict=True):
         found[n] = replace(
             found[n],
             audit=found[n].audit.after(drop.matched),
             quantities=budgets.measured(drop),
             matches=drop.rods,
             learned=True,
-            causes=causes(drop),
+            unmatched=unmatched_edges(drop),
         )
-    return found, lesson, dict(zip(keys, lesson.drops, strict=True))
+    return found, joint, dict(zip(keys, joint.drops, strict=True))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.student import coverage_factor
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
 

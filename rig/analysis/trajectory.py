@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.legs import fall_for, fall_through, leg_slopes, one_leg, reach_slopes
+from rig.analysis.free_flight import fall_for, fall_through, leg_slopes, one_leg, reach_slopes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.analysis.faults import find_faults
+from rig.analysis.diagnoses import diagnose
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -57,7 +57,7 @@ def judge(
     for role, guess in guesses.items():
         void += pattern_faults(role, guess)
     if fit is not None:
-        faults = find_faults(fit)
+        faults = diagnose(fit)
         void += _limits(protocol, audit, found)
         void += faults.void
         if void:

@@ -193,7 +193,7 @@ def drawn(fit: Fit, draws: int, seed: int) -> TimerReading:
     """
     rng = np.random.default_rng(seed)
     model, estimate = fit.model, fit.estimate
-    at, struck, free = model.unknowns, model.sides["impact"], model.sides["free"]
+    at, struck, free = model.unknowns, model.records["impact"], model.records["free"]
     assert struck.ratios is not None
     names = ["gravity", "drop", "side", "alpha", "impulses", "impact hang", "impact rods"]
     names += ["free hang", "free rods"]

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 from rig import __version__
 from rig.commands.output import print_results, progress
 from rig.errors import SessionError
-from rig.report.effects import effects_parts
-from rig.report.scatter import scatter_part
-from rig.report.table import aligned
+from rig.report.columns import aligned
+from rig.report.parts import effects_parts, scatter_part
 from rig.results import with_analysis
 from rig.session.store import Session
 

@@ -12,10 +12,13 @@ from rig.bench.accuracy import accuracy
 from rig.bench.fast_accuracy import BLOCK, DOUBLED, STACK, doubled, fast_accuracy
 from rig.commands.output import print_json, say
 from rig.measurands import MEASURANDS
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Mapping
+
+    from rig.measurands import Measurand
 
 SESSIONS = 5
 """Of the whole protocol, through the whole stack."""
@@ -71,26 +74,21 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         f"{found['sessions']} simulated sessions, drops: {verdicts}",
         f"{found['edges_matched']} edges matched, {found['edges_given_to_a_wrong_rod']} to a wrong "
         f"rod, {found['strays_taken_for_a_rod']} strays taken for a rod",
-        f"{'error of one run':<28}{'rms':>9}{'bias':>9}{'worst':>9}{'mean U95':>10}"
-        f"{'bias/U':>8}  in U95",
     ]
+    rows = [["error of one run", "rms", "bias", "worst", "mean U95", "bias/U", "in U95"]]
     for name, errors in found["quantities"].items():
         row = MEASURANDS[name]
-        rms, bias, worst, u = (
-            errors[key] * row.fine_scale for key in ("rms", "bias", "worst", "mean_U95")
-        )
-        lines.append(
-            f"{f'{row.label} ({row.fine})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}{u:10.3f}"
-            f"{errors['bias_over_U']:8.2f}  {errors['coverage']:.1%}"
-            + (f" ± {errors['coverage_se']:.1%}" if "coverage_se" in errors else "")
-        )
+        held = f"{errors['coverage']:.1%}"
+        if "coverage_se" in errors:
+            held += f" ± {errors['coverage_se']:.1%}"
+        sizes = _sizes(errors, row, "rms", "bias", "worst", "mean_U95")
+        rows.append([f"{row.label} ({row.fine})", *sizes, f"{errors['bias_over_U']:.2f}", held])
     for baseline, label in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
         for name, errors in found.get(baseline, {}).items():
             row = MEASURANDS[name]
-            rms, bias, worst = (errors[key] * row.fine_scale for key in ("rms", "bias", "worst"))
-            lines.append(
-                f"{f'{label} {row.symbol} ({row.fine})':<28}{rms:9.3f}{bias:9.3f}{worst:9.3f}"
-            )
+            sizes = _sizes(errors, row, "rms", "bias", "worst")
+            rows.append([f"{label} {row.symbol} ({row.fine})", *sizes, "", "", ""])
+    lines += text_table(rows, left={0})
     own = found["analysis_ms_per_run"]
     plain = found.get("plain_fit_ms_per_run")
     ratio = f", {own / plain:.0f} times a plain least-squares fit" if plain else ""
@@ -98,3 +96,7 @@ def _table(found: Mapping[str, Any]) -> list[str]:
     times = sorted(found["wall_time_s"])
     lines.append(f"wall time of a session: median {times[len(times) // 2]:.1f} s")
     return lines
+
+
+def _sizes(errors: Mapping[str, float], row: Measurand, *names: str) -> list[str]:
+    return [f"{errors[name] * row.fine_scale:.3f}" for name in names]

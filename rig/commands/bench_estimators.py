@@ -12,8 +12,7 @@ from rig.bench.estimators import as_json, estimators
 from rig.bench.figures import estimators_figure
 from rig.commands.output import print_json, say
 from rig.files import make_folder, write_atomic
-from rig.report.columns import Column
-from rig.report.table import aligned
+from rig.report.columns import Column, aligned
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -13,6 +13,7 @@ from rig.bench.scenes import as_json, scenes
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import write_atomic
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -64,14 +65,8 @@ def table(costs: Sequence[Cost]) -> str:
              str(work), f"{work / first.operations['predict']:.3g}",
              *map(str, account.evaluations.values())]
         )  # fmt: skip
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "  ".join(
-            cell.rjust(width) if column else cell.ljust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    lines = text_table(rows, left={0})
+    width = max(len(cost.scene) for cost in costs)
     lines += [
         "",
         "medians with quartiles; × is over the simplest scene; bytecodes and the columns behind "
@@ -82,7 +77,7 @@ def table(costs: Sequence[Cost]) -> str:
     for cost in costs[1:]:
         more = [name for name in cost.account.rooms if name not in first.rooms]
         more += [name for name in cost.account.packages if name not in first.packages]
-        lines.append(f"  {cost.scene:<{widths[0]}}  {', '.join(more) or 'nothing'}")
+        lines.append(f"  {cost.scene:<{width}}  {', '.join(more) or 'nothing'}")
     return "\n".join(lines)
 
 

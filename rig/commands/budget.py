@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
 from rig.analysis.monte_carlo import agreement, monte_carlo
-from rig.analysis.student import coverage_factor
 from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.protocol.plan import runs

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.components import STATED
 from rig.commands.output import print_json, say
 from rig.design.cases import beams_of, cases
-from rig.design.outlook import outlook
-from rig.design.readable import readable
-from rig.design.search import better, room
+from rig.design.forecast import forecast
+from rig.design.search import better, readable, room
 from rig.errors import InputError
 from rig.estimate.coefficients import KNOWN
 from rig.protocol import reader
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.analysis.components import Components
-    from rig.design.outlook import Outlook
+    from rig.design.forecast import Forecast
     from rig.protocol.protocol import Protocol, Side
 
 SPACING_M = 0.01
@@ -61,15 +60,15 @@ def main(arguments: Namespace) -> int:
 
 
 def _learned(path: str) -> Components:
-    """How much everything scatters, as an earlier session of the same rig taught."""
+    """How much everything scatters, as an earlier session of the same rig found."""
     from rig.results import detailed  # noqa: PLC0415 - only with --learned
     from rig.session.store import Session  # noqa: PLC0415
 
     with Session.open(path, readonly=True) as session:
-        lesson = detailed(session)[0].lesson
-    if lesson is None:
+        joint = detailed(session)[0].joint
+    if joint is None:
         raise InputError(f"{path}: too few good drops to learn from", "leave out --learned")
-    return lesson.components
+    return joint.components
 
 
 def _length(option: str, text: str | None) -> float | None:
@@ -88,7 +87,7 @@ def _said(
     protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
 ) -> dict[str, Any]:
     assert protocol.gates is not None
-    expected: Outlook = outlook(
+    expected: Forecast = forecast(
         protocol, cases(protocol, beams, components), range(len(beams)), sure=True
     )
     return {

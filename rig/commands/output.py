@@ -59,9 +59,8 @@ def print_results(found: Mapping[str, Any], *, as_json: bool) -> int:
     else:
         if found["simulated"]:
             print("SIMULATED DATA")
-        from rig.report.air import air_lines  # noqa: PLC0415 - few commands print one
-        from rig.report.clock import clock_lines  # noqa: PLC0415
-        from rig.report.table import summary_table  # noqa: PLC0415
+        from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
+        from rig.report.remarks import air_lines, clock_lines  # noqa: PLC0415
 
         print(summary_table(found))
         print("\n".join([*clock_lines(found), *air_lines(found)]))

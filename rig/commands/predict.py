@@ -9,6 +9,7 @@ from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.predictions import label, predictions
 from rig.protocol import reader
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -74,10 +75,5 @@ def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[st
             for key, scale, style in shown.values()
         ]
         rows.append([*cells, line["model"]])
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
     notes = [f"{label(line)}: {note}" for line in found for note in line["notes"]]
-    return "\n".join([*lines, *notes])
+    return "\n".join([*text_table(rows), *notes])

@@ -10,13 +10,12 @@ from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
-from rig.report.air import air_lines
-from rig.report.clock import clock_lines
-from rig.report.effects import effects_parts
 from rig.report.estimate import page_parts
 from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
+from rig.report.parts import effects_parts
 from rig.report.pictures import pictures
+from rig.report.remarks import air_lines, clock_lines
 from rig.results import protocol_of, with_analysis
 from rig.sections import Sections
 from rig.session.store import Session
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.protocol.protocol import Protocol
-    from rig.report.embed import Picture
+    from rig.report.embed import PageFigure
 
 
 def main(arguments: Namespace) -> int:
@@ -94,7 +93,7 @@ def _estimated(protocol: Protocol, analysis: Analysis, *, simulated: bool) -> di
     return {"simulated": simulated} | estimate(protocol, analysis)
 
 
-def _write_figures(folder: Path, figures: Sequence[Picture]) -> None:
+def _write_figures(folder: Path, figures: Sequence[PageFigure]) -> None:
     """Write ``figure-1.svg`` and on, numbered as in the report."""
     make_folder(folder)
     for number, picture in enumerate(figures, 1):

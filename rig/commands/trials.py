@@ -34,9 +34,9 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The session has taught nothing, or fewer than two trials are asked for.
+        The session has no joint fit, or fewer than two trials are asked for.
     """
-    if analysis.lesson is None:
+    if analysis.joint is None:
         raise InputError(
             "this session has too few good runs to be adjusted together",
             "rig analyze SESSION --budget RUN propagates one run by itself",
@@ -47,7 +47,7 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
         (result.run.number, result.attempt): result
         for result in (*analysis.runs, *analysis.superseded)
     }
-    drawn = session_monte_carlo(analysis.lesson, trials, SEED)
+    drawn = session_monte_carlo(analysis.joint, trials, SEED)
     runs = []
     for key, one in zip(analysis.adjusted, drawn, strict=True):
         quantities = {}

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.pattern import Guess
 from rig.analysis.quantities import measurands
-from rig.analysis.shared import Shared
-from rig.analysis.sides import sides_of
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.model.rods import rod_impacts
 from rig.protocol.plan import runs
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.components import Components
-    from rig.analysis.trains import Side, Train
     from rig.protocol.protocol import Protocol
     from rig.protocol.protocol import Side as Role
 
@@ -159,7 +159,7 @@ def cases(
     kinds = Counter((run.incline_deg, run.impact, run.free) for run in planned)
     first = {(run.incline_deg, run.impact, run.free): run for run in reversed(planned)}
     models = {kind: _model(protocol, first[kind], components) for kind in sorted(kinds, key=str)}
-    shared = Shared(model for model, _ in models.values())
+    shared = SharedUnknowns(model for model, _ in models.values())
     kept = np.ones(len(shared), dtype=np.bool_)
     for name in _BEAMS:
         if name in shared.blocks:
@@ -173,7 +173,7 @@ def cases(
     return Cases(tuple(found), int(kept.sum()))
 
 
-def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Side, Array]]:
+def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[ChainRecord, Array]]:
     """Each chain of a drop as the model predicts it, with every edge seen.
 
     Parameters
@@ -188,7 +188,7 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Side
     """
     found = []
     start, gravity = protocol.drop.value - lower, protocol.gravity.value
-    for side in sides_of(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
+    for side in chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
         path, alphas = free_trajectory(RELEASE_S, start, gravity), np.zeros(0)
         if side.ratios is not None:
             assert protocol.surface is not None
@@ -218,7 +218,7 @@ def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropMo
     return model, x
 
 
-def _seen(train: Train, times: Array) -> Train:
+def _seen(train: EdgeTrain, times: Array) -> EdgeTrain:
     return replace(
         train,
         times=times,
@@ -233,7 +233,7 @@ def _case(
     count: int,
     model: DropModel,
     x: Array,
-    shared: Shared,
+    shared: SharedUnknowns,
     kept: NDArray[np.bool_],
     number: Index,
 ) -> Case:
@@ -250,7 +250,7 @@ def _case(
     place = np.full(len(at), -1)
     place[order] = np.arange(order.size)
     blocks: dict[int, Block] = {}
-    for role, side in model.sides.items():
+    for role, side in model.records.items():
         blocks |= _blocks(model, side, role, x, place)
     chance = [place[at[name]] for name in at.blocks if name.endswith(_CHANCE)]
     return Case(
@@ -268,7 +268,9 @@ def _case(
 _BLIND = Block(np.zeros(0, dtype=np.intp), np.zeros((BEAM, BEAM)))
 
 
-def _blocks(model: DropModel, side: Side, role: str, x: Array, place: Index) -> dict[int, Block]:
+def _blocks(
+    model: DropModel, side: ChainRecord, role: str, x: Array, place: Index
+) -> dict[int, Block]:
     """Split the equations of a side by beam."""
     at, sd = model.unknowns, model.unknowns.sd
     rows = model.equations(role, x, [np.arange(train.times.size) for train in side.trains])

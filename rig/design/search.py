@@ -1,4 +1,7 @@
-"""Better heights for the beams that are there: one beam at a time goes where it tells most."""
+"""Better heights for the beams that are there: one beam at a time goes where it tells most.
+
+Beams that tell most must also be read: a layout whose edges could be given to wrong rods is none.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.design.cases import cases
-from rig.design.outlook import outlook
-from rig.design.readable import MARGIN, margin
+from rig.analysis.pattern import guess, guess_release
+from rig.analysis.verdict import LEAD, SUPPORT
+from rig.design.cases import cases, perfect, with_beams
+from rig.design.forecast import forecast
 from rig.measurands import averaged
+from rig.protocol.plan import runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -24,7 +29,10 @@ if TYPE_CHECKING:
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
 FEW = 3
-"""Inclines that the search looks at; the outlook looks at all of them."""
+"""Inclines that the search looks at; the forecast looks at all of them."""
+MARGIN = 0.03
+"""Share of the expected edges beyond what a verdict asks for: real ones are missed, and flicker."""
+_OFF = 2.0  # standard uncertainties that the drop may be off
 _GRID_M = 4e-3  # between candidates
 _COARSE = 5  # every so many of them are tried first, then those about the best
 _SWEEPS = 4
@@ -91,7 +99,7 @@ def better(
 
     Each beam in turn is tried at candidate heights while the others stay; sweeps go on until none
     moves. That finds no worse a layout than it begins with, and not always the best of all. A
-    layout whose edges could be given to wrong rods is none, see `rig.design.readable`.
+    layout whose edges could be given to wrong rods is none, see `readable`.
 
     Parameters
     ----------
@@ -173,10 +181,39 @@ def _crowded(
     return any(side == one and abs(height - at) < spacing - 1e-9 for one, at in others)
 
 
+def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
+    """Share of the expected edges by which the right fall leads the next best one.
+
+    The least over both chains at the outermost inclines, hung higher or lower than stated; less
+    what a drop needs not to be void.
+    """
+    protocol = with_beams(protocol, beams)
+    planned, gravity = runs(protocol), protocol.gravity.value
+    ends = {run.incline_deg: run for run in reversed(planned)}
+    least = 1.0
+    for incline in {min(ends), max(ends)}:
+        for off in (-_OFF, _OFF):
+            for side, _ in perfect(protocol, ends[incline], off * protocol.drop.u):
+                found = guess(side, protocol.drop, gravity)
+                lead = found.share - found.runner_up
+                if side.ratios is not None:
+                    # The other chain's fall is found in two steps: when it was let go, then α.
+                    pitch = float(np.diff(side.chain.chain.heights).min())
+                    first = guess_release(side, protocol.drop, gravity, 0.0, pitch / 6.0)
+                    lead = min(lead, first.share - first.runner_up)
+                least = min(least, lead - LEAD, found.share - SUPPORT)
+    return least
+
+
+def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
+    """Whether every edge of a layout finds its rod, with something in hand."""
+    return margin(protocol, beams) >= MARGIN
+
+
 def score(protocol: Protocol, found: Cases, layout: Sequence[int]) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    wanted = outlook(protocol, found, layout, goals, sure=True).wanted()
+    wanted = forecast(protocol, found, layout, goals, sure=True).wanted()
     values = [math.log(wanted[name]) for name in goals if name in wanted]
     return sum(values) / len(values)
 

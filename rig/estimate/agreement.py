@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import chi2_tail, coverage_factor
 from rig.analysis.result import GOOD
-from rig.analysis.student import coverage_factor
 from rig.analysis.summary import by_case, mean
-from rig.estimate.tail import chi2_tail
 from rig.measurands import averaged
 from rig.predictions import predicted_run
 from rig.units import Quantity

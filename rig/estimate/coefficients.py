@@ -16,14 +16,14 @@ from rig.estimate.hypotheses import (
     with_contact,
     with_drag,
 )
-from rig.estimate.joint import Parameter, fit
+from rig.estimate.hypothesis_fit import Parameter, fit
 from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.estimate.forms import Form
-    from rig.estimate.joint import Hypothesis, Outcome
+    from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit
+    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
     from rig.units import Quantity
@@ -37,7 +37,7 @@ FOUND = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class CoefficientProblem:
     """What there is to be estimated.
 
     What the edges tell is fitted, whatever the protocol says of it. What they do not tell is held
@@ -57,7 +57,7 @@ class Scene:
         Sentences on what is not fitted, and why.
     """
 
-    forms: tuple[Form, ...]
+    forms: tuple[QuadraticForm, ...]
     parameters: tuple[Parameter, ...]
     held: tuple[str, ...]
     stated: dict[str, Quantity]
@@ -69,13 +69,13 @@ class Scene:
         return sorted({form.run.incline_deg for form in self.forms})
 
 
-def scene(protocol: Protocol, forms: Sequence[Form]) -> Scene:
+def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> CoefficientProblem:
     """Find out what drops at these inclines can tell.
 
     Parameters
     ----------
     forms
-        Of like drops, see `rig.estimate.forms.merged`.
+        Of like drops, see `rig.estimate.quadratic_forms.merged`.
     """
     ordered = sorted(forms, key=lambda one: one.run.incline_deg)
     kept, stated, left_out = described(
@@ -83,7 +83,7 @@ def scene(protocol: Protocol, forms: Sequence[Form]) -> Scene:
     )
     parameters = [Parameter(name, quantity.value) for name, quantity in stated.items()]
     told = tuple(one for one, said in zip(ordered, kept, strict=True) if said)
-    found = Scene(told, tuple(parameters), (), stated, tuple(left_out))
+    found = CoefficientProblem(told, tuple(parameters), (), stated, tuple(left_out))
     return _identified(protocol, found) if told else found
 
 
@@ -133,7 +133,7 @@ def words(name: str) -> str:
     return what.replace("_", " ") + (f" of chain {chain}" if chain else "")
 
 
-def _identified(protocol: Protocol, given: Scene) -> Scene:
+def _identified(protocol: Protocol, given: CoefficientProblem) -> CoefficientProblem:
     """Hold μ, and then β, where the edges do not tell them apart."""
     found = given
     alphas = [name for name in given.stated if name not in {MU, BETA, PILE}]
@@ -175,23 +175,23 @@ def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     return coefficients(protocol.surface, parameters, given_alphas(protocol))
 
 
-def nuisances(protocol: Protocol, found: Scene, inner: Hypothesis) -> Hypothesis:
+def nuisances(protocol: Protocol, found: CoefficientProblem, inner: Hypothesis) -> Hypothesis:
     """Add where the contact point is at each incline, and drag where a free chain tells it."""
     added = with_contact(inner, found.inclines, (0.0, CONTACT_U))
     return with_drag(added) if has_drag(protocol, found) else added
 
 
-def has_drag(protocol: Protocol, found: Scene) -> bool:
+def has_drag(protocol: Protocol, found: CoefficientProblem) -> bool:
     """Whether drag can be told: by a free chain, of chains that slow down alike."""
     return protocol.two_chains and all(form.chain.alike for form in found.forms)
 
 
-def best(protocol: Protocol, found: Scene) -> Outcome:
+def best(protocol: Protocol, found: CoefficientProblem) -> HypothesisFit:
     """Fit the coefficients with all nuisances."""
     return fit(found.forms, nuisances(protocol, found, model(protocol, found.parameters)))
 
 
-def correlation(outcome: Outcome, names: Sequence[str]) -> list[list[float]]:
+def correlation(outcome: HypothesisFit, names: Sequence[str]) -> list[list[float]]:
     """Correlation matrix of some parameters."""
     at = [outcome.names.index(name) for name in names]
     part = outcome.covariance[np.ix_(at, at)]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.fit import Fit
-from rig.analysis.legs import squared_after
-from rig.analysis.student import coverage_factor
+from rig.analysis.free_flight import squared_after
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.learn import Lesson, Taught
+    from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.protocol.protocol import Protocol, Run
 
     Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ _STEP = 1e-3  # of an unknown's prior uncertainty
 
 
 def drop_curves(
-    protocol: Protocol, run: Run, drop: Fit | Taught, lesson: Lesson | None
+    protocol: Protocol, run: Run, drop: Fit | JointDrop, joint: JointFit | None
 ) -> dict[str, Any]:
     """Follow one drop from release to the top rod's hit.
 
@@ -43,7 +43,7 @@ def drop_curves(
     """
     model, x = drop.model, drop.x
     end = model.trajectory("impact", x)
-    top = model.sides["impact"].chain.chain.length
+    top = model.records["impact"].chain.chain.length
     heights = np.linspace(_top(model, x) - 1e-6, 0.0, POINTS)
     said: dict[str, Any] = {
         "run": run.number,
@@ -51,11 +51,11 @@ def drop_curves(
         "impact_chain": run.impact,
         "height_m": heights.tolist(),
     }
-    said |= _with_band("speed2_m2_s2", lambda at: _squares(model, at, heights), drop, lesson)
+    said |= _with_band("speed2_m2_s2", lambda at: _squares(model, at, heights), drop, joint)
     times = np.linspace(0.0, float(end.time[-1] - end.time[0]), POINTS)
-    if "free" in model.sides:
+    if "free" in model.records:
         said["time_s"] = times.tolist()
-        said |= _with_band("separation_m", lambda at: _separations(model, at, times), drop, lesson)
+        said |= _with_band("separation_m", lambda at: _separations(model, at, times), drop, joint)
     return said | _by_model(protocol, run, heights, times, top)
 
 
@@ -66,7 +66,7 @@ def _top(model: DropModel, x: Array) -> float:
 
 
 def _places(model: DropModel, x: Array, role: str) -> Array:
-    chain = model.sides[role].chain.chain
+    chain = model.records[role].chain.chain
     found: Array = np.array(chain.heights) + x[model.unknowns[f"{role} rods"]]
     return found
 
@@ -90,7 +90,7 @@ def _separations(model: DropModel, x: Array, times: Array) -> Array:
 
 
 def _with_band(
-    name: str, curve: Callable[[Array], Array], drop: Fit | Taught, lesson: Lesson | None
+    name: str, curve: Callable[[Array], Array], drop: Fit | JointDrop, joint: JointFit | None
 ) -> dict[str, list[float]]:
     """Values, and 1.96 standard uncertainties from the covariance of the adjustment."""
     x, sd = drop.x, drop.model.unknowns.sd
@@ -102,13 +102,13 @@ def _with_band(
         axis=1,
     )
     slopes[:, sd >= 1.0] *= 1e3 * sd[sd >= 1.0]
-    if isinstance(drop, Fit) or lesson is None:
+    if isinstance(drop, Fit) or joint is None:
         assert isinstance(drop, Fit)
         variance = np.einsum("ij,jk,ik->i", slopes, drop.estimate.covariance, slopes, optimize=True)
     else:
         own, common = slopes[:, drop.own], slopes[:, drop.common]
         left = common - own @ drop.gain
-        shared = lesson.covariance[np.ix_(drop.here, drop.here)]
+        shared = joint.covariance[np.ix_(drop.here, drop.here)]
         variance = np.einsum("ij,jk,ik->i", own, drop.inverse, own, optimize=True)
         variance += np.einsum("ij,jk,ik->i", left, shared, left, optimize=True)
     band = coverage_factor(np.inf) * np.sqrt(np.maximum(variance, 0.0))

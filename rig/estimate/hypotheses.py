@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.estimate.forms import EXTRA
-from rig.estimate.joint import Hypothesis, Parameter
+from rig.estimate.hypothesis_fit import Hypothesis, Parameter
+from rig.estimate.quadratic_forms import EXTRA
 from rig.model.rods import rod_impacts
 from rig.units import Quantity
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.estimate.forms import Form
+    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
 
@@ -41,7 +41,7 @@ def coefficients(
     names = [one.name for one in parameters]
     known: dict[tuple[float, int, tuple[float, ...]], tuple[Array, Array]] = {}
 
-    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         key = form.run.incline_deg, id(form.chain), tuple(values.tolist())
         if key not in known:
             now = dict(zip(names, values.tolist(), strict=True))
@@ -98,12 +98,12 @@ def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
     )
 
 
-def one_alpha(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesis:
+def one_alpha(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
     """Suppose one α for all drops that share a key: an incline, or a run."""
     keys = list(dict.fromkeys(map(key, forms)))
     starts = [float(np.mean([f.alphas.mean() for f in forms if key(f) == one])) for one in keys]
 
-    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         n = keys.index(key(form))
         slopes = np.zeros((form.alphas.size, values.size))
         slopes[:, n] = 1.0
@@ -113,7 +113,7 @@ def one_alpha(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesi
     return Hypothesis(tuple(parameters), targets)
 
 
-def each_rod(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesis:
+def each_rod(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
     """Suppose an α for each rod but the top one, whose impact pulls on nothing."""
     keys = list(dict.fromkeys(map(key, forms)))
     starts, first, at = [], {}, 0
@@ -123,7 +123,7 @@ def each_rod(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesis
         at += alphas.size
         starts += [Parameter(f"α {one}, rod {k}", float(x)) for k, x in enumerate(alphas)]
 
-    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         rods, begin = form.alphas.size, first[key(form)]
         slopes = np.zeros((rods, values.size))
         slopes[np.arange(rods - 1), begin + np.arange(rods - 1)] = 1.0
@@ -132,7 +132,9 @@ def each_rod(forms: Sequence[Form], key: Callable[[Form], object]) -> Hypothesis
     return Hypothesis(tuple(starts), targets)
 
 
-def ended(inner: Hypothesis, gammas: Callable[[Form], Array], scale: float | None) -> Hypothesis:
+def ended(
+    inner: Hypothesis, gammas: Callable[[QuadraticForm], Array], scale: float | None
+) -> Hypothesis:
     """Suppose γ to be so many times that of Eq. 10, or (`None`) leave it open.
 
     Parameters
@@ -142,7 +144,7 @@ def ended(inner: Hypothesis, gammas: Callable[[Form], Array], scale: float | Non
     """
     size = len(inner.parameters)
 
-    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         target, slopes = inner.targets(form, values[:size])
         rods = form.alphas.size
         factor = float(values[size]) if scale is None else scale
@@ -174,11 +176,14 @@ def with_drag(inner: Hypothesis) -> Hypothesis:
 
 
 def _with(
-    inner: Hypothesis, added: tuple[Parameter, ...], extra: int, which: Callable[[Form], int]
+    inner: Hypothesis,
+    added: tuple[Parameter, ...],
+    extra: int,
+    which: Callable[[QuadraticForm], int],
 ) -> Hypothesis:
     size = len(inner.parameters)
 
-    def targets(form: Form, values: Array) -> tuple[Array, Array]:
+    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         target, slopes = inner.targets(form, values[:size])
         row, n = form.alphas.size + extra, which(form)
         target = target.copy()

@@ -15,13 +15,13 @@ import numpy as np
 
 from rig.estimate.coefficients import model, nuisances
 from rig.estimate.hypotheses import MU
-from rig.estimate.joint import Parameter, fit
+from rig.estimate.hypothesis_fit import Parameter, fit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rig.estimate.coefficients import Scene
-    from rig.estimate.joint import Outcome
+    from rig.estimate.coefficients import CoefficientProblem
+    from rig.estimate.hypothesis_fit import HypothesisFit
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Posterior:
         return 0.5 * (low + high)
 
 
-def posterior(protocol: Protocol, found: Scene, centre: Outcome) -> Posterior:
+def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisFit) -> Posterior:
     """Work the posterior out.
 
     Parameters

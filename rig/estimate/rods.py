@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
-from rig.estimate.joint import fit
-from rig.estimate.tail import chi2_tail
+from rig.estimate.hypothesis_fit import fit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rig.estimate.forms import Form
-    from rig.estimate.joint import Hypothesis
+    from rig.estimate.hypothesis_fit import Hypothesis
+    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""
 
 
-def impulses(protocol: Protocol, forms: Sequence[Form]) -> dict[str, Any]:
+def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> dict[str, Any]:
     """Measure the speed that the chain gains from each rod, ΔV = J/M, at each incline.
 
     Neither Eq. 9 nor the scatter about it pulls at these numbers: the α of every rod is open, and
@@ -37,7 +37,7 @@ def impulses(protocol: Protocol, forms: Sequence[Form]) -> dict[str, Any]:
     Parameters
     ----------
     forms
-        Of like drops, see `rig.estimate.forms.merged`.
+        Of like drops, see `rig.estimate.quadratic_forms.merged`.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def impulses(protocol: Protocol, forms: Sequence[Form]) -> dict[str, Any]:
     return {"inclines": lines, "sentence": words}
 
 
-def _case(protocol: Protocol, forms: Sequence[Form]) -> dict[str, Any]:
+def _case(protocol: Protocol, forms: Sequence[QuadraticForm]) -> dict[str, Any]:
     incline = forms[0].run.incline_deg
 
     def contact(hypothesis: Hypothesis) -> Hypothesis:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.shared import Shared
+from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.estimate import coefficients as of
 from rig.estimate.agreement import agreement
 from rig.estimate.curves import drop_curves
-from rig.estimate.ends import end_correction
-from rig.estimate.forms import form, merged
+from rig.estimate.end_correction import end_correction
 from rig.estimate.hypotheses import AIR, one_alpha
-from rig.estimate.joint import fit
+from rig.estimate.hypothesis_fit import fit
 from rig.estimate.posterior import posterior
+from rig.estimate.quadratic_forms import merged, quadratic_form
 from rig.estimate.rods import impulses
-from rig.estimate.tail import chi2_tail
 from rig.sections import Sections
 from rig.threads import one_thread
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.analysis.session import Analysis
-    from rig.estimate.coefficients import Scene
-    from rig.estimate.forms import Form
-    from rig.estimate.joint import Outcome
+    from rig.estimate.coefficients import CoefficientProblem
+    from rig.estimate.hypothesis_fit import HypothesisFit
+    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol, Run
 
 
@@ -61,14 +61,16 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
         raise InputError("no good drop in this session", "rig analyze SESSION says why")
-    shared = analysis.lesson.shared if analysis.lesson else Shared(d.model for d in drops.values())
-    forms = [form(good[key], drop, shared) for key, drop in drops.items()]
+    shared = (
+        analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
+    )
+    forms = [quadratic_form(good[key], drop, shared) for key, drop in drops.items()]
     like = merged(forms)
     said: dict[str, Any] = {"drops": len(forms), "edges": sum(one.edges for one in forms)}
     sections = Sections()
     found, outcome = None, None
     with sections.alone("The coefficients"):
-        found = of.scene(protocol, like)
+        found = of.coefficient_problem(protocol, like)
         said["left_out"] = list(found.left_out)
         if found.forms:
             outcome = of.best(protocol, found)
@@ -85,7 +87,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     with sections.alone("The curves"):
         first = {_case(protocol, good[key]): key for key in reversed(drops)}
         said["curves"] = [
-            drop_curves(protocol, good[key], drops[key], analysis.lesson)
+            drop_curves(protocol, good[key], drops[key], analysis.joint)
             for _, key in sorted(first.items())
         ]
     if sections.failed:
@@ -97,7 +99,9 @@ def _case(protocol: Protocol, run: Run) -> tuple[object, ...]:
     return tuple(protocol.case(run).values())
 
 
-def _coefficients(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[str, Any]:
+def _coefficients(
+    protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
+) -> dict[str, Any]:
     """Least squares and posterior, with correlations and nuisances."""
     contact = []
     for incline in found.inclines:
@@ -114,7 +118,7 @@ def _coefficients(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[st
     return said | {"contact": contact, "drag_per_m": drag, "edges_chi2": outcome.chi2}
 
 
-def _told(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[str, Any]:
+def _told(protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit) -> dict[str, Any]:
     """What is said of the coefficients that are fitted."""
     names = list(found.stated)
     bayes = posterior(protocol, found, outcome)
@@ -147,17 +151,17 @@ def _told(protocol: Protocol, found: Scene, outcome: Outcome) -> dict[str, Any]:
 
 def _alphas(
     protocol: Protocol,
-    found: Scene | None,
-    outcome: Outcome | None,
-    forms: Sequence[Form],
-    like: Sequence[Form],
+    found: CoefficientProblem | None,
+    outcome: HypothesisFit | None,
+    forms: Sequence[QuadraticForm],
+    like: Sequence[QuadraticForm],
 ) -> dict[str, Any]:
     """The best single α of every run and case, and whether they agree.
 
     A case is an incline, or an incline and a striking chain where chains are unlike.
     """
 
-    def case(one: Form) -> tuple[object, ...]:
+    def case(one: QuadraticForm) -> tuple[object, ...]:
         return _case(protocol, one.run)
 
     by_run = fit(forms, one_alpha(forms, lambda one: one.run.number))
@@ -204,7 +208,9 @@ def _test(chi2: float, degrees: int) -> dict[str, Any]:
     return {"chi2": chi2, "degrees": degrees, "p": chi2_tail(chi2, degrees)}
 
 
-def _model_alphas(protocol: Protocol, found: Scene, outcome: Outcome) -> list[float]:
+def _model_alphas(
+    protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
+) -> list[float]:
     """α of the model with the fitted coefficients, of each form."""
     model = of.model(protocol, found.parameters)
     values = outcome.values[: len(found.parameters)]

@@ -1,4 +1,4 @@
-"""The columns of result tables, for the terminal and the page alike."""
+"""Result tables: their columns, for the terminal and the page alike, and as text."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.measurands import averaged, listed
 from rig.report.numbers import fixed, nested, plus_minus, value_of
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -114,3 +115,28 @@ def filled(
     table = [[column.cell(record) for column in columns] for record in records]
     kept = [index for index in range(len(columns)) if any(row[index] for row in table)]
     return [columns[index] for index in kept], [[row[index] for index in kept] for row in table]
+
+
+def aligned(columns: Sequence[Column], records: Sequence[Record]) -> list[str]:
+    """Write records as lines of aligned text below their headings; empty columns are left out."""
+    columns, rows = filled(columns, records)
+    return text_table([[column.heading for column in columns], *rows], rule=True)
+
+
+def summary_table(analysis: Mapping[str, Any]) -> str:
+    """Write the summary as aligned text.
+
+    Parameters
+    ----------
+    analysis
+        What ``rig analyze --json`` prints.
+
+    Returns
+    -------
+    str
+        Lines without an end of line at the last; one sentence where there is no summary.
+    """
+    summary = analysis.get("summary") or ()
+    if not summary:
+        return "No accepted runs, so no summary."
+    return "\n".join(aligned(summary_columns(), summary))

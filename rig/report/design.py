@@ -6,10 +6,9 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS
-from rig.report.columns import Column
+from rig.report.columns import Column, aligned
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
-from rig.report.table import aligned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

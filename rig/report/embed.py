@@ -22,7 +22,7 @@ _NAME = re.compile(r'(\bid="|\bxlink:href="#|url\(#)')
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class PageFigure:
     """A figure for the report: its SVG text, what it shows, and the caption below."""
 
     svg: str
@@ -44,7 +44,7 @@ def dark_figure_css() -> str:
     return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}}}\n"
 
 
-def embedded(picture: Picture, number: int) -> str:
+def embedded(picture: PageFigure, number: int) -> str:
     """Return a ``<figure>`` with the SVG inline.
 
     Parameters

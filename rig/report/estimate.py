@@ -6,10 +6,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS
-from rig.report.columns import Column
+from rig.report.columns import Column, aligned
 from rig.report.numbers import decimals_for, fixed, plus_minus, value_of
 from rig.report.parts import Part
-from rig.report.table import aligned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
-from rig.report.embed import Picture
+from rig.report.embed import PageFigure
 from rig.report.estimate import has_free_chain
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _SHOWN = 3
 _STYLES = (("o", MODEL), ("s", SECOND), ("^", INK))
 
 
-def estimate_pictures(found: Mapping[str, Any], sections: Sections) -> dict[str, Picture]:
+def estimate_pictures(found: Mapping[str, Any], sections: Sections) -> dict[str, PageFigure]:
     """Draw everything there is, by file name without its ending.
 
     Parameters
@@ -33,7 +33,7 @@ def estimate_pictures(found: Mapping[str, Any], sections: Sections) -> dict[str,
     sections
         Where a picture that cannot be drawn is noted.
     """
-    wanted: dict[str, tuple[str, Callable[[Mapping[str, Any]], Picture | None]]] = {}
+    wanted: dict[str, tuple[str, Callable[[Mapping[str, Any]], PageFigure | None]]] = {}
     if found.get("alpha"):
         wanted["alpha"] = "The picture of α", _alpha
     if found.get("impulses"):
@@ -50,7 +50,7 @@ def estimate_pictures(found: Mapping[str, Any], sections: Sections) -> dict[str,
     return {name: picture for name, picture in drawn.items() if picture is not None}
 
 
-def _alpha(found: Mapping[str, Any]) -> Picture:
+def _alpha(found: Mapping[str, Any]) -> PageFigure:
     """α against incline, and below it every run's residual."""
     inclines, runs = found["alpha"]["inclines"], found["alpha"]["runs"]
     left = [run for run in runs if "residual" in run]
@@ -85,7 +85,7 @@ def _alpha(found: Mapping[str, Any]) -> Picture:
             )  # fmt: skip
             low.set_ylabel("residual / u")
         drawing.axes[-1].set_xlabel("inclination of the surface (°)")
-    return Picture(
+    return PageFigure(
         drawing.svg,
         "Impact coefficient against inclination, with residuals",
         "The best single α of every incline and run; below, each run less the fitted coefficients, "
@@ -93,7 +93,7 @@ def _alpha(found: Mapping[str, Any]) -> Picture:
     )
 
 
-def _impulses(found: Mapping[str, Any]) -> Picture:
+def _impulses(found: Mapping[str, Any]) -> PageFigure:
     """ΔV of every rod beside Eq. 9, and the normalized errors of all inclines."""
     lines = found["impulses"]["inclines"]
     shown = _spread(lines)
@@ -129,7 +129,7 @@ def _impulses(found: Mapping[str, Any]) -> Picture:
             )  # fmt: skip
         low.set_ylabel("Eₙ, all inclines")
         low.set_xlabel("rod, from the bottom")
-    return Picture(
+    return PageFigure(
         drawing.svg,
         "Speed gained from each rod's impact",
         "Speed that the chain gains as each rod strikes, as measured and by Eq. 9 with the best α "
@@ -137,7 +137,7 @@ def _impulses(found: Mapping[str, Any]) -> Picture:
     )
 
 
-def _curves(found: Mapping[str, Any]) -> Picture:
+def _curves(found: Mapping[str, Any]) -> PageFigure:
     """Δz(t) and V²(z) with bands (Fig. 4)."""
     curves = _spread(found["curves"])
     free = all("separation_m" in curve for curve in curves)
@@ -157,7 +157,7 @@ def _curves(found: Mapping[str, Any]) -> Picture:
         drawing.axes[-1].set_ylabel("V² (m²/s²)")
         drawing.axes[-1].invert_xaxis()
         drawing.axes[0].legend(loc="upper left")
-    return Picture(
+    return PageFigure(
         drawing.svg,
         "Separation against time and squared speed against height"
         if free
@@ -183,7 +183,7 @@ def _banded(
     axes.plot(at, scale * np.array(curve[f"{key}_model"]), "--", color=color, linewidth=0.8)
 
 
-def _posterior(found: Mapping[str, Any]) -> Picture | None:
+def _posterior(found: Mapping[str, Any]) -> PageFigure | None:
     """Contours of β and μ; none where the posterior has no spread to draw."""
     mixture = found["posterior"]
     beta, mu = (mixture["names"].index(name) for name in ("restitution", "friction"))
@@ -224,7 +224,7 @@ def _posterior(found: Mapping[str, Any]) -> Picture | None:
         axes.set_xlabel("restitution β")
         axes.set_ylabel("friction μ")
         axes.legend()
-    return Picture(
+    return PageFigure(
         drawing.svg,
         "Posterior of restitution and friction",
         "Posterior of β and μ: smallest regions that hold 68.3 % and 95 %.",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
-    from rig.report.embed import Picture
+    from rig.report.embed import PageFigure
     from rig.report.parts import Part
 
 
@@ -57,7 +57,7 @@ class ReportContext:
     title: str
     analysis: Mapping[str, Any]
     simulated: bool
-    figures: Sequence[Picture] = ()
+    figures: Sequence[PageFigure] = ()
     protocol_text: str = ""
     protocol_source: str = ""
     protocol_sha256: str = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.report.embed import Picture
+from rig.report.embed import PageFigure
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.numbers import value_of
 
@@ -24,7 +24,7 @@ def pictures(
     site_m_s2: object = None,
     bars: Bars = "U95",
     sections: Sections,
-) -> list[Picture]:
+) -> list[PageFigure]:
     """Draw the figures of a report.
 
     Parameters
@@ -82,5 +82,5 @@ def pictures(
     for draw, alt, caption in drawn:
         svg = sections.make(f'The figure "{alt}"', draw)
         if svg is not None:
-            found.append(Picture(svg, alt, caption))
+            found.append(PageFigure(svg, alt, caption))
     return found

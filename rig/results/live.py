@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rig.analysis.curves import model_curves
 from rig.analysis.drop import fit_drop
 from rig.analysis.gravity import free_gravity
-from rig.analysis.learn import FEWEST
+from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
 from rig.analysis.session import gather, overruled, sum_up
 from rig.clock.calibration import Calibrator

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.sides import trains_of
-from rig.analysis.trains import Edges
+from rig.analysis.chain_records import EdgeArrays, edge_trains
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.model.fall import kicks
 from rig.predictions import air_of, predict_incline
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.trains import Train
+    from rig.analysis.chain_records import EdgeTrain
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol, Run
 
@@ -91,7 +90,7 @@ def motions(
         return ()
     table = _table(edges, hz, thin=matches is None)
     found = []
-    for role, _, parts in trains_of(protocol, run, table):
+    for role, _, parts in edge_trains(protocol, run, table):
         model = _model(protocol, run, role)
         if matches is not None:
             pairs = [_matched(part, matches) for part in parts]
@@ -109,7 +108,7 @@ def as_table(edges: Iterable[Sequence[int]]) -> NDArray[np.int64]:
     return np.array([tuple(edge) for edge in edges], dtype=np.int64).reshape(-1, 3)
 
 
-def _table(edges: Table, hz: float, *, thin: bool) -> Edges:
+def _table(edges: Table, hz: float, *, thin: bool) -> EdgeArrays:
     """Take edges as arrays; of very many only as many as a picture can show."""
     table = edges if isinstance(edges, np.ndarray) else as_table(edges)
     if thin and len(table) > _MOST:
@@ -117,7 +116,7 @@ def _table(edges: Table, hz: float, *, thin: bool) -> Edges:
         for channel in np.unique(table[:, 1]):  # where counting has to begin
             kept[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
         table = table[kept]
-    return Edges(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
+    return EdgeArrays(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
 
 
 def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Array, Array]:
@@ -142,7 +141,7 @@ def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Ar
     return times_in[: gaps.size], gaps, curve, model
 
 
-def _nearest(parts: Sequence[Train], model: Trajectory | None) -> list[tuple[Array, Array]]:
+def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple[Array, Array]]:
     """Times and heights of each gate's edges before anybody has matched them."""
     counted = [_counted(part, part.times.size) for part in parts]
     if model is None:
@@ -164,13 +163,13 @@ def _nearest(parts: Sequence[Train], model: Trajectory | None) -> list[tuple[Arr
     return found
 
 
-def _counted(part: Train, most: int) -> tuple[Array, Array]:
+def _counted(part: EdgeTrain, most: int) -> tuple[Array, Array]:
     """Take a gate's edges for its rods in order."""
     count = min(part.times.size, part.levels.size, most)
     return part.times[:count], part.levels[:count]
 
 
-def _matched(part: Train, matches: Mapping[int, int]) -> tuple[Array, Array]:
+def _matched(part: EdgeTrain, matches: Mapping[int, int]) -> tuple[Array, Array]:
     """Times and heights of one gate's edges, each with the rod it was matched to."""
     where = {(rod, blocks): at for at, (rod, blocks) in enumerate(
         zip(part.rods.tolist(), part.blocks.tolist(), strict=True))}  # fmt: skip

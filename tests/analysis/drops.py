@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from rig.analysis.align import align
+from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import STATED, Components
 from rig.analysis.drop import analyze_drop
 from rig.analysis.drop_model import DropModel
-from rig.analysis.pattern import Guess
+from rig.analysis.pattern import Guess, first_guesses
 from rig.analysis.result import DropResult
-from rig.analysis.sides import guesses_of
-from rig.analysis.trains import Edges, Side, train
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
 from rig.model.chain import Chain
@@ -58,35 +57,37 @@ class Case:
         ordered = tuple(sorted(edges, key=lambda edge: edge.tick))
         return replace(self, drop=replace(self.drop, edges=ordered))
 
-    def side(self, role: str) -> Side:
+    def side(self, role: str) -> ChainRecord:
         """One chain with the trains of its gates."""
         struck = role == "impact"
         chain = self.protocol.chains[self.run.impact if struck else self.run.free]
-        edges = Edges.of(self.drop, self.scale.hz)
+        edges = EdgeArrays.of(self.drop, self.scale.hz)
         trains = [
-            train(number, gate, chain, edges, self.protocol.drop.value, struck)
+            edge_train(number, gate, chain, edges, self.protocol.drop.value, struck)
             for number, gate in enumerate(self.protocol.gates.gates)
             if gate.side == role
         ]
-        return Side(role, chain, tuple(trains), impact_ratios(chain.chain) if struck else None)
+        return ChainRecord(
+            role, chain, tuple(trains), impact_ratios(chain.chain) if struck else None
+        )
 
     @property
-    def sides(self) -> list[Side]:
+    def records(self) -> list[ChainRecord]:
         names = {"impact": self.run.impact, "free": self.run.free}
         return [self.side(role) for role, name in names.items() if name is not None]
 
     def guesses(self) -> dict[str, Guess]:
-        return guesses_of(self.protocol, self.sides)
+        return first_guesses(self.protocol, self.records)
 
     def model(self) -> tuple[DropModel, dict]:
         """The observation equations of this drop, and the matches that the first guess gives."""
-        model = DropModel(self.protocol, self.sides, self.guesses(), self.scale.u)
+        model = DropModel(self.protocol, self.records, self.guesses(), self.scale.u)
         x = model.first()
         matches = {
             side.role: align(
                 side.trains, model.levels(side.role, x), model.trajectory(side.role, x), 2.5e-3
             )
-            for side in self.sides
+            for side in self.records
         }
         return model, matches
 

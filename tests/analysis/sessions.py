@@ -1,4 +1,4 @@
-"""Whole sessions straight from the simulated lab, and what they teach."""
+"""Whole sessions straight from the simulated lab, and what they say together."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cache
 
 from rig.analysis.drop import fit_drop
 from rig.analysis.fit import Fit
-from rig.analysis.learn import Lesson, learn
+from rig.analysis.joint_fit import JointFit, joint_fit
 from rig.analysis.session import Analysis, analyze
 from sim.dials import Dials
 from tests.analysis.drops import SCENES, Case, case
@@ -30,10 +30,10 @@ def fits(drops: Iterable[Case]) -> list[Fit]:
 
 
 @cache
-def lesson(
+def fit_session(
     runs: tuple[int, ...], dials: Dials = MILD, seed: int = 1, scene: str = "uniform"
-) -> Lesson:
-    return learn(fits(cases(runs, dials, seed, scene)))
+) -> JointFit:
+    return joint_fit(fits(cases(runs, dials, seed, scene)))
 
 
 def analysis(drops: list[Case]) -> Analysis:

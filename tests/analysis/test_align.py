@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.align import EXTRA, MISSED, align
-from rig.analysis.trains import Side, Train
+from rig.analysis.chain_records import ChainRecord, EdgeTrain
 from rig.analysis.trajectory import free_trajectory
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
@@ -33,10 +33,10 @@ def at(height: float) -> float:
     return float(np.sqrt(2 * (START - height) / GRAVITY))
 
 
-def build(number: int, observed, expected) -> tuple[Train, list, list]:
+def build(number: int, observed, expected) -> tuple[EdgeTrain, list, list]:
     observed = sorted(observed, key=lambda edge: -edge[0])
     expected = sorted(expected, key=lambda edge: -edge[0])
-    train = Train(
+    train = EdgeTrain(
         number,
         np.array([at(SCALE * height) for height, _ in observed]),
         np.array([blocked for _, blocked in observed], dtype=np.bool_),
@@ -135,11 +135,11 @@ QUIET = case(UNIFORM, Dials.quiet(), incline=40.0)
 FALL = free_trajectory(0.020, 0.180, GRAVITY)  # the free side, exactly
 
 
-def matched(side: Side) -> list:
+def matched(side: ChainRecord) -> list:
     return align(side.trains, [train.levels for train in side.trains], FALL, 0.5e-3)
 
 
-def kept(train: Train, keep) -> Train:
+def kept(train: EdgeTrain, keep) -> EdgeTrain:
     """A gate that reported only some of its edges."""
     return replace(
         train,
@@ -150,7 +150,7 @@ def kept(train: Train, keep) -> Train:
     )
 
 
-def with_extra(train: Train, when, blocked) -> Train:
+def with_extra(train: EdgeTrain, when, blocked) -> EdgeTrain:
     """A gate that reported more edges; theirs are numbered −1."""
     order = np.argsort(np.concatenate([train.times, when]), kind="stable")
     return replace(

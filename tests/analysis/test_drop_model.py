@@ -56,7 +56,7 @@ def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
     for role, match in matches.items():
         found = model.equations(role, x, match)
         assert found.residuals.values.size > 0.9 * sum(
-            train.rods.size for train in model.sides[role].trains
+            train.rods.size for train in model.records[role].trains
         )
         expected, kinks = differences(
             lambda at, role=role, match=match: model.residuals(role, at, match).values,
@@ -123,7 +123,7 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
     x = model.first()
     for role, match in matches.items():
         found = model.residuals(role, x, match)
-        trains = model.sides[role].trains
+        trains = model.records[role].trains
         times = np.concatenate([t.times[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
         burst = np.concatenate([t.burst[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
         _, speed = model.trajectory(role, x).heights(times)

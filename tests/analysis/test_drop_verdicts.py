@@ -189,7 +189,7 @@ def test_hardly_any_edges_are_void(scene, count):
     result = one.with_edges(one.drop.edges[:count]).analyze()
     assert result.verdict == "void"
     assert all("does not look like this chain falling" in reason for reason in result.reasons)
-    assert len(result.reasons) == len(one.sides)
+    assert len(result.reasons) == len(one.records)
     assert (result.audit.received, result.audit.matched) == (count, 0)
     assert not result.quantities
     printable(result)

@@ -11,7 +11,7 @@ from rig.analysis.monte_carlo import Propagated, agreement, monte_carlo, session
 from rig.analysis.refine import Budgets
 from rig.commands.trials import session_trials, trials_lines
 from rig.errors import InputError
-from tests.analysis.sessions import MILD, analysis, cases, fits, lesson
+from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 
 TRIALS = 150
 FOUR = (1, 2, 3, 4)
@@ -43,11 +43,11 @@ SESSION_TRIALS = 60
 
 def test_a_session_s_trials_scatter_as_its_budgets_say():
     """u of 60 trials is known to 9 %: within 36 %, and the means within four standard errors."""
-    taught = lesson(FOUR, MILD, 1)
-    budgets = Budgets(taught)
-    drawn = session_monte_carlo(taught, SESSION_TRIALS, seed=2)
-    assert len(drawn) == len(taught.drops)
-    for drop, found in zip(taught.drops, drawn, strict=True):
+    joint = fit_session(FOUR, MILD, 1)
+    budgets = Budgets(joint)
+    drawn = session_monte_carlo(joint, SESSION_TRIALS, seed=2)
+    assert len(drawn) == len(joint.drops)
+    for drop, found in zip(joint.drops, drawn, strict=True):
         measured = budgets.measured(drop)
         assert found.keys() == measured.keys()
         for name, one in measured.items():
@@ -57,8 +57,8 @@ def test_a_session_s_trials_scatter_as_its_budgets_say():
 
 
 def test_a_session_s_seed_is_kept():
-    taught = lesson(FOUR, MILD, 1)
-    one, same, other = (session_monte_carlo(taught, 2, seed) for seed in (3, 3, 4))
+    joint = fit_session(FOUR, MILD, 1)
+    one, same, other = (session_monte_carlo(joint, 2, seed) for seed in (3, 3, 4))
     assert one == same != other
 
 

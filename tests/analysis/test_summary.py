@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import Audit, DropResult, Measured
-from rig.analysis.student import coverage_factor
 from rig.analysis.summary import Incline, mean, summarize
 from rig.model.chain import Chain
 from rig.protocol.plan import runs

@@ -36,7 +36,7 @@ HAVE = {
 }
 NEVER = {
     "rig.model.motion", "rig.model.batch", "rig.model.rods", "rig.protocol.masses",
-    "rig.protocol.plan", "rig.protocol.site", "rig.report.table", "difflib", "random",
+    "rig.protocol.plan", "rig.protocol.site", "rig.report.columns", "difflib", "random",
 }  # fmt: skip
 
 

@@ -24,7 +24,7 @@ def added(monkeypatch):
     """Have a measurand that nobody has heard of: how fast the free chain is at the end."""
 
     def compute(model, x):
-        if set(model.sides) != {"impact", "free"}:
+        if set(model.records) != {"impact", "free"}:
             return None
         struck, free = model.trajectory("impact", x), model.trajectory("free", x)
         since = float(struck.time[-1] - free.time[0])

@@ -11,12 +11,11 @@ import pytest
 from rig.analysis.components import Components
 from rig.analysis.session import Analysis
 from rig.design.cases import beams_of, cases
-from rig.design.outlook import outlook
-from rig.design.readable import readable
-from rig.design.search import Room, better, candidates, room, score
+from rig.design.forecast import forecast
+from rig.design.search import Room, better, candidates, readable, room, score
 from rig.errors import InputError
-from rig.estimate.coefficients import best, scene
-from rig.estimate.forms import merged
+from rig.estimate.coefficients import best, coefficient_problem
+from rig.estimate.quadratic_forms import merged
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Gates, Plan, Protocol
 from sim.dials import Dials
@@ -47,7 +46,7 @@ def dropped(protocol_heights: tuple[float, ...]) -> tuple[tuple[Case, ...], Anal
 
 @pytest.fixture(scope="module")
 def expected():
-    """The outlook for the simulated session: its coefficients, its plan, the scatter it taught."""
+    """The forecast for the simulated session: its coefficients, its plan, the scatter it taught."""
     surface = UNIFORM.surface
     true = replace(
         surface,
@@ -56,11 +55,11 @@ def expected():
     )
     protocol = replace(UNIFORM, surface=true, plan=Plan(INCLINES, 2))
     beams = beams_of(protocol)
-    learned = analysis(INCLINES).lesson.components
-    return outlook(protocol, cases(protocol, beams, learned), range(len(beams)))
+    learned = analysis(INCLINES).joint.components
+    return forecast(protocol, cases(protocol, beams, learned), range(len(beams)))
 
 
-def test_the_outlook_is_what_a_session_then_states(expected):
+def test_the_forecast_is_what_a_session_then_states(expected):
     """Same scatter, same plan: only edges that were missed are in one and not in the other."""
     for result in analysis(INCLINES).runs:
         for name, by_incline in expected.single.items():
@@ -68,8 +67,8 @@ def test_the_outlook_is_what_a_session_then_states(expected):
             assert by_incline[result.run.incline_deg] == pytest.approx(stated, rel=0.1), name
 
 
-def test_the_outlook_of_coefficients_is_what_the_estimate_then_states(expected):
-    found = best(UNIFORM, scene(UNIFORM, merged(forms(INCLINES))))
+def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected):
+    found = best(UNIFORM, coefficient_problem(UNIFORM, merged(forms(INCLINES))))
     assert set(expected.coefficients) == {"restitution", "friction"}
     for name, u in expected.coefficients.items():
         assert u == pytest.approx(found[name][1], rel=0.2), name
@@ -78,7 +77,7 @@ def test_the_outlook_of_coefficients_is_what_the_estimate_then_states(expected):
 def test_more_runs_tell_more_but_not_of_what_is_common():
     beams = beams_of(UNIFORM)
     one, many = (
-        outlook(p, cases(p, beams, TRUE), range(len(beams)))
+        forecast(p, cases(p, beams, TRUE), range(len(beams)))
         for p in (replace(UNIFORM, plan=Plan(INCLINES, n)) for n in (2, 32))
     )
     for name in ("restitution", "friction"):
@@ -93,7 +92,7 @@ def test_more_runs_tell_more_but_not_of_what_is_common():
 def test_one_incline_tells_no_friction():
     protocol = replace(UNIFORM, plan=Plan((40.0,), 12))
     beams = beams_of(protocol)
-    found = outlook(protocol, cases(protocol, beams, TRUE), range(len(beams)))
+    found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)))
     assert found.coefficients == {}
 
 
@@ -116,7 +115,7 @@ def speed_errors(layout: tuple[float, ...]) -> np.ndarray:
 def predicted_speed_u(layout: tuple[float, ...]) -> float:
     protocol = placed(SINGLE, list(layout), repeats=16)
     beams = beams_of(protocol)
-    found = outlook(protocol, cases(protocol, beams, TRUE), range(len(beams)), ("speed_m_s",))
+    found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)), ("speed_m_s",))
     return found.typical("speed_m_s")
 
 

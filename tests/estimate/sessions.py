@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 from rig.analysis.session import Analysis
-from rig.analysis.shared import Shared
-from rig.estimate.forms import Form, form
+from rig.analysis.unknowns import SharedUnknowns
+from rig.estimate.quadratic_forms import QuadraticForm, quadratic_form
 from rig.protocol.plan import runs
 from sim.dials import Dials
 from tests.analysis.drops import SCENES
@@ -32,8 +32,10 @@ def analysis(
 
 
 @cache
-def forms(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> tuple[Form, ...]:
+def forms(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> tuple[QuadraticForm, ...]:
     found = analysis(inclines, each, seed)
     by_number = {run.number: run for run in runs(SCENES["uniform"])}
-    shared = Shared(drop.model for drop in found.adjusted.values())
-    return tuple(form(by_number[run], drop, shared) for (run, _), drop in found.adjusted.items())
+    shared = SharedUnknowns(drop.model for drop in found.adjusted.values())
+    return tuple(
+        quadratic_form(by_number[run], drop, shared) for (run, _), drop in found.adjusted.items()
+    )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rig.estimate.coefficients import best, scene
-from rig.estimate.forms import merged
+from rig.estimate.coefficients import best, coefficient_problem
+from rig.estimate.quadratic_forms import merged
 from tests.analysis.drops import UNIFORM
 from tests.estimate.sessions import BETA, MU, forms
 
@@ -20,7 +20,7 @@ def test_restitution_and_friction_from_one_nine_incline_session():
     ratios = []
     for seed in SEEDS:
         every = merged(forms(inclines, UNIFORM.plan.repeats, seed))
-        outcome = best(UNIFORM, scene(UNIFORM, every))
+        outcome = best(UNIFORM, coefficient_problem(UNIFORM, every))
         for name, truth, wanted in (("restitution", BETA, 0.01), ("friction", MU, 0.02)):
             value, u = outcome[name]
             assert abs(value - truth) < wanted

@@ -10,11 +10,11 @@ import pytest
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
 from rig.errors import InputError
-from rig.estimate.coefficients import best, scene
-from rig.estimate.forms import merged
+from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import one_alpha
-from rig.estimate.joint import fit
+from rig.estimate.hypothesis_fit import fit
 from rig.estimate.posterior import Posterior, _nodes, posterior
+from rig.estimate.quadratic_forms import merged
 from rig.estimate.session import estimate
 from rig.model.impact import alpha_inclined
 from rig.protocol.plan import runs
@@ -168,7 +168,7 @@ def test_without_priors_the_posterior_is_the_least_squares_fit():
         UNIFORM,
         surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2)),
     )
-    found = scene(vague, merged(forms(SURFACE)))
+    found = coefficient_problem(vague, merged(forms(SURFACE)))
     centre = best(vague, found)
     spread = posterior(vague, found, centre)
     for name in ("restitution", "friction"):

@@ -12,19 +12,10 @@ from rig.analysis.result import GOOD
 from rig.analysis.trajectory import DRAG, free_trajectory, struck_trajectory
 from rig.estimate.agreement import agreement
 from rig.estimate.rods import _groups
-from rig.estimate.tail import chi2_tail
 from rig.model.chain import Chain
 from rig.model.drag import drag_hits, fallen
 from tests.analysis.drops import UNIFORM, impact_ratios
 from tests.estimate.sessions import analysis
-
-
-@pytest.mark.parametrize("degrees", [1, 2, 3, 9, 24, 207, 1001])
-def test_the_tail_of_chi2(degrees):
-    for x in (0.0, 1e-3, 1.0, degrees, 3.0 * degrees, 700.0):
-        assert chi2_tail(x, degrees) == pytest.approx(chi2.sf(x, degrees), rel=1e-9, abs=1e-300)
-    with pytest.raises(ValueError, match="at least 1"):
-        chi2_tail(1.0, 0)
 
 
 def test_a_little_air_by_the_exact_fall_of_a_free_chain():

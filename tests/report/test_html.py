@@ -138,7 +138,7 @@ def test_written_whole(tmp_path: Path) -> None:
 
 def test_importing_loads_neither_matplotlib_nor_numpy() -> None:
     code = (
-        "import sys, rig.report.html, rig.report.pictures, rig.report.table, rig.session.export,"
+        "import sys, rig.report.html, rig.report.pictures, rig.report.columns, rig.session.export,"
         "rig.session.store\n"
         "assert not {'matplotlib', 'numpy'} & set(sys.modules)"
     )

@@ -2,10 +2,9 @@
 
 import pytest
 
-from rig.report.clock import clock_lines
-from rig.report.columns import run_columns
+from rig.report.columns import aligned, run_columns, summary_table
 from rig.report.numbers import decimals_for, fixed, plus_minus
-from rig.report.table import aligned, summary_table
+from rig.report.remarks import clock_lines
 from tests.report import fake_analysis
 
 

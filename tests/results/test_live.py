@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from rig.analysis.learn import FEWEST
+from rig.analysis.joint_fit import FEWEST
 from rig.records import Job
 from rig.results import detailed
 from rig.results.live import LiveAnalysis

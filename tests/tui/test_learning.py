@@ -40,7 +40,7 @@ def test_what_is_learned_is_what_rig_analyze_says(recorded):
     fitted = live.read()
     with Session.open(recorded, readonly=True) as session:
         expected = detailed(session)[0]
-    assert (fitted.fitted, fitted.lagging) == (len(expected.lesson.drops), False)
+    assert (fitted.fitted, fitted.lagging) == (len(expected.joint.drops), False)
     assert fitted.analysis == expected.json()
     assert fitted.analysis["summary"] != alone.analysis["summary"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from textual.containers import Horizontal
 from textual.content import Content
 
-from rig.analysis.student import coverage_factor
+from rig.analysis.distributions import coverage_factor
 from rig.measurands import listed
 from rig.predictions import predicted_run
 from rig.report.columns import AUDIT

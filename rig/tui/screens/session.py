@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from textual.containers import Grid, VerticalScroll
 from textual.content import Content
 
-from rig.analysis.learn import FEWEST
+from rig.analysis.joint_fit import FEWEST
 from rig.campaign.plan import done
 from rig.measurands import averaged
 from rig.report.numbers import fixed, plus_minus

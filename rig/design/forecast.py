@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Outlook:
+class Forecast:
     """Standard uncertainties to be expected.
 
     Attributes
@@ -53,14 +53,14 @@ class Outlook:
 
 
 @one_thread
-def outlook(
+def forecast(
     protocol: Protocol,
     found: Cases,
     layout: Sequence[int],
     names: Sequence[str] | None = None,
     *,
     sure: bool = False,
-) -> Outlook:
+) -> Forecast:
     """Predict the uncertainties of a session.
 
     Parameters
@@ -99,7 +99,7 @@ def outlook(
             single.setdefault(name, {})[incline] = math.sqrt(alone)
             both = together + float(common @ covariance @ common)
             mean.setdefault(name, {})[incline] = math.sqrt(both)
-    return Outlook(single, mean, _coefficients(protocol, parts, size, sure=sure))
+    return Forecast(single, mean, _coefficients(protocol, parts, size, sure=sure))
 
 
 @dataclass(frozen=True, slots=True)

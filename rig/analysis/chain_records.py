@@ -1,4 +1,7 @@
-"""Edges as times, gate by gate, and the passages each gate should see."""
+"""A drop's edges as times: a train for each gate, a record for each chain.
+
+Beside what each gate reported stands what it should see of the chain that hangs there.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rig.model.fall import kicks
+from rig.model.rods import rod_impacts
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
-    from rig.protocol.protocol import Gate, RodChain
+    from rig.model.chain import Chain
+    from rig.protocol.protocol import Gate, Protocol, RodChain, Run
     from rig.records import Drop
 
     Array = NDArray[np.float64]
@@ -25,7 +34,7 @@ QUICK = 0.3e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Train:
+class EdgeTrain:
     """What one gate reported, and what it should have.
 
     Attributes
@@ -57,7 +66,7 @@ class Train:
 
 
 @dataclass(frozen=True)
-class Edges:
+class EdgeArrays:
     """A drop's edges as arrays, shape ``(edges,)`` each."""
 
     times: Array
@@ -82,7 +91,7 @@ class Edges:
         return found
 
     @classmethod
-    def of(cls, drop: Drop, hz: float) -> Edges:
+    def of(cls, drop: Drop, hz: float) -> EdgeArrays:
         """Take them from a drop whose ticks come at a rate in Hz."""
         flat = itertools.chain.from_iterable(drop.edges)  # much faster than an array of rows
         table = np.fromiter(flat, np.int64, 3 * len(drop.edges)).reshape(-1, 3)
@@ -90,7 +99,7 @@ class Edges:
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ChainRecord:
     """One chain and the gates beside it.
 
     Attributes
@@ -108,7 +117,7 @@ class Side:
 
     role: Literal["impact", "free"]
     chain: RodChain
-    trains: tuple[Train, ...]
+    trains: tuple[EdgeTrain, ...]
     ratios: Array | None = None
 
     @property
@@ -117,9 +126,9 @@ class Side:
         return sum(train.rods.size for train in self.trains)
 
 
-def train(
-    number: int, gate: Gate, chain: RodChain, edges: Edges, start: float, struck: bool
-) -> Train:
+def edge_train(
+    number: int, gate: Gate, chain: RodChain, edges: EdgeArrays, start: float, struck: bool
+) -> EdgeTrain:
     """Collect what one gate saw and what it should see.
 
     Parameters
@@ -135,7 +144,7 @@ def train(
     """
     mine = np.flatnonzero(edges.channels == gate.channel)
     rods, blocks, levels = _passages(gate.height, chain, start, struck, edges.darkening)
-    return Train(
+    return EdgeTrain(
         number,
         edges.times[mine],
         edges.blocked[mine],
@@ -167,3 +176,40 @@ def _passages(
     for one in found:
         one.flags.writeable = False
     return found
+
+
+def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[ChainRecord]:
+    """Collect each chain with the trains of its gates."""
+    return [
+        ChainRecord(
+            role, chain, trains, _ratios(protocol, chain.chain) if role == "impact" else None
+        )
+        for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop, hz))
+    ]
+
+
+def edge_trains(
+    protocol: Protocol, run: Run, edges: EdgeArrays
+) -> Iterator[tuple[Literal["impact", "free"], RodChain, tuple[EdgeTrain, ...]]]:
+    """Sort edges by side: its role, the chain that hung there, and the train of each of its gates.
+
+    A side where nothing hung, or without gates, is left out.
+    """
+    assert protocol.gates is not None
+    start = protocol.drop.value
+    for role in ("impact", "free"):
+        name = run.impact if role == "impact" else run.free
+        gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
+        if name is None or not gates:
+            continue
+        chain = protocol.chains[name]
+        trains = (edge_train(n, gate, chain, edges, start, role == "impact") for n, gate in gates)
+        yield role, chain, tuple(trains)
+
+
+def _ratios(protocol: Protocol, chain: Chain) -> Array:
+    """ΔV/V of each impact for α = 1, Eq. 9."""
+    assert protocol.surface is not None
+    # γ is the same at every incline, and level ground is always inside the domain of Eq. 13.
+    gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain, 0.0)]
+    return np.array(kicks(chain, [1.0] * chain.rods, gammas))

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import Measured
 from rig.estimate.coefficients import nuisances
 from rig.estimate.hypotheses import END, ended, one_alpha
-from rig.estimate.joint import fit
-from rig.estimate.tail import chi2_tail
+from rig.estimate.hypothesis_fit import fit
 from rig.model.rods import rod_impacts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rig.estimate.coefficients import Scene
-    from rig.estimate.forms import Form
+    from rig.estimate.coefficients import CoefficientProblem
+    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ STRONG = 10.0
 _TELLS = 0.5  # standard uncertainty of γ over Eq. 10's, above which the edges do not tell it
 
 
-def end_correction(protocol: Protocol, found: Scene) -> dict[str, Any] | None:
+def end_correction(protocol: Protocol, found: CoefficientProblem) -> dict[str, Any] | None:
     """Compare the three, with one α for each incline, so that Eqs. 8 to 13 are not at stake.
 
     Returns
@@ -38,7 +38,7 @@ def end_correction(protocol: Protocol, found: Scene) -> dict[str, Any] | None:
         ratio (one degree of freedom); ``needed``; ``sentence``. `None` where γ is given as 0.
     """
 
-    def gammas(form: Form) -> Array:
+    def gammas(form: QuadraticForm) -> Array:
         assert protocol.surface is not None
         return np.array([one.gamma for one in rod_impacts(protocol.surface, form.chain, 0.0)])
 

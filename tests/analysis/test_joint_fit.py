@@ -1,4 +1,4 @@
-"""What a session teaches: against all equations solved at once, and against the hidden truth."""
+"""All drops fitted together: against all equations solved at once, and against the hidden truth."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.components import LEAST_SHARE, STATED
-from rig.analysis.learn import FEWEST
-from rig.analysis.lesson_json import lesson_json
-from rig.analysis.normal import STRAY, normal
+from rig.analysis.equations import STRAY, normal_equations
+from rig.analysis.joint_fit import FEWEST
 from rig.analysis.quantities import measurands
 from rig.analysis.refine import Budgets
 from rig.analysis.session import analyze
@@ -19,7 +18,7 @@ from rig.model.chain import Chain
 from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.analysis.drops import FENCE, UNIFORM, case, true_value, with_dials, wrong_rods
-from tests.analysis.sessions import MILD, analysis, cases, lesson
+from tests.analysis.sessions import MILD, analysis, cases, fit_session
 
 FOUR = (1, 2, 3, 4)
 EIGHT = tuple(range(1, 9))
@@ -28,11 +27,11 @@ EIGHT = tuple(range(1, 9))
 class Whole:
     """All equations of all drops in one matrix, nothing eliminated, in prior units."""
 
-    def __init__(self, taught) -> None:
-        self.taught = taught
-        size = len(taught.shared)
+    def __init__(self, joint) -> None:
+        self.joint = joint
+        size = len(joint.shared)
         self.columns = []
-        for drop in taught.drops:
+        for drop in joint.drops:
             place = np.empty(drop.x.size, dtype=int)
             place[drop.common] = drop.here
             place[drop.own] = size + np.arange(drop.own.size)
@@ -42,9 +41,9 @@ class Whole:
         self.vector = np.zeros(size)
         self.x = np.zeros(size)
         self.group = np.empty(size, dtype=object)
-        for drop, place in zip(taught.drops, self.columns, strict=True):
+        for drop, place in zip(joint.drops, self.columns, strict=True):
             sd = drop.model.unknowns.sd
-            found = normal(drop.model, drop.matches, drop.x, sd, cut=STRAY)
+            found = normal_equations(drop.model, drop.matches, drop.x, sd, cut=STRAY)
             self.data[np.ix_(place, place)] += found.matrix
             self.vector[place] += found.vector
             self.x[place] = np.divide(drop.x, sd, out=np.zeros_like(sd), where=sd > 0)
@@ -55,16 +54,16 @@ class Whole:
 
 
 def test_eliminating_drop_by_drop_is_solving_all_at_once():
-    taught = lesson(FOUR)
-    assert taught.settled
-    whole = Whole(taught)
-    size = len(taught.shared)
+    joint = fit_session(FOUR)
+    assert joint.settled
+    whole = Whole(joint)
+    size = len(joint.shared)
     # Steps end when they are below 2 % of a standard uncertainty.
     left = whole.inverse @ (whole.vector + whole.x) / np.sqrt(np.diag(whole.inverse))
     assert np.abs(left).max() < 0.1
-    np.testing.assert_allclose(whole.inverse[:size, :size], taught.covariance, rtol=2e-2, atol=2e-4)
-    budgets = Budgets(taught)
-    for drop, place in zip(taught.drops, whole.columns, strict=True):
+    np.testing.assert_allclose(whole.inverse[:size, :size], joint.covariance, rtol=2e-2, atol=2e-4)
+    budgets = Budgets(joint)
+    for drop, place in zip(joint.drops, whole.columns, strict=True):
         found = budgets.measured(drop)
         for name, (value, gradient) in measurands(drop.model, drop.x).items():
             full = np.zeros(whole.x.size)
@@ -80,9 +79,9 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once():
 
 
 def test_a_session_s_budgets_add_up():
-    taught = lesson(EIGHT)
-    budgets = Budgets(taught)
-    for drop in taught.drops:
+    joint = fit_session(EIGHT)
+    budgets = Budgets(joint)
+    for drop in joint.drops:
         for measured in budgets.measured(drop).values():
             squares = sum(part**2 for part in measured.budget.values())
             assert squares == pytest.approx(measured.u**2, rel=1e-9)
@@ -99,7 +98,7 @@ def test_how_much_everything_scatters_is_found_whatever_was_stated(factor):
         MILD, gate_sd=factor * 0.2e-3, rod_sd=factor * 0.3e-3, beam_sd=factor * 0.5e-3,
         hang_sd=factor * 0.1e-3, impulse_sd=factor * 0.04, jitter_sd=factor * 2e-6,
     )  # fmt: skip
-    components = lesson(EIGHT, dials, 2).components
+    components = fit_session(EIGHT, dials, 2).components
     # All at 60°, where α is 0.0689: only the sum of both parts shows.
     found = asdict(components) | {"impulse": components.impulses(0.0689119616602868) / 0.0689}
     true = {
@@ -115,23 +114,23 @@ def test_how_much_everything_scatters_is_found_whatever_was_stated(factor):
 
 def test_the_rod_maps_and_the_beams_are_the_rig_s():
     """Each found within its own uncertainty, and the odd rods' places far better than stated."""
-    taught = lesson(EIGHT, MILD, 3)
+    joint = fit_session(EIGHT, MILD, 3)
     lab = ChainLab(UNIFORM, MILD, 3)
-    u = np.sqrt(np.diag(taught.covariance)) * taught.sd
+    u = np.sqrt(np.diag(joint.covariance)) * joint.sd
     truth = {
         f"{name} rods": body.offsets - np.array(body.spec.chain.heights)
         for name, body in lab.bodies.items()
     }
     truth["beams"] = np.array([lab.heights[g.channel] - g.height for g in UNIFORM.gates.gates])
     for name, true in truth.items():
-        block = taught.shared.blocks[name]
-        assert np.abs(taught.x[block] - true).max() < 4.0 * u[block].max(), name
-    a = taught.shared.blocks["A rods"]
-    error = np.diff((taught.x[a] - truth["A rods"])[::2])
+        block = joint.shared.blocks[name]
+        assert np.abs(joint.x[block] - true).max() < 4.0 * u[block].max(), name
+    a = joint.shared.blocks["A rods"]
+    error = np.diff((joint.x[a] - truth["A rods"])[::2])
     assert np.sqrt(np.mean(error**2)) < 0.02e-3  # of 0.3 mm stated, whatever the level
-    block = taught.shared.blocks["A width"]
+    block = joint.shared.blocks["A width"]
     width = lab.bodies["A"].widths[0] - UNIFORM.chains["A"].widths[0]
-    assert abs(taught.x[block][0] - width) < 4.0 * u[block][0]
+    assert abs(joint.x[block][0] - width) < 4.0 * u[block][0]
 
 
 def test_intervals_hold_the_truth_and_are_not_too_wide():
@@ -159,7 +158,7 @@ def test_intervals_hold_the_truth_and_are_not_too_wide():
 
 
 def test_what_the_edges_do_not_tell_is_said():
-    found = {one["name"]: one for one in lesson_json(lesson(EIGHT))["unknowns"]}
+    found = {one["name"]: one for one in fit_session(EIGHT).json()["unknowns"]}
     assert not any(found["clock"]["identified"])  # pings know it better than a chain that falls
     assert all(found["A width"]["identified"])
     assert "gravity" not in found  # given exactly
@@ -200,9 +199,9 @@ def test_the_least_sure_calibration_counts_for_all():
 def test_a_session_teaches_what_the_air_takes(drag):
     drops = cases(EIGHT, replace(MILD, drag=drag), 4)
     found = analysis(drops)
-    at = found.lesson.shared.blocks["drag"].start
-    u = math.sqrt(found.lesson.covariance[at, at]) * found.lesson.sd[at]
-    assert abs(found.lesson.x[at] - drag) < 4 * u < 1e-4
+    at = found.joint.shared.blocks["drag"].start
+    u = math.sqrt(found.joint.covariance[at, at]) * found.joint.sd[at]
+    assert abs(found.joint.x[at] - drag) < 4 * u < 1e-4
     for one, result in zip(drops, found.runs, strict=True):
         assert result.learned
         assert not wrong_rods(result, one.truth)
@@ -213,7 +212,7 @@ def test_a_session_teaches_what_the_air_takes(drag):
 def test_few_drops_teach_nothing():
     drops = cases(FOUR)
     few = analysis(drops[: FEWEST - 1])
-    assert few.lesson is None
+    assert few.joint is None
     assert not any(result.learned for result in few.runs)
     assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in drops[:3]]
     assert "learned" not in few.json()
@@ -258,7 +257,7 @@ def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
         {(3, 1): ("the door slammed",)},
     )
     assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 5
-    assert len(rejected.lesson.drops) == 7
+    assert len(rejected.joint.drops) == 7
 
 
 @pytest.mark.parametrize("scene", ["single", "fence"])
@@ -268,7 +267,7 @@ def test_simpler_scenes_learn_too(scene):
     )  # fmt: skip
     drops = cases(FOUR, dials, 5, scene)
     found = analysis(drops)
-    assert found.lesson is not None
+    assert found.joint is not None
     for one, result in zip(drops, found.runs, strict=True):
         assert result.learned
         for name, measured in result.quantities.items():
@@ -286,10 +285,10 @@ def test_a_perfect_rig_is_learned_from_and_not_believed_without_end(seed):
     """Nothing scatters: what is learned stays above a floor, and numbers stay numbers."""
     drops = [case(FENCE, Dials.quiet(), seed=seed, run=run) for run in range(1, 11)]
     found = analysis(drops)
-    assert found.lesson is not None
+    assert found.joint is not None
     for name in STATED.__slots__:
         least = LEAST_SHARE * getattr(STATED, name)
-        assert getattr(found.lesson.components, name) >= least * (1.0 - 1e-12), name
+        assert getattr(found.joint.components, name) >= least * (1.0 - 1e-12), name
     for result in found.runs:
         gravity = result.quantities["gravity_m_s2"]
         assert 0.0 < gravity.u < 0.01
@@ -308,8 +307,8 @@ def test_two_rods_have_too_few_impulses_to_learn_their_scatter_from():
     both = {"A": replace(short, name="A"), "B": replace(short, name="B")}
     scene = replace(UNIFORM, chains=both, plan=replace(UNIFORM.plan, inclines=(40.0,)))
     found = analysis([case(scene, MILD, run=run) for run in range(1, 9)])
-    assert found.lesson is not None
-    assert found.lesson.components.impulse == STATED.impulse
-    assert found.lesson.components.impulse_floor == STATED.impulse_floor
-    assert "impulse" not in found.lesson.degrees
+    assert found.joint is not None
+    assert found.joint.components.impulse == STATED.impulse
+    assert found.joint.components.impulse_floor == STATED.impulse_floor
+    assert "impulse" not in found.joint.degrees
     assert all(result.learned for result in found.runs)

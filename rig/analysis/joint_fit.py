@@ -1,4 +1,4 @@
-"""What all drops of a session teach about the rig, and each drop in the light of it.
+"""All drops of a session fitted together: what they say of the rig, and each in that light.
 
 All drops together are one least-squares problem: unknowns c of the rig and the chains, the same in
 every drop, and unknowns of each drop alone. The latter are eliminated drop by drop (a Schur
@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.analysis.components import STATED
+from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
-from rig.analysis.joint import Joint, joint_step, scaled
-from rig.analysis.normal import STRAY
-from rig.analysis.shared import Shared
+from rig.analysis.joint_step import DropState, joint_step
+from rig.analysis.unknowns import SharedUnknowns
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     Matches = dict[str, list[Index]]
 
 FEWEST = 4
-"""Drops that a session must have to be learned from: one block of A, B, B, A."""
+"""Drops that a session must have for a joint fit: one block of A, B, B, A."""
+IDENTIFIED = 0.5
+"""Share of the prior variance that the edges must take away for an unknown to be found by them."""
 _ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again
 _DONE = 0.02  # of a standard uncertainty
@@ -44,8 +46,8 @@ _LEAST = {"floor": 5e-6}  # where others of its kind count for more
 
 
 @dataclass(frozen=True, slots=True)
-class Taught(Matched):
-    """One drop after all have been adjusted together.
+class JointDrop(Matched):
+    """One drop after all have been fitted together.
 
     Attributes
     ----------
@@ -54,7 +56,7 @@ class Taught(Matched):
     own, common, here
         Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
     inverse, gain
-        As in `rig.analysis.joint.Part`.
+        As in `rig.analysis.joint_step.Reduced`.
     """
 
     x: Array
@@ -66,8 +68,8 @@ class Taught(Matched):
 
 
 @dataclass(frozen=True, slots=True)
-class Lesson:
-    """What a session teaches.
+class JointFit:
+    """What the drops of a session say together.
 
     Attributes
     ----------
@@ -84,18 +86,55 @@ class Lesson:
         Whether the steps came to an end.
     """
 
-    shared: Shared
+    shared: SharedUnknowns
     x: Array
     sd: Array
     covariance: Array
     components: Components
     degrees: Mapping[str, float]
-    drops: tuple[Taught, ...]
+    drops: tuple[JointDrop, ...]
     settled: bool
+
+    def json(self) -> dict[str, Any]:
+        """``learned`` of `rig analyze --json`.
+
+        Returns
+        -------
+        dict
+            ``scatter``: each variance component as stated and as found, with its degrees of
+            freedom; ``gates`` and ``rods`` are relative to the protocol's uncertainties.
+            ``unknowns``: what the drops have in common, as deviations from the protocol in SI
+            units, with the standard uncertainties before and after; what the edges do not tell is
+            marked as not identified.
+        """
+        variance = np.diag(self.covariance)
+        return {
+            "runs": len(self.drops),
+            "scatter": [
+                {
+                    "name": name,
+                    "stated": getattr(STATED, name),
+                    "found": getattr(self.components, name),
+                    "degrees": degrees,
+                }
+                for name, degrees in self.degrees.items()
+            ],
+            "unknowns": [
+                {
+                    "name": name,
+                    "value": self.x[block].tolist(),
+                    "u": (np.sqrt(variance[block]) * self.sd[block]).tolist(),
+                    "prior_u": self.sd[block].tolist(),
+                    "identified": (variance[block] <= 1.0 - IDENTIFIED).tolist(),
+                }
+                for name, block in self.shared.blocks.items()
+                if self.sd[block].any()
+            ],
+        }
 
 
 @one_thread
-def learn(fits: Sequence[Fit]) -> Lesson:
+def joint_fit(fits: Sequence[Fit]) -> JointFit:
     """Adjust all drops of a session together.
 
     Parameters
@@ -103,7 +142,7 @@ def learn(fits: Sequence[Fit]) -> Lesson:
     fits
         Good drops, each adjusted by itself.
     """
-    shared = Shared(fit.model for fit in fits)
+    shared = SharedUnknowns(fit.model for fit in fits)
     # One clock for all: its error is common, and as large as the least sure calibration allows.
     clock_u = max(fit.model.clock_u for fit in fits)
     drops = [_begin(fit, shared) for fit in fits]
@@ -128,25 +167,25 @@ def learn(fits: Sequence[Fit]) -> Lesson:
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
             break
-    return Lesson(
+    return JointFit(
         shared,
         x,
         sd,
         covariance,
         before,
         evidence.degrees,
-        tuple(_taught(drop) for drop in drops),
+        tuple(_jointly_fitted(drop) for drop in drops),
         settled,
     )
 
 
-def _begin(fit: Fit, shared: Shared) -> Joint:
+def _begin(fit: Fit, shared: SharedUnknowns) -> DropState:
     common, here = shared.places(fit.model)
     own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
-    return Joint(fit.model, fit.matches, fit.estimate.x.copy(), own, common, here)
+    return DropState(fit.model, fit.matches, fit.estimate.x.copy(), own, common, here)
 
 
-def _average(drops: Sequence[Joint], shared: Shared) -> Array:
+def _average(drops: Sequence[DropState], shared: SharedUnknowns) -> Array:
     """Begin at the mean of what the drops say by themselves."""
     total, count = np.zeros(len(shared)), np.zeros(len(shared))
     for drop in drops:
@@ -157,11 +196,11 @@ def _average(drops: Sequence[Joint], shared: Shared) -> Array:
 
 def _weigh(
     evidence: Evidence,
-    shared: Shared,
+    shared: SharedUnknowns,
     x: Array,
     sd: Array,
     covariance: Array,
-    drops: Sequence[Joint],
+    drops: Sequence[DropState],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
     new = Evidence(evidence.components)
@@ -170,10 +209,10 @@ def _weigh(
         new.common(name, scaled(x, sd)[block], remaining[block], sd[block])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     for drop in drops:
-        assert drop.part is not None
-        part, model = drop.part, drop.model
+        assert drop.reduced is not None
+        reduced, model = drop.reduced, drop.model
         common = covariance[np.ix_(drop.here, drop.here)]
-        left = np.diag(part.inverse) + np.sum((part.gain @ common) * part.gain, axis=1)
+        left = np.diag(reduced.inverse) + np.sum((reduced.gain @ common) * reduced.gain, axis=1)
         own_sd = model.unknowns.sd[drop.own]
         parameters += float(np.sum((1.0 - left)[own_sd > 0.0]))
         variance = np.zeros(drop.x.size)
@@ -183,7 +222,7 @@ def _weigh(
     return new.settled(parameters)
 
 
-def _steady(one: Components, other: Components, drops: Sequence[Joint]) -> bool:
+def _steady(one: Components, other: Components, drops: Sequence[DropState]) -> bool:
     """Whether no component changes much; a floor that is not there shrinks for ever.
 
     Of impulses it is their scatter in these drops that counts: where all have about the same α, it
@@ -198,15 +237,15 @@ def _steady(one: Components, other: Components, drops: Sequence[Joint]) -> bool:
     return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)
 
 
-def _taught(drop: Joint) -> Taught:
-    assert drop.part is not None
-    return Taught(
+def _jointly_fitted(drop: DropState) -> JointDrop:
+    assert drop.reduced is not None
+    return JointDrop(
         drop.model,
         without_strays(drop.model, drop.x, drop.matches),
         drop.x,
         drop.own,
         drop.common,
         drop.here,
-        drop.part.inverse,
-        drop.part.gain,
+        drop.reduced.inverse,
+        drop.reduced.gain,
     )

@@ -1,7 +1,9 @@
-"""Faults of the rig that edges show: dead and exchanged gates, chains of other rods.
+"""What is wrong with the rig, by the edges: dead and exchanged gates, chains of other rods.
 
-They are said and never fitted away: a drop whose gates or chains are not those of the protocol is
-void, with the fault as its reason.
+It is said and never fitted away: a drop whose gates or chains are not those of the protocol is
+void, with the fault as its reason. An adjusted drop is diagnosed by what the adjustment left over
+(`diagnose`); where the edges are not even like the chain falling, one fault after another is tried
+(`diagnose_pattern`).
 """
 
 from __future__ import annotations
@@ -13,16 +15,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.align import align, possible
-from rig.analysis.trains import Train
+from rig.analysis.chain_records import EdgeTrain, chain_records
+from rig.analysis.equations import scaled
+from rig.analysis.pattern import guess
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord
     from rig.analysis.fit import Fit
+    from rig.analysis.pattern import Guess
     from rig.analysis.trajectory import Trajectory
-    from rig.protocol.protocol import Gate
+    from rig.protocol.protocol import Gate, Protocol, RodChain, Run
+    from rig.records import Drop
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -36,19 +43,22 @@ IMPLAUSIBLE = 6.0
 evenly spaced, an exchanged gate is fitted well at a wrong height."""
 RIGHT = 0.8
 """Share that says that it was exchanged with another."""
+CONVINCING = 0.85
+"""Share of the expected edges that must be where a suspicion puts them."""
+_LEAD = 0.1  # by which it must exceed the next best
 _WIDTH = 1e-3  # m: how far off an edge of another gate or rod may be
 _ENOUGH = 3  # gates that must agree on how many rods there are
 _MOST = 3  # rods by which a chain may differ
 
 
-class Faults(NamedTuple):
+class Diagnosis(NamedTuple):
     """What is wrong, in words: beyond use, and worth a remark."""
 
     void: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
 
 
-def find_faults(fit: Fit) -> Faults:
+def diagnose(fit: Fit) -> Diagnosis:
     """Look for gates and chains that are not those of the protocol."""
     gates = _gates(fit)
     void: list[str] = []
@@ -75,9 +85,9 @@ def find_faults(fit: Fit) -> Faults:
             )
         elif gate.off > IMPLAUSIBLE:
             void.append(f"{name} is off its height by {gate.off:.0f} times its uncertainty")
-    for role in fit.model.sides:
+    for role in fit.model.records:
         void += _rods(fit, role, [gate for gate in alive if gate.role == role])
-    return Faults(tuple(void), tuple(doubts))
+    return Diagnosis(tuple(void), tuple(doubts))
 
 
 class _Seen(NamedTuple):
@@ -87,7 +97,7 @@ class _Seen(NamedTuple):
     """
 
     role: str
-    train: Train
+    train: EdgeTrain
     match: Index
     matched: int
     off: float
@@ -111,17 +121,16 @@ class _Seen(NamedTuple):
 
 def _gates(fit: Fit) -> list[_Seen]:
     beams = fit.model.unknowns["beams"]
-    x, sd = np.abs(fit.estimate.x[beams]), fit.model.unknowns.sd[beams]
-    off = np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
+    off = np.abs(scaled(fit.estimate.x[beams], fit.model.unknowns.sd[beams]))
     return [
         _Seen(role, train, match, int((match >= 0).sum()), float(off[train.gate]))
-        for role, side in fit.model.sides.items()
-        for train, match in zip(side.trains, fit.matches[role], strict=True)
+        for role, record in fit.model.records.items()
+        for train, match in zip(record.trains, fit.matches[role], strict=True)
         if match.size
     ]
 
 
-def _gate(fit: Fit, train: Train) -> Gate:
+def _gate(fit: Fit, train: EdgeTrain) -> Gate:
     assert fit.model.protocol.gates is not None
     return fit.model.protocol.gates.gates[train.gate]
 
@@ -180,7 +189,7 @@ def _motion(fit: Fit, role: str) -> tuple[Trajectory, float]:
 
 def _rods(fit: Fit, role: str, gates: Sequence[_Seen]) -> list[str]:
     """Compare the number of rods that passed with the chain's."""
-    chain = fit.model.sides[role].chain
+    chain = fit.model.records[role].chain
     rods = chain.chain.rods
     # Of a rod's two edges one is enough, and counts once.
     expected = _counts([gate.train.rods for gate in gates], rods)
@@ -208,7 +217,7 @@ def _count(role: str, name: str, stated: int, found: int) -> str:
 
 def _more(fit: Fit, role: str, gates: Sequence[_Seen]) -> int:
     """Count the rods above the top one of the protocol that most gates saw."""
-    chain = fit.model.sides[role].chain
+    chain = fit.model.records[role].chain
     places = chain.chain.heights
     enough = max(_ENOUGH, len(gates) / 2)
     left = [gate for gate in gates if gate.train.times.size - gate.matched > 1]
@@ -224,11 +233,11 @@ def _more(fit: Fit, role: str, gates: Sequence[_Seen]) -> int:
     return _MOST
 
 
-def _above(fit: Fit, gate: _Seen, place: float, width: float) -> Train:
+def _above(fit: Fit, gate: _Seen, place: float, width: float) -> EdgeTrain:
     """What is left of a gate's edges, with one rod expected."""
     left = np.setdiff1d(np.arange(gate.train.times.size), gate.match)
     level = _gate(fit, gate.train).height - place
-    return Train(
+    return EdgeTrain(
         gate.train.gate,
         gate.train.times[left],
         gate.train.blocked[left],
@@ -238,3 +247,82 @@ def _above(fit: Fit, gate: _Seen, place: float, width: float) -> Train:
         np.array([True, False]),
         np.array([level + width / 2, level - width / 2]),
     )
+
+
+def diagnose_pattern(
+    protocol: Protocol,
+    run: Run,
+    drop: Drop,
+    hz: float,
+    records: Sequence[ChainRecord],
+    unlike: Sequence[str],
+) -> list[str]:
+    """Try one fault after another on each side that is unlike its chain, and say which one fits.
+
+    Parameters
+    ----------
+    hz
+        Of the drop's ticks.
+    sides
+        As the protocol has them.
+    unlike
+        Roles of those that do not look like it.
+    """
+    found: list[str] = []
+    for role, record in ((record.role, record) for record in records if record.role in unlike):
+        turned = upside_down(record.chain)
+        if turned is not None:
+            other = replace(protocol, chains={**protocol.chains, record.chain.name: turned})
+            (again,) = (s for s in chain_records(other, run, drop, hz) if s.role == role)
+            if _convincing(_guess(protocol, again)):
+                found.append(f"chain {record.chain.name} hangs upside down on the {role} side")
+                continue
+        found += _plugs(protocol, record)
+    return found
+
+
+def upside_down(chain: RodChain) -> RodChain | None:
+    """Turn a chain round; `None` where that makes no difference."""
+    rods = chain.chain
+    top = rods.heights[-1]
+    heights = tuple(top - height for height in rods.heights[::-1])
+    widths = chain.widths[::-1]
+    alike = all(abs(a - b) < 1e-3 for a, b in zip(heights, rods.heights, strict=True))
+    if alike and widths == chain.widths:
+        return None
+    inertias = rods.inertias and rods.inertias[::-1]
+    turned = replace(rods, masses=rods.masses[::-1], heights=heights, inertias=inertias)
+    return replace(chain, chain=turned, widths=widths)
+
+
+def _plugs(protocol: Protocol, record: ChainRecord) -> list[str]:
+    """Look for the one pair of gates that makes sense when exchanged."""
+    assert protocol.gates is not None
+    tried = []
+    for a, b in combinations(range(len(record.trains)), 2):
+        trains = list(record.trains)
+        trains[a], trains[b] = _saw(trains[a], trains[b]), _saw(trains[b], trains[a])
+        tried.append((_guess(protocol, replace(record, trains=tuple(trains))), a, b))
+    tried.sort(key=lambda one: -one[0].share)
+    if not tried or not _convincing(tried[0][0]):
+        return []
+    if len(tried) > 1 and tried[0][0].share - tried[1][0].share < _LEAD:
+        return []
+    gates = protocol.gates.gates
+    _, a, b = tried[0]
+    return [exchanged(gates[record.trains[a].gate], gates[record.trains[b].gate])]
+
+
+def _saw(train: EdgeTrain, other: EdgeTrain) -> EdgeTrain:
+    """Give a gate the edges of another."""
+    return replace(
+        train, times=other.times, blocked=other.blocked, burst=other.burst, edge=other.edge
+    )
+
+
+def _guess(protocol: Protocol, record: ChainRecord) -> Guess:
+    return guess(record, protocol.drop, protocol.gravity.value)
+
+
+def _convincing(one: Guess) -> bool:
+    return one.share >= CONVINCING and one.share - one.runner_up >= _LEAD

@@ -13,26 +13,26 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from rig.analysis.align import EXTRA, MISSED
-from rig.analysis.trains import QUICK
+from rig.analysis.chain_records import QUICK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.fit import Fit
-    from rig.analysis.learn import Taught
-    from rig.analysis.trains import Side, Train
+    from rig.analysis.joint_fit import JointDrop
     from rig.analysis.trajectory import Trajectory
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
-Kind = Literal["missed", "merged", "dead gate", "chatter", "string", "bounce", "extra"]
+EdgeClass = Literal["missed", "merged", "dead gate", "chatter", "string", "bounce", "extra"]
 
 
 @dataclass(frozen=True, slots=True)
-class Cause:
+class UnmatchedEdge:
     """One edge that is missing or belongs to no rod.
 
     Attributes
@@ -56,7 +56,7 @@ class Cause:
         What it cost the matching, in units of ½ (residual/scale)², see `rig.analysis.align`.
     """
 
-    kind: Kind
+    kind: EdgeClass
     channel: int
     time_s: float
     blocked: bool
@@ -69,7 +69,7 @@ class Cause:
         return {name: getattr(self, name) for name in self.__slots__}
 
 
-def causes(drop: Fit | Taught) -> tuple[Cause, ...]:
+def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     """Name everything that is not as it should be, in order of time.
 
     Parameters
@@ -80,35 +80,39 @@ def causes(drop: Fit | Taught) -> tuple[Cause, ...]:
     model, x = drop.model, drop.x
     assert model.protocol.gates is not None
     clock = 1.0 + float(x[model.unknowns["clock"]][0])
-    found: list[Cause] = []
-    for role, side in model.sides.items():
+    found: list[UnmatchedEdge] = []
+    for role, record in model.records.items():
         path = model.trajectory(role, x)
-        lowest = min(model.protocol.gates.gates[train.gate].height for train in side.trains)
+        lowest = min(model.protocol.gates.gates[train.gate].height for train in record.trains)
         for train, levels, match in zip(
-            side.trains, model.levels(role, x), drop.matches[role], strict=True
+            record.trains, model.levels(role, x), drop.matches[role], strict=True
         ):
             gate = model.protocol.gates.gates[train.gate]
             if (match < 0).any():
                 found += _absent(gate.channel, train, match, path.times(levels) / clock)
             if train.times.size > (match >= 0).sum():
-                after = _first_hit(side, path) / clock if gate.height == lowest else np.inf
+                after = _first_hit(record, path) / clock if gate.height == lowest else np.inf
                 found += _surplus(gate.channel, train, match, after)
-    return tuple(sorted(found, key=lambda cause: cause.time_s))
+    return tuple(sorted(found, key=lambda edge: edge.time_s))
 
 
-def _first_hit(side: Side, path: Trajectory) -> float:
+def _first_hit(record: ChainRecord, path: Trajectory) -> float:
     """When the first rod strikes, s; never on the free side."""
-    return float(path.time[1]) if side.ratios is not None else np.inf
+    return float(path.time[1]) if record.ratios is not None else np.inf
 
 
-def _absent(channel: int, train: Train, match: Index, expected: Array) -> Iterator[Cause]:
+def _absent(
+    channel: int, train: EdgeTrain, match: Index, expected: Array
+) -> Iterator[UnmatchedEdge]:
     """Expected edges that nobody reported."""
     for at in np.flatnonzero(match < 0).tolist():
         blocks, when = bool(train.blocks[at]), float(expected[at])
-        yield Cause(_why(train, when), channel, when, blocks, int(train.rods[at]), None, MISSED)
+        yield UnmatchedEdge(
+            _why(train, when), channel, when, blocks, int(train.rods[at]), None, MISSED
+        )
 
 
-def _why(train: Train, when: float) -> Kind:
+def _why(train: EdgeTrain, when: float) -> EdgeClass:
     """Say why there is no edge, by the level that the gate kept.
 
     While a rod leaves no trace the beam stays bright, while a gap leaves none it stays dark.
@@ -120,7 +124,7 @@ def _why(train: Train, when: float) -> Kind:
     return "merged" if dark else "missed"
 
 
-def _surplus(channel: int, train: Train, match: Index, hit: float) -> Iterator[Cause]:
+def _surplus(channel: int, train: EdgeTrain, match: Index, hit: float) -> Iterator[UnmatchedEdge]:
     """Reported edges that belong to no rod."""
     rods = np.full(train.times.size, -1)
     rods[match[match >= 0]] = train.rods[match >= 0]
@@ -128,7 +132,7 @@ def _surplus(channel: int, train: Train, match: Index, hit: float) -> Iterator[C
     for at in np.flatnonzero(rods < 0).tolist():
         when, blocked = float(train.times[at]), bool(train.blocked[at])
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
-        kind: Kind = "extra"
+        kind: EdgeClass = "extra"
         if near.size:
             kind = "chatter"
         elif train.burst[at] > 0.0:
@@ -136,4 +140,4 @@ def _surplus(channel: int, train: Train, match: Index, hit: float) -> Iterator[C
         elif when > hit:
             kind = "bounce"
         rod = int(near[0]) if near.size else None
-        yield Cause(kind, channel, when, blocked, rod, int(train.edge[at]), EXTRA)
+        yield UnmatchedEdge(kind, channel, when, blocked, rod, int(train.edge[at]), EXTRA)

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
-from rig.analysis.normal import HUBER, STRAY
 from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.learn import Taught
-    from rig.analysis.shared import Shared
+    from rig.analysis.joint_fit import JointDrop
     from rig.analysis.trajectory import Trajectory
+    from rig.analysis.unknowns import SharedUnknowns
     from rig.model.chain import Chain
     from rig.protocol.protocol import Run
 
@@ -39,7 +39,7 @@ EXTRA = ("contact", "drag")
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class QuadraticForm:
     """zᵀMz + 2 vᵀz + c, z being the shared unknowns of the drop, then its impacts.
 
     Attributes
@@ -76,7 +76,7 @@ class Form:
     edges: int
 
 
-def form(run: Run, drop: Fit | Taught, shared: Shared) -> Form:
+def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> QuadraticForm:
     """Reduce a drop to what it says of its impacts.
 
     Parameters
@@ -89,8 +89,8 @@ def form(run: Run, drop: Fit | Taught, shared: Shared) -> Form:
         Where the shared unknowns are.
     """
     model, x = drop.model, drop.x
-    at, side = model.unknowns, model.sides["impact"]
-    assert side.ratios is not None
+    at, record = model.unknowns, model.records["impact"]
+    assert record.ratios is not None
     common, here = shared.places(model)
     alphas = model.guesses["impact"].alpha + x[at["alpha"]] + x[at["impulses"]]
     inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
@@ -110,23 +110,25 @@ def form(run: Run, drop: Fit | Taught, shared: Shared) -> Form:
     cross = normal[np.ix_(own, kept)] * np.outer(sd[own], scale[kept])
     gain = np.linalg.solve(left, np.column_stack([cross, vector[own] * sd[own]]))
     path = model.trajectory("impact", x)
-    return Form(
+    return QuadraticForm(
         run,
-        side.chain.chain,
-        side.ratios,
+        record.chain.chain,
+        record.ratios,
         here,
         normal[np.ix_(kept, kept)] * np.outer(scale[kept], scale[kept]) - cross.T @ gain[:, :-1],
         vector[kept] * scale[kept] - cross.T @ gain[:, -1],
         constant - float(vector[own] * sd[own] @ gain[:, -1]),
         float(at.sd[impulses[0]]),
         alphas,
-        path.speed[1:] / (1.0 + alphas * side.ratios),
+        path.speed[1:] / (1.0 + alphas * record.ratios),
         edges,
     )
 
 
-def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array, Array, float, int]:
-    """‖r/σ‖² about a point, as in `Form`, in the drop's unknowns and `EXTRA`, all in SI.
+def _normal(
+    drop: Fit | JointDrop, alphas: Array, inflation: float
+) -> tuple[Array, Array, float, int]:
+    """‖r/σ‖² about a point, as in `QuadraticForm`, in the drop's unknowns and `EXTRA`, all in SI.
 
     The impulses stand for whole α, and the unknown α for nothing.
     """
@@ -148,8 +150,7 @@ def _normal(drop: Fit | Taught, alphas: Array, inflation: float) -> tuple[Array,
         if "drag" in at:
             slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
         sigma = rows.residuals.sigma * inflation
-        far = np.maximum(np.abs(rows.residuals.values / sigma), np.finfo(float).tiny)
-        weight = np.where(far > STRAY, 0.0, np.minimum(1.0, HUBER / far)) / sigma**2
+        weight = robust_weights(rows.residuals.values / sigma, STRAY) / sigma**2
         weighted = slopes * weight[:, None]
         left = rows.residuals.values - slopes @ point[place]
         matrix[np.ix_(place, place)] += slopes.T @ weighted
@@ -165,16 +166,16 @@ def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple
     if role == "free":
         return np.zeros(times.size), slopes[:, DRAG]
     # A contact point higher up is met as if every rod hung that much lower.
-    rods = len(model.sides["impact"].chain.widths)
+    rods = len(model.records["impact"].chain.widths)
     return -slopes[:, COMMON + rods :].sum(axis=1), slopes[:, DRAG]
 
 
-def merged(forms: Sequence[Form]) -> list[Form]:
+def merged(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
     """Add up the forms of like drops: all that is wanted of them is the same function of them.
 
     Drops are alike where the same chain strikes at the same incline. The run kept is the first.
     """
-    like: dict[tuple[object, ...], list[Form]] = {}
+    like: dict[tuple[object, ...], list[QuadraticForm]] = {}
     for one in forms:
         like.setdefault((one.run.incline_deg, one.run.impact, one.run.free), []).append(one)
     return [

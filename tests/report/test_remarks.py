@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from rig.report.air import air_lines
+from rig.report.remarks import air_lines
 from tests.cli.lab import rig, short
 
 

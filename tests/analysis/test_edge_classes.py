@@ -18,18 +18,18 @@ STRING_S = 250e-6  # the simulation's string flickers for up to 200 µs, its rod
 
 
 def kinds(result: DropResult) -> set[str]:
-    return {cause.kind for cause in result.causes}
+    return {edge.kind for edge in result.unmatched}
 
 
 def consistent(result: DropResult) -> None:
-    """One cause for each edge that the audit counts, each with its cost."""
-    absent = [cause for cause in result.causes if cause.edge is None]
-    surplus = [cause for cause in result.causes if cause.edge is not None]
+    """One entry for each edge that the audit counts, each with its cost."""
+    absent = [edge for edge in result.unmatched if edge.edge is None]
+    surplus = [edge for edge in result.unmatched if edge.edge is not None]
     assert (len(absent), len(surplus)) == (result.audit.missed, result.audit.spurious)
-    assert {cause.cost for cause in absent} <= {MISSED}
-    assert {cause.cost for cause in surplus} <= {EXTRA}
-    assert not {cause.edge for cause in surplus} & result.matches.keys()
-    times = [cause.time_s for cause in result.causes]
+    assert {edge.cost for edge in absent} <= {MISSED}
+    assert {edge.cost for edge in surplus} <= {EXTRA}
+    assert not {edge.edge for edge in surplus} & result.matches.keys()
+    times = [edge.time_s for edge in result.unmatched]
     assert times == sorted(times)
 
 
@@ -53,25 +53,25 @@ def test_each_edge_has_the_cause_that_it_has(seed):
     result = one.analyze()
     consistent(result)
     hidden = Counter()
-    for cause in result.causes:
-        if cause.edge is None:
+    for edge in result.unmatched:
+        if edge.edge is None:
             continue
-        when, channel, blocked, rod = one.truth.edges[cause.edge]
-        assert (cause.channel, cause.blocked) == (channel, blocked)
-        assert cause.time_s == pytest.approx(when, abs=2e-6)
+        when, channel, blocked, rod = one.truth.edges[edge.edge]
+        assert (edge.channel, edge.blocked) == (channel, blocked)
+        assert edge.time_s == pytest.approx(when, abs=2e-6)
         if rod != STRAY:
             true = "chatter"
-            assert cause.rod == rod
-        elif shadow_s(one, cause.edge) < STRING_S:
+            assert edge.rod == rod
+        elif shadow_s(one, edge.edge) < STRING_S:
             true = "string"
         else:
             true = "bounce"
             assert channel in LOWEST
-        if true == "bounce" and cause.kind == "chatter":
+        if true == "bounce" and edge.kind == "chatter":
             hidden["bounce at the very moment of a rod's edge"] += 1
             continue
-        assert cause.kind == true
-        assert (cause.rod is None) == (true != "chatter")
+        assert edge.kind == true
+        assert (edge.rod is None) == (true != "chatter")
     assert hidden.total() <= 1
     assert {"chatter", "bounce"} <= kinds(result)
 
@@ -86,15 +86,15 @@ def test_a_rod_without_a_trace_and_a_gap_without_one(seed):
     there = {(channel, rod, blocked) for _, channel, blocked, rod in one.truth.edges}
     quiet = case(UNIFORM, Dials.quiet(), incline=40.0, seed=seed).truth.edges
     due = {(channel, rod, blocked): when for when, channel, blocked, rod in quiet}
-    found = {(c.channel, c.rod, c.blocked): c for c in result.causes}
+    found = {(c.channel, c.rod, c.blocked): c for c in result.unmatched}
     assert found.keys() == due.keys() - there
-    for (channel, rod, blocked), cause in found.items():
+    for (channel, rod, blocked), edge in found.items():
         alone = (channel, rod, not blocked) in there  # its other edge came
         if alone:
-            assert cause.kind == "merged"
-        assert cause.time_s == pytest.approx(due[channel, rod, blocked], abs=20e-6)
+            assert edge.kind == "merged"
+        assert edge.time_s == pytest.approx(due[channel, rod, blocked], abs=20e-6)
     # Two gaps in a row leave a rod between them without a trace, but in the dark.
-    missed = [cause for cause in result.causes if cause.kind == "missed"]
+    missed = [edge for edge in result.unmatched if edge.kind == "missed"]
     assert all((c.channel, c.rod, not c.blocked) in found for c in missed)
 
 
@@ -104,7 +104,7 @@ def test_a_dead_gate_is_named():
     result = one.with_edges([e for e in one.drop.edges if e.channel != channel]).analyze()
     consistent(result)
     assert kinds(result) == {"dead gate"}
-    assert {cause.channel for cause in result.causes} == {channel}
+    assert {edge.channel for edge in result.unmatched} == {channel}
 
 
 def test_a_flash_that_nothing_explains_is_extra():
@@ -120,12 +120,12 @@ def test_a_flash_that_nothing_explains_is_extra():
     ]
     result = one.with_edges([*one.drop.edges, *flash]).analyze()
     consistent(result)
-    assert [cause.kind for cause in result.causes] == ["extra", "extra"]
-    assert math.isclose(result.causes[0].time_s, flash[0].tick / one.scale.hz, rel_tol=1e-12)
+    assert [edge.kind for edge in result.unmatched] == ["extra", "extra"]
+    assert math.isclose(result.unmatched[0].time_s, flash[0].tick / one.scale.hz, rel_tol=1e-12)
 
 
 def test_a_perfect_record_has_no_causes():
     result = case(UNIFORM, Dials.quiet(), incline=40.0).analyze()
-    assert result.causes == ()
+    assert result.unmatched == ()
     assert result.json()["causes"] == []
     assert "causes" not in replace(result, matches={}).json()

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from rig.report.effects import effects_parts
-from rig.report.scatter import scatter_part
-from rig.report.table import aligned
+from rig.report.columns import aligned
+from rig.report.parts import effects_parts, scatter_part
 
 
 def q(value: float, u: float) -> dict[str, float]:

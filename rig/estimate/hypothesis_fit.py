@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.estimate.forms import Form
+    from rig.estimate.quadratic_forms import QuadraticForm
 
     Array = NDArray[np.float64]
 
@@ -52,16 +52,17 @@ class Hypothesis(NamedTuple):
     parameters
         Their vector is the argument of `targets`.
     targets
-        From a drop and the parameters, α of every rod and the extras of `rig.estimate.forms`, shape
-        ``(n,)``, with the derivatives, shape ``(n, parameters)``.
+        From a drop and the parameters, α of every rod and the extras of
+        `rig.estimate.quadratic_forms`, shape ``(n,)``, with the derivatives, shape
+        ``(n, parameters)``.
     """
 
     parameters: tuple[Parameter, ...]
-    targets: Callable[[Form, Array], tuple[Array, Array]]
+    targets: Callable[[QuadraticForm, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class HypothesisFit:
     """A hypothesis where it fits best.
 
     Attributes
@@ -92,7 +93,7 @@ class Outcome:
         return name in self.names
 
 
-def fit(forms: Sequence[Form], hypothesis: Hypothesis) -> Outcome:
+def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit:
     """Find the parameters at which the edges of all drops are most likely (Gauss–Newton).
 
     Parameters
@@ -141,5 +142,5 @@ def fit(forms: Sequence[Form], hypothesis: Hypothesis) -> Outcome:
         if float(np.abs(step / sd).max()) < _DONE:
             names = tuple(one.name for one in parameters)
             volume = -0.5 * float(np.linalg.slogdet(total)[1])
-            return Outcome(names, values, covariance[shared:, shared:], chi2, volume)
+            return HypothesisFit(names, values, covariance[shared:, shared:], chi2, volume)
     raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")

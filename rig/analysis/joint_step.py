@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.normal import STRAY, Normal, normal
+from rig.analysis.equations import STRAY, NormalEquations, normal_equations, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Joint:
+class DropState:
     """One drop on the way.
 
     Attributes
@@ -30,10 +30,10 @@ class Joint:
     model, matches, x
         Its equations and unknowns.
     own, common, here
-        As in `rig.analysis.learn.Taught`.
+        As in `rig.analysis.joint_fit.JointDrop`.
     centre
         Prior means of its own unknowns, zero if not given.
-    part
+    reduced
         Its equations at the last step.
     """
 
@@ -44,10 +44,10 @@ class Joint:
     common: Index
     here: Index
     centre: Array | None = None
-    part: Part | None = None
+    reduced: Reduced | None = None
 
 
-class Part(NamedTuple):
+class Reduced(NamedTuple):
     """A drop's equations with its own unknowns o eliminated, all in units of prior uncertainties.
 
     Attributes
@@ -56,7 +56,7 @@ class Part(NamedTuple):
         A⁻¹ of the drop's own unknowns, prior included.
     gain
         G = A⁻¹B: o = o₀ − G c.
-    reduced, vector
+    matrix, vector
         What the drop says of c: N_cc − BᵀG, and the right-hand side.
     own
         o₀.
@@ -64,13 +64,13 @@ class Part(NamedTuple):
 
     inverse: Array
     gain: Array
-    reduced: Array
+    matrix: Array
     vector: Array
     own: Array
 
 
 def joint_step(
-    drops: Sequence[Joint],
+    drops: Sequence[DropState],
     x: Array,
     sd: Array,
     centre: Array | None = None,
@@ -85,7 +85,7 @@ def joint_step(
     centre
         Prior means of the common unknowns, zero if not given.
     cut
-        As for `rig.analysis.normal.normal`.
+        As for `rig.analysis.equations.normal_equations`.
 
     Returns
     -------
@@ -95,21 +95,21 @@ def joint_step(
     total = np.eye(x.size)
     vector = scaled(-x if centre is None else centre - x, sd)
     for drop in drops:
-        found = normal(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=cut)
-        drop.part = part = _eliminate(drop, found)
-        total[np.ix_(drop.here, drop.here)] += part.reduced
-        vector[drop.here] += part.vector
+        found = normal_equations(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=cut)
+        drop.reduced = reduced = _eliminate(drop, found)
+        total[np.ix_(drop.here, drop.here)] += reduced.matrix
+        vector[drop.here] += reduced.vector
     covariance = np.linalg.inv(total).astype(np.float64, copy=False)
     step = covariance @ vector
     for drop in drops:
-        assert drop.part is not None
+        assert drop.reduced is not None
         scale = drop.model.unknowns.sd[drop.own]
-        drop.x[drop.own] += scale * (drop.part.own - drop.part.gain @ step[drop.here])
+        drop.x[drop.own] += scale * (drop.reduced.own - drop.reduced.gain @ step[drop.here])
         drop.x[drop.common] = (x + step * sd)[drop.here]
     return covariance, step
 
 
-def _eliminate(drop: Joint, found: Normal) -> Part:
+def _eliminate(drop: DropState, found: NormalEquations) -> Reduced:
     """Solve for the drop's own unknowns, given the common ones."""
     own, common = drop.own, drop.common
     sd = drop.model.unknowns.sd
@@ -120,15 +120,10 @@ def _eliminate(drop: Joint, found: Normal) -> Part:
     gain = inverse @ cross
     off = drop.x[own] if drop.centre is None else drop.x[own] - drop.centre
     pull = -found.vector[own] - scaled(off, sd[own])
-    return Part(
+    return Reduced(
         inverse,
         gain,
         found.matrix[np.ix_(common, common)] - cross.T @ gain,
         -found.vector[common] - gain.T @ pull,
         inverse @ pull,
     )
-
-
-def scaled(x: Array, sd: Array) -> Array:
-    """In units of the prior uncertainty; what is known exactly stays."""
-    return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
