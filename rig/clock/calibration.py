@@ -11,6 +11,7 @@ import numpy as np
 from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.clock.samples import HostTime, one_axis, samples
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -172,6 +173,7 @@ class Calibrator:
     def __init__(self) -> None:
         self._pings = samples(())
 
+    @one_thread
     def look(self, session: ClockLog, reference_u: float) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now.
 
