@@ -101,8 +101,10 @@ def _said(
                 "name": name,
                 "u_run": expected.typical(name),
                 "inclines": [
-                    {"incline_deg": incline, "u_run": u, "u_mean": expected.mean[name][incline]}
-                    for incline, u in single.items()
+                    {"incline_deg": incline}
+                    | ({} if struck is None else {"impact_chain": struck})
+                    | {"u_run": u, "u_mean": expected.mean[name][incline, struck]}
+                    for (incline, struck), u in single.items()
                 ],
             }
             for name, single in expected.single.items()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.summary import by_case
 from rig.design.cases import BEAM
 from rig.estimate.coefficients import KNOWN, described, given_alphas
 from rig.estimate.hypotheses import alphas
@@ -33,13 +34,14 @@ class Forecast:
     ----------
     single, mean
         Of a measurand in one run, and of its mean over an incline's runs with what makes the runs
-        themselves differ, in the light of the whole session; by JSON name, then by incline.
+        themselves differ, in the light of the whole session; by JSON name, then by incline and,
+        where chains are unlike, the one that strikes.
     coefficients
         Of the coefficients that the edges tell, by name; without any prior.
     """
 
-    single: Mapping[str, Mapping[float, float]]
-    mean: Mapping[str, Mapping[float, float]]
+    single: Mapping[str, Mapping[tuple[float, str | None], float]]
+    mean: Mapping[str, Mapping[tuple[float, str | None], float]]
     coefficients: Mapping[str, float]
 
     def typical(self, name: str) -> float:
@@ -80,10 +82,11 @@ def forecast(
     for part in parts:
         total[part.grid] += part.case.count * part.without_alpha
     covariance = np.linalg.inv(total)  # once a layout, then asked by every measurand and incline
-    single: dict[str, dict[float, float]] = {}
-    mean: dict[str, dict[float, float]] = {}
-    for incline in dict.fromkeys(part.case.run.incline_deg for part in parts):
-        here = [part for part in parts if part.case.run.incline_deg == incline]
+    single: dict[str, dict[tuple[float, str | None], float]] = {}
+    mean: dict[str, dict[tuple[float, str | None], float]] = {}
+    for here in by_case(protocol, parts, lambda part: part.case.run):
+        run = here[0].case.run
+        at = run.incline_deg, protocol.striker(run)
         n = sum(part.case.count for part in here)
         for name in here[0].spreads:
             alone, together, common = 0.0, 0.0, np.zeros(size)
@@ -97,9 +100,9 @@ def forecast(
                 alone += share * (own + float(shared @ covariance @ shared))
                 together += share * (own + float(chance @ chance)) / n
                 common += share * shared
-            single.setdefault(name, {})[incline] = math.sqrt(alone)
+            single.setdefault(name, {})[at] = math.sqrt(alone)
             both = together + float(common @ covariance @ common)
-            mean.setdefault(name, {})[incline] = math.sqrt(both)
+            mean.setdefault(name, {})[at] = math.sqrt(both)
     return Forecast(single, mean, _coefficients(protocol, parts, size, sure=sure))
 
 

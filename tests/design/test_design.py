@@ -18,6 +18,7 @@ from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.quadratic_forms import merged
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Gates, Plan, Protocol
+from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, UNIFORM, Case, case
 from tests.analysis.sessions import analysis as analyzed
@@ -62,9 +63,9 @@ def expected():
 def test_the_forecast_is_what_a_session_then_states(expected):
     """Same scatter, same plan: only edges that were missed are in one and not in the other."""
     for result in analysis(INCLINES).runs:
-        for name, by_incline in expected.single.items():
+        for name, by_case in expected.single.items():
             stated = result.quantities[name].u
-            assert by_incline[result.run.incline_deg] == pytest.approx(stated, rel=0.1), name
+            assert by_case[result.run.incline_deg, None] == pytest.approx(stated, rel=0.1), name
 
 
 def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected):
@@ -83,10 +84,23 @@ def test_more_runs_tell_more_but_not_of_what_is_common():
     for name in ("restitution", "friction"):
         assert many.coefficients[name] < 0.5 * one.coefficients[name]
     for incline in INCLINES:
-        assert many.mean["speed_m_s"][incline] < 0.5 * one.mean["speed_m_s"][incline]
-        assert many.mean["separation_m"][incline] < one.mean["separation_m"][incline]
+        at = incline, None
+        assert many.mean["speed_m_s"][at] < 0.5 * one.mean["speed_m_s"][at]
+        assert many.mean["separation_m"][at] < one.mean["separation_m"][at]
         # Beam heights are off by as much in every run.
-        assert many.mean["separation_m"][incline] > 0.2 * one.mean["separation_m"][incline]
+        assert many.mean["separation_m"][at] > 0.2 * one.mean["separation_m"][at]
+
+
+def test_unlike_chains_have_forecasts_of_their_own():
+    """B is given an α twice that of A at 50°: its strike ends faster, and V is known less well."""
+    b = UNIFORM.chains["B"]
+    given = replace(b, chain=replace(b.chain, alpha=Quantity(0.25, 0.02)))
+    protocol = replace(UNIFORM, chains={**UNIFORM.chains, "B": given}, plan=Plan((50.0,), 4))
+    beams = beams_of(protocol)
+    found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)))
+    for by_striker in (found.single["speed_m_s"], found.mean["speed_m_s"]):
+        assert set(by_striker) == {(50.0, "A"), (50.0, "B")}
+        assert by_striker[50.0, "B"] > by_striker[50.0, "A"]
 
 
 def test_one_incline_tells_no_friction():
