@@ -111,6 +111,7 @@ def adjust(
         y = np.linalg.solve(information, right).astype(np.float64, copy=False)
         last, moved = moved, length(y - before, information)
         previous, chi2, edges = chi2, found.chi2, found.size
+        # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
         calm = chi2 <= edges - x.size
         if calm or (step and abs(chi2 - previous) <= _STEADY * max(chi2, 1.0)):

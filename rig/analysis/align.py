@@ -23,11 +23,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
+# Both together are the worth of a match: an edge 6 widths off is better called extra and missed.
 MISSED = 9.0
 """Cost of an expected edge that was not seen, in units of ½ (residual/scale)²."""
 EXTRA = 9.0
 """Cost of an edge that belongs to no rod."""
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # the way back through the table meets sums made in another order
 
 
 def align(
@@ -95,6 +96,7 @@ def _costs(
     expected = np.full((gates.size, 2, wide), np.inf)  # of either polarity
     expected[gate, blocks.astype(np.intp), place] = np.concatenate(levels)
     blocked = np.concatenate([train.blocked for train in trains])
+    # One row of expected levels a gate and polarity: an unlike polarity costs infinity by itself.
     like = 2 * np.repeat(gates, sizes[1]) + blocked
     times = np.concatenate([train.times for train in trains]) * (1.0 + clock)
     distance = expected.reshape(2 * gates.size, wide)[like]
@@ -137,6 +139,7 @@ def _match(costs: Array, sizes: Index) -> Index:
         left, right = int(later[begin]), int(earlier[begin + length - 1])
         base = gate[begin] * wide
         block = costs[rows[edges], left - base : right - base]
+        # What is left is a few edges: plain lists are quicker here than arrays.
         for row, column in _cheapest(block.tolist()):
             matched[left + column] = number[begin + row]
     return matched

@@ -70,6 +70,7 @@ def diagnose(fit: Fit) -> Diagnosis:
     alive = [one for one in gates if one.train.times.size]
     found: set[int] = set()
     suspect = [gate for gate in alive if gate.odd or gate.off > IMPLAUSIBLE]
+    # Exchanged gates first: each of them alone would look like a gate that sees nonsense.
     for one, other in combinations(suspect, 2):
         if not {one.train.gate, other.train.gate} & found and _exchanged(fit, one, other):
             void.append(exchanged(_gate(fit, one.train), _gate(fit, other.train)))
@@ -153,7 +154,7 @@ def _exchanged(fit: Fit, one: _Seen, other: _Seen) -> bool:
     pairs = ((one, other), (other, one))
     own = one.matched + other.matched + 1
     if max(one.off, other.off) > IMPLAUSIBLE:
-        own = 0
+        own = 0  # beams at impossible heights fit anything: that they fit their own means nothing
     if sum(min(a.match.size, b.train.times.size) for a, b in pairs) <= own:
         return False  # not even if all of them were
     counts = []
@@ -220,6 +221,7 @@ def _more(fit: Fit, role: str, gates: Sequence[_Seen]) -> int:
     chain = fit.model.records[role].chain
     places = chain.chain.heights
     enough = max(_ENOUGH, len(gates) / 2)
+    # A further rod leaves two edges at each gate, evenly spaced above the top one.
     left = [gate for gate in gates if gate.train.times.size - gate.matched > 1]
     if len(places) < 2 or len(left) < enough:
         return 0
@@ -306,6 +308,7 @@ def _plugs(protocol: Protocol, record: ChainRecord) -> list[str]:
     tried.sort(key=lambda one: -one[0].share)
     if not tried or not _convincing(tried[0][0]):
         return []
+    # Two exchanges that explain it as well explain nothing.
     if len(tried) > 1 and tried[0][0].share - tried[1][0].share < _LEAD:
         return []
     gates = protocol.gates.gates

@@ -102,6 +102,7 @@ class DropModel:
         }
         self.unknowns = self._unknowns()
         self._local = {role: self._columns(role) for role in self.records}
+        # The last path and the last matches of each side: nothing older is asked for again.
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
         self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
 
@@ -125,6 +126,7 @@ class DropModel:
         for role, record in self.records.items():
             chain = record.chain
             places = [components.rods * chain.position_u] * chain.chain.rods
+            # Told by the edges alone, so its uncertainty counts as theirs.
             unknowns.add(f"{role} release", "edges", ANYTHING)
             unknowns.add(f"{role} hang", "hanging height", components.hang)
             unknowns.add(f"{role} rods", "rod places", places)
@@ -173,6 +175,7 @@ class DropModel:
             struck = guesses["impact"]
             guesses["impact"] = replace(struck, alpha=struck.alpha + float(x[at][0]))
             x[at] = 0.0
+        # Columns and matched edges stay: only priors and where α is counted from are others.
         other = copy(self)
         other.components, other.clock_u, other.guesses = components, clock_u, guesses
         other.unknowns = other._unknowns()
@@ -193,6 +196,7 @@ class DropModel:
         """Unknowns as the first guess has them, shape ``(unknowns,)``."""
         x = np.zeros(len(self.unknowns))
         starts = [guess.start for guess in self.guesses.values()]
+        # Their mean: how much lower each one hangs begins at zero.
         x[self.unknowns["drop"]] = sum(starts) / len(starts) - self.protocol.drop.value
         if "drag" in self.unknowns:
             x[self.unknowns["drag"]] = max(guess.kappa for guess in self.guesses.values())
@@ -295,6 +299,7 @@ class DropModel:
         slopes = np.zeros((times.size, local.columns.size))
         slopes[:, : local.moving] = moved
         row = np.arange(times.size)
+        # Of a slow clock the true time is later, and the chain lower by then.
         slopes[:, local.at[at["clock"].start]] -= speed * seen.times
         slopes[row, local.at[at[f"{role} rods"].start + seen.rods]] += 1.0
         slopes[:, local.at[at[f"{role} width"].start]] += seen.sign

@@ -91,6 +91,7 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
             if (match < 0).any():
                 found += _absent(gate.channel, train, match, path.times(levels) / clock)
             if train.times.size > (match >= 0).sum():
+                # Only the lowest beam is near enough to what bounces.
                 after = _first_hit(record, path) / clock if gate.height == lowest else np.inf
                 found += _surplus(gate.channel, train, match, after)
     return tuple(sorted(found, key=lambda edge: edge.time_s))
@@ -128,6 +129,7 @@ def _surplus(channel: int, train: EdgeTrain, match: Index, hit: float) -> Iterat
     """Reported edges that belong to no rod."""
     rods = np.full(train.times.size, -1)
     rods[match[match >= 0]] = train.rods[match >= 0]
+    # Edges that follow each other so quickly are of one flicker, and share its number.
     flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
     for at in np.flatnonzero(rods < 0).tolist():
         when, blocked = float(train.times[at]), bool(train.blocked[at])

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 STATED_WEIGHT = 1.0
 """Members that a stated uncertainty counts for."""
-_INNER = 40
+_INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
 
 
@@ -67,6 +67,7 @@ class Evidence:
         y, v
             Estimates and variances in units of the prior uncertainties `sd`.
         """
+        # Clock, gravity, drop and air are one number each: one number has no scatter to estimate.
         kind = {"beams": "gates", "ripple": "beam"}.get(name)
         if name.endswith(" rods"):
             kind = "rods"
@@ -80,6 +81,7 @@ class Evidence:
             self._count("hang", y[at[f"{role} hang"]], v[at[f"{role} hang"]])
         if "impulses" in at:
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
+            # Back to α², for drops of different α have different units.
             variance = self.components.impulses(alpha) ** 2
             self._impulses.append(
                 (alpha**2, float(y[block] @ y[block]) * variance, float(np.sum(1.0 - v[block])))
@@ -115,6 +117,7 @@ class Evidence:
             sizes, squares, counts = np.array(self._impulses).T
             self._pair("impulse", "impulse_floor", (squares, counts, sizes), new)
         squares, speeds = (np.concatenate(parts) for parts in zip(*self._edges, strict=True))
+        # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
         free = max(0.5, 1.0 - parameters / max(1, squares.size))
         # Edges at about the same speed scatter alike: few bins do as well as all of them.
         counts, edges = np.histogram(speeds, _BINS)

@@ -69,6 +69,7 @@ def settle(model: DropModel) -> Fit:
     """Match and adjust in turn until that moves the chain no more."""
     x = model.first()
     matches = match(model, x, _COARSE)
+    # Not to the end: the matches are about to change.
     estimate = adjust(model, matches, x, done=_NEAR)
     for _ in range(_ROUNDS):
         x = estimate.x

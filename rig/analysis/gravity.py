@@ -132,12 +132,13 @@ def free_gravity(
     channel = np.array([edge.channel for edge, _ in pairs])
     side = np.array([0.5 if edge.blocked else -0.5 for edge, _ in pairs])
     time = np.array([edge.tick for edge, _ in pairs]) / scale.hz
-    time -= time.mean()
+    time -= time.mean()  # else height and speed at time zero are nearly one unknown
     beam = np.array([gates[edge.channel].height for edge, _ in pairs])
     height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
     design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
     top, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
     sigma = np.hypot(_EDGE_M, (speed - fall * time) * _EDGE_S)
+    # The parabola's vertex is the release: where and when the speed was zero.
     point = np.array([top + speed**2 / (2.0 * fall), speed / fall, fall, 0.0])  # h, t, g and κ
     turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
     ripple = _BEAM_M * math.tan(math.radians(chain.tilt_deg))
@@ -156,6 +157,7 @@ def free_gravity(
     prior = np.concatenate(
         [[0.0, 0.0, 0.0, DRAG_U**-2 if air else _FIXED], np.ones(common.shape[1])]
     )
+    # The parabola is near enough for a few steps; a check needs no test of whether they end.
     for _ in range(_STEPS):
         at, release, g, kappa = point
         since = np.maximum(time - release, 0.0)

@@ -39,7 +39,7 @@ FEWEST = 4
 IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""
 _ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
-_REMATCH = 2  # rounds after which all edges are matched again
+_REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
 _DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
 _LEAST = {"floor": 5e-6}  # where others of its kind count for more
@@ -152,6 +152,7 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit:
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
         for drop in drops:
+            # Priors follow the scatter that was found, and impulses the α that was found.
             drop.model = drop.model.informed(evidence.components, clock_u, drop.x)
             drop.x[drop.common] = x[drop.here]
             if round_ == _REMATCH:
@@ -172,7 +173,7 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit:
         x,
         sd,
         covariance,
-        before,
+        before,  # those that the solution was made with
         evidence.degrees,
         tuple(_jointly_fitted(drop) for drop in drops),
         settled,
@@ -212,6 +213,7 @@ def _weigh(
         assert drop.reduced is not None
         reduced, model = drop.reduced, drop.model
         common = covariance[np.ix_(drop.here, drop.here)]
+        # The variance of an own unknown: with the common ones known, and what these leave open.
         left = np.diag(reduced.inverse) + np.sum((reduced.gain @ common) * reduced.gain, axis=1)
         own_sd = model.unknowns.sd[drop.own]
         parameters += float(np.sum((1.0 - left)[own_sd > 0.0]))

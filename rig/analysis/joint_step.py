@@ -99,12 +99,14 @@ def joint_step(
         drop.reduced = reduced = _eliminate(drop, found)
         total[np.ix_(drop.here, drop.here)] += reduced.matrix
         vector[drop.here] += reduced.vector
+    # The inverse itself is wanted: variances of all common unknowns, of every drop, from each step.
     covariance = np.linalg.inv(total).astype(np.float64, copy=False)
     step = covariance @ vector
     for drop in drops:
         assert drop.reduced is not None
         scale = drop.model.unknowns.sd[drop.own]
         drop.x[drop.own] += scale * (drop.reduced.own - drop.reduced.gain @ step[drop.here])
+        # Its copy of the common unknowns follows, so that the next equations are made there.
         drop.x[drop.common] = (x + step * sd)[drop.here]
     return covariance, step
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PROBABILITY = 0.95
-_SESSION_STEPS = 3
+_SESSION_STEPS = 3  # from the solution itself: a trial moves it by about one σ
 _END = 2.7
 """Standard error of the end of a 95 % interval from M trials, in units of u/√M: the quantile of a
 normal distribution, √(p(1 − p))/density at p = 0.025."""
@@ -80,6 +80,7 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     model, at = fit.model, fit.estimate.x
     sd = model.unknowns.sd
     shifts = _scatter(fit)
+    # A restless drop was weighed by its own scatter, so that is what its edges are shaken by.
     for role in shifts:
         shifts[role] *= fit.estimate.scatter
     found: dict[str, list[float]] = {}
@@ -182,5 +183,5 @@ def _scatter(drop: Fit | JointDrop) -> dict[str, Array]:
         expected = drop.model.expected[role]
         _, edges = expected.chosen(matches)
         found[role] = np.zeros(expected.times.size)
-        found[role][edges] = rows.sigma / rows.speed
+        found[role][edges] = rows.sigma / rows.speed  # m at the beam are s in the stamp
     return found

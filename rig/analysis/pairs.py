@@ -28,7 +28,7 @@ SIGNS = (0.5, -0.5, -0.5, 0.5)
 """Of the four runs of a block, in the difference."""
 MEANS = (0.25, 0.25, 0.25, 0.25)
 """The same in the mean."""
-_REST = np.array([-1.0, 3.0, -3.0, 1.0])
+_REST = np.array([-1.0, 3.0, -3.0, 1.0])  # orthogonal to a mean, a linear drift, and A less B
 _CHAINS_OWN = ("rod places", "rod width")  # lines of a budget that are not the same for both
 
 Block = tuple["DropResult", "DropResult", "DropResult", "DropResult"]
@@ -127,6 +127,7 @@ def _contrast(blocks: Sequence[Block], name: str, signs: Sequence[float]) -> Mea
     n = len(blocks)
     size = float(weights @ weights)
     # Within a block one sum is left that knows of no chain and no linear drift.
+    # Its square is of the runs' own scatter only: one more degree of freedom from each block.
     squares = float(np.sum((values - values.mean()) ** 2))
     squares += size * float(np.sum((runs @ _REST) ** 2)) / float(_REST @ _REST)
     seen = math.sqrt(squares / (2 * n - 1))

@@ -93,7 +93,7 @@ def guess(record: ChainRecord, start: Quantity, gravity: float, air: Air = NO_AI
     """
     places = np.array(record.chain.chain.heights)
     pitch = float(np.diff(places).min()) if places.size > 1 else start.value
-    slack = pitch / 6
+    slack = pitch / 6  # either way: what is a rod off is well outside
     # An impact chain falls freely until its bottom rod is down.
     lowest = -np.inf if record.ratios is None else 0.0
     free = guess_release(record, start, gravity, lowest, slack, air)
@@ -111,7 +111,7 @@ def first_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[st
     # The free chain tells what the air does to both.
     air = Air(0.0, DRAG_U) if air_is_told(records) else NO_AIR
     found: dict[str, Guess] = {}
-    for record in reversed(records):
+    for record in reversed(records):  # the free chain first
         found[record.role] = guess(record, start, gravity, air)
         kappa = found[record.role].kappa
         air = Air(kappa) if abs(kappa) > _FELT else NO_AIR
@@ -137,6 +137,7 @@ def guess_release(
         return Guess(0.0, start.value)
     speed, tau = fall_through(start.value - levels, np.zeros_like(levels), gravity, air.kappa)
     middle = times - tau
+    # A level passed fast tells the moment better; before it moves, a chain tells hardly anything.
     half = np.minimum(slack / np.maximum(speed, slack / _LONGEST), _LONGEST)
     begins = times.size  # the first so many of all ends of votes
     moments = np.concatenate([np.sort(middle - half), np.sort(middle + half)])
@@ -195,6 +196,7 @@ def _refine(
 ) -> tuple[float, float, float]:
     """Fit release time, start height and κ to the pairs that voted for them."""
     offset, kappa = 0.0, air.kappa
+    # Of the release nothing is known; the others are held: early edges hardly tell all three apart.
     prior = np.array([0.0, (_ROUGH / max(start.u, STATED.hang)) ** 2, 0.0])
     prior[2] = (_ROUGH / air.u) ** 2 if air.u else 1.0
     for _ in range(_STEPS):
@@ -202,6 +204,7 @@ def _refine(
         still = np.zeros_like(since)
         fallen, speed, _, _, by_kappa = leg_slopes(since, still, gravity, kappa)
         residual = start.value + offset - fallen - levels
+        # Votes by chance are among the voters: beyond 2 mm they pull no harder than at 2 mm.
         weight = np.minimum(1.0, 2.0 * _ROUGH / np.maximum(np.abs(residual), _ROUGH))
         slopes = np.stack([speed, np.ones_like(since), -by_kappa if air.u else still])
         right = slopes @ (weight * residual) + prior * [0.0, offset, kappa if air.u else 0.0]
@@ -225,6 +228,7 @@ def _alpha(
     leg = np.clip((time <= end).sum(axis=0) - 1, 0, None)
     since = end - time[leg, range(ALPHAS.size)]
     at = height[leg] - fall_for(since, speed[leg, range(ALPHAS.size)], gravity, free.kappa)[0]
+    # Neighbouring α give the same edges the same rods: only another matching is another answer.
     different = np.abs(at - at[best]) > pitch / 2
     return replace(
         free,

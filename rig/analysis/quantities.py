@@ -93,6 +93,8 @@ def _separation(model: DropModel, x: Array) -> Value | None:
         return None
     struck = model.trajectory("impact", x)
     hit, d_hit = float(struck.time[-1]), model.spread("impact", struck.d_time[-1])
+    # The free chain is read off where it was as long after its own release: no model of what it
+    # would have done comes in.
     return _apart(model, x, hit + skew[0], d_hit + skew[1])
 
 
@@ -106,7 +108,7 @@ def _apart(model: DropModel, x: Array, when: float, d_when: Array) -> Value:
     top = model.records["free"].chain.chain.length + float(x[at["free rods"]][-1])
     height, speed = free.heights(np.array([when]))
     gradient = model.spread("free", free.derivatives(np.array([when])))[0]
-    gradient[at["free rods"].stop - 1] += 1.0
+    gradient[at["free rods"].stop - 1] += 1.0  # the top rod is measured, not the reference point
     return float(height[0]) + top, gradient - float(speed[0]) * d_when
 
 

@@ -49,6 +49,8 @@ class Budgets:
     def __init__(self, joint: JointFit) -> None:
         self.joint = joint
         size = len(joint.shared)
+        # h·C·h is |h·L|²: with the vector h·L kept of every measurand, covariances between drops
+        # are plain products, and signs that cancel when chains change places are not lost.
         self._root = np.linalg.cholesky(joint.covariance)
         self._others: dict[str, Array] = {}
         for drop in joint.drops:
@@ -78,11 +80,13 @@ class Budgets:
         variance = float(gradient[drop.own] @ alone) + float(shared @ shared)
         lines: dict[str, float] = {}
         for name, rows in places[0].items():
+            # The sum over all drops was made once; this drop's share is replaced by its own rows.
             here = drop.gain[rows] @ common[drop.here]
             others = float(common @ self._others[name] @ common) - float(here @ here)
             lines[name] = float(own[rows] @ own[rows]) + max(0.0, others)
         for name, rows in places[1].items():
             lines[name] = lines.get(name, 0.0) + float(common[rows] @ common[rows])
+        # What no prior explains comes from the edges; rounding may leave less than nothing.
         lines["edges"] = lines.get("edges", 0.0) + max(0.0, variance - sum(lines.values()))
         budget = {name: math.sqrt(line) for name, line in lines.items() if line > 0.0}
         u = math.sqrt(variance)
@@ -90,7 +94,7 @@ class Budgets:
 
     def _degrees(self, u: float, budget: dict[str, float]) -> float:
         """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4)."""
-        degrees = self.joint.degrees
+        degrees = self.joint.degrees  # lines without any are stated, and taken as known exactly
         share = sum(
             (line / u) ** 4 / degrees[_DEGREES[name]]
             for name, line in budget.items()

@@ -48,6 +48,7 @@ class Measured:
     @property
     def expanded(self) -> float:
         """Expanded uncertainty for 95 %."""
+        # Effective degrees of freedom may come out below one, where t has no quantile of use.
         return coverage_factor(max(1.0, self.degrees)) * self.u
 
     def json(self) -> dict[str, float]:

@@ -147,12 +147,14 @@ def mean(runs: Sequence[Measured]) -> Measured:
         return replace(run, budget={"runs": alone, "common": common}, shared=None)
     n = len(runs)
     common, each = _common(runs)
+    # Of a run's u² what all share is taken out: averaging does not reduce it, and it is added last.
     own = math.sqrt(
         fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
     )
     seen = stdev(run.value for run in runs)
     single = max(own, seen) / math.sqrt(n)
     u = math.hypot(single, common)
+    # The run that knows its own uncertainty least speaks for all.
     known = min(max(1.0, run.degrees) for run in runs)
     share = single**4 / (n - 1.0 if seen > own else known) + common**4 / known
     return Measured(

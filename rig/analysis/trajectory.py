@@ -210,6 +210,7 @@ def struck_trajectory(
     height[0] = start
     np.negative(places, out=height[1:])
     distance = height[:-1] - height[1:]
+    # Each leg needs the speed after the one before: a loop over floats is quicker than numpy here.
     now, speed = release, 0.0
     time, speeds, arrivals = [now], [speed], []
     for fallen, more in zip(distance.tolist(), gain.tolist(), strict=True):
@@ -238,6 +239,7 @@ def _struck_slopes(path: Trajectory) -> Slopes:
     places, gain = COMMON + rods + row, COMMON + row
     factor, arrival = 1.0 + hits.gain, hits.arrival
     left = np.exp(-2.0 * kappa * hits.distance)
+    # In row k and column j of the product: what is left at impact k of E_j.
     steps = np.ones((rods, rods))
     kept = left[1:] * factor[:-1] ** 2
     steps[1:] = np.where(row[1:, None] > row, kept[:, None], 1.0)

@@ -124,6 +124,7 @@ class SharedUnknowns:
 def _names(model: DropModel) -> dict[str, slice]:
     """Blocks of one drop that are common, by the name they have for all."""
     at = model.unknowns
+    # Where gravity is the result, each drop measures it for itself, and runs are averaged.
     measured = {"gravity"} if model.protocol.surface is None else set()
     found = {name: at[name] for name in _RIG if name in at and name not in measured}
     for role, record in model.records.items():

@@ -164,6 +164,7 @@ def cases(
     for name in _BEAMS:
         if name in shared.blocks:
             kept[shared.blocks[name]] = False
+    # Beams are left out here and added by each layout: the rest is worked out once for all.
     number = np.cumsum(kept) - 1
     found = [
         _case(first[kind], kinds[kind], model, x, shared, kept, number)
@@ -244,6 +245,7 @@ def _case(
         if name in at:
             beam[at[name]] = True
     alpha = np.arange(at["alpha"].start, at["alpha"].stop) if "alpha" in at else np.zeros(0, int)
+    # Own first, then common, then α, as `Case` has them: eliminated from the front.
     common = mine[kept[here]]
     own = np.setdiff1d(np.flatnonzero(~beam), np.append(common, alpha))
     order = np.concatenate([own, common, alpha])

@@ -79,7 +79,7 @@ def forecast(
     total = np.eye(size)
     for part in parts:
         total[part.grid] += part.case.count * part.without_alpha
-    covariance = np.linalg.inv(total)
+    covariance = np.linalg.inv(total)  # once a layout, then asked by every measurand and incline
     single: dict[str, dict[float, float]] = {}
     mean: dict[str, dict[float, float]] = {}
     for incline in dict.fromkeys(part.case.run.incline_deg for part in parts):
@@ -89,6 +89,7 @@ def forecast(
             alone, together, common = 0.0, 0.0, np.zeros(size)
             for part in here:
                 share = part.case.count / n
+                # Own variance and slopes by what the session has in common, at this layout.
                 own, slopes = part.spreads[name]
                 shared = np.zeros(size)
                 shared[part.place] = slopes

@@ -142,6 +142,7 @@ def better(
                     trial = score(protocol, found, [*layout[:slot], n, *layout[slot + 1 :]])
                     if trial >= best - _WORTH:
                         continue
+                    # Only now: whether it can be read takes a pattern search for each chain.
                     proposed = [beams[one] for one in (*layout[:slot], n, *layout[slot + 1 :])]
                     if _held(protocol, proposed) and margin(protocol, proposed) >= floor:
                         best, layout[slot] = trial, n

@@ -71,6 +71,7 @@ def _compared(
         axis=1,
     ) / 2.0  # fmt: skip
     measured = np.diag(single) + shared @ shared.T
+    # Half the difference of two predictions is one input's part; outer products add them up.
     covariance = measured + slopes @ slopes.T
     off = np.array([one.value for one in means]) - predicted
     chi2 = float(off @ np.linalg.solve(covariance, off))

@@ -101,6 +101,7 @@ def _with_band(
         ],
         axis=1,
     )
+    # A prior of "anything" is too far to step: a thousandth was stepped, and is scaled back here.
     slopes[:, sd >= 1.0] *= 1e3 * sd[sd >= 1.0]
     if isinstance(drop, Fit) or joint is None:
         assert isinstance(drop, Fit)

@@ -133,8 +133,10 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
             slope[form.here] += pull[:n] + form.vector[:n]
             slope[shared:] += by_parameters.T @ (pull[n:] + form.vector[n:])
             total[form.here, shared:] += form.matrix[:n, n:] @ by_parameters
+            # The targets are taken as linear: where the fit is good, their curvature counts little.
             total[shared:, shared:] += by_parameters.T @ form.matrix[n:, n:] @ by_parameters
         total[shared:, :shared] = total[:shared, shared:].T
+        # A few tens of unknowns: the inverse costs little, and its diagonal says when to stop.
         covariance = np.linalg.inv(total).astype(np.float64, copy=False)
         step = -covariance @ slope
         c, values = c + step[:shared], values + step[shared:]

@@ -95,6 +95,7 @@ def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisF
     nodes = _nodes(*_around(centre[MU], priors[MU].prior))
     logs, means, sds = [], [], []
     for mu in nodes.tolist():
+        # The node holds μ; what was known of it is counted below, not twice.
         fixed = {**priors, MU: Parameter(MU, mu, (mu, _EXACT))}
         at = fit(found.forms, nuisances(protocol, found, model(protocol, [*fixed.values()])))
         prior = priors[MU].prior
@@ -103,7 +104,7 @@ def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisF
         pairs = np.array([at[name] for name in names])
         means.append(pairs[:, 0])
         sds.append(pairs[:, 1])
-    weights = np.exp(np.array(logs) - max(logs))
+    weights = np.exp(np.array(logs) - max(logs))  # of the largest: no exponent overflows
     widths = np.array(sds)
     widths[:, names.index(MU)] = 0.5 * (nodes[1] - nodes[0])
     return Posterior(names, weights / weights.sum(), np.array(means), widths)

@@ -108,6 +108,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     scale[impulses] = 1.0
     left = normal[np.ix_(own, own)] * np.outer(sd[own], sd[own]) + np.eye(own.size)
     cross = normal[np.ix_(own, kept)] * np.outer(sd[own], scale[kept])
+    # Matrix and vector in one solution: the same factors serve both.
     gain = np.linalg.solve(left, np.column_stack([cross, vector[own] * sd[own]]))
     path = model.trajectory("impact", x)
     return QuadraticForm(
@@ -118,7 +119,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
         normal[np.ix_(kept, kept)] * np.outer(scale[kept], scale[kept]) - cross.T @ gain[:, :-1],
         vector[kept] * scale[kept] - cross.T @ gain[:, -1],
         constant - float(vector[own] * sd[own] @ gain[:, -1]),
-        float(at.sd[impulses[0]]),
+        float(at.sd[impulses[0]]),  # one prior for all of them
         alphas,
         path.speed[1:] / (1.0 + alphas * record.ratios),
         edges,
