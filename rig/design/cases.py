@@ -185,35 +185,35 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
     Returns
     -------
     list
-        Sides with their trains, and α of each rod, shape ``(rods,)``; empty for a free chain.
+        Records with their trains, and α of each rod, shape ``(rods,)``; empty for a free chain.
     """
     found = []
     start, gravity = protocol.drop.value - lower, protocol.gravity.value
-    for side in chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
+    for record in chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
         path, alphas = free_trajectory(RELEASE_S, start, gravity), np.zeros(0)
-        if side.ratios is not None:
+        if record.ratios is not None:
             assert protocol.surface is not None
-            impacts = rod_impacts(protocol.surface, side.chain.chain, run.incline_deg)
+            impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
             alphas = np.array([one.alpha for one in impacts])
-            places = np.array(side.chain.chain.heights)
-            path = struck_trajectory(RELEASE_S, start, gravity, alphas, side.ratios, places)
-        trains = tuple(_seen(train, path.times(train.levels)) for train in side.trains)
-        found.append((replace(side, trains=trains), alphas))
+            places = np.array(record.chain.chain.heights)
+            path = struck_trajectory(RELEASE_S, start, gravity, alphas, record.ratios, places)
+        trains = tuple(_seen(train, path.times(train.levels)) for train in record.trains)
+        found.append((replace(record, trains=trains), alphas))
     return found
 
 
 def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
     """The equations of the drop as the model predicts it."""
-    sides = perfect(protocol, run)
+    records = perfect(protocol, run)
     guesses: dict[str, Guess] = {
-        side.role: Guess(
+        record.role: Guess(
             RELEASE_S, protocol.drop.value, float(alphas.mean()) if alphas.size else 0.0
         )
-        for side, alphas in sides
+        for record, alphas in records
     }
-    model = DropModel(protocol, [side for side, _ in sides], guesses, CLOCK_U, components)
+    model = DropModel(protocol, [record for record, _ in records], guesses, CLOCK_U, components)
     x = np.zeros(len(model.unknowns))
-    for _, alphas in sides:
+    for _, alphas in records:
         if alphas.size:
             x[model.unknowns["impulses"]] = alphas - alphas.mean()
     return model, x
@@ -252,8 +252,8 @@ def _case(
     place = np.full(len(at), -1)
     place[order] = np.arange(order.size)
     blocks: dict[int, Block] = {}
-    for role, side in model.records.items():
-        blocks |= _blocks(model, side, role, x, place)
+    for role, record in model.records.items():
+        blocks |= _blocks(model, record, role, x, place)
     chance = [place[at[name]] for name in at.blocks if name.endswith(_CHANCE)]
     return Case(
         run,
@@ -271,18 +271,18 @@ _BLIND = Block(np.zeros(0, dtype=np.intp), np.zeros((BEAM, BEAM)))
 
 
 def _blocks(
-    model: DropModel, side: ChainRecord, role: str, x: Array, place: Index
+    model: DropModel, record: ChainRecord, role: str, x: Array, place: Index
 ) -> dict[int, Block]:
-    """Split the equations of a side by beam."""
+    """Split the equations of one chain by beam."""
     at, sd = model.unknowns, model.unknowns.sd
-    rows = model.equations(role, x, [np.arange(train.times.size) for train in side.trains])
+    rows = model.equations(role, x, [np.arange(train.times.size) for train in record.trains])
     slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
     gate = model.expected[role].gate
     columns = np.flatnonzero(place[rows.columns] >= 0)
     where = np.full(len(at), -1)
     where[rows.columns] = np.arange(rows.columns.size)
     found = {}
-    for train in side.trains:
+    for train in record.trains:
         own = [where[at[name].start + train.gate] for name in _BEAMS if name in at]
         mine = slopes[gate == train.gate]
         part = np.zeros((mine.shape[0], columns.size + BEAM))
