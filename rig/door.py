@@ -22,7 +22,7 @@ from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
 from rig.results import calibration, protocol_of, with_analysis
 from rig.session.export import flatten
-from rig.session.store import Session as SessionFile
+from rig.session.store import Session
 
 if TYPE_CHECKING:
     import os
@@ -37,11 +37,20 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
-__all__ = ["Edges", "Found", "Line", "Prediction", "Run", "Session", "open", "predict",
-           "read_protocol"]  # fmt: skip
+__all__ = [
+    "Edges",
+    "MeanResult",
+    "PredictedIncline",
+    "RecordedSession",
+    "Results",
+    "RunResult",
+    "open",
+    "predict",
+    "read_protocol",
+]
 
 
-def open(path: str | os.PathLike[str]) -> Session:  # noqa: A001 - it is rig.open
+def open(path: str | os.PathLike[str]) -> RecordedSession:  # noqa: A001 - it is rig.open
     """Open a session for reading.
 
     Parameters
@@ -54,7 +63,7 @@ def open(path: str | os.PathLike[str]) -> Session:  # noqa: A001 - it is rig.ope
     SessionError
         If there is no such session, or it cannot be read.
     """
-    return Session(SessionFile.open(path, readonly=True))
+    return RecordedSession(Session.open(path, readonly=True))
 
 
 def read_protocol(path: str | os.PathLike[str]) -> Protocol:
@@ -68,22 +77,23 @@ def read_protocol(path: str | os.PathLike[str]) -> Protocol:
     return reader.read(str(path))
 
 
-def predict(protocol: Protocol) -> list[Prediction]:
+def predict(protocol: Protocol) -> list[PredictedIncline]:
     """Predict each incline of a protocol's plan by the discrete model (Eqs. 8 to 13).
 
     Returns
     -------
-    list of Prediction
+    list of PredictedIncline
         One an incline; of unlike chains one for each that strikes.
     """
     lines: list[dict[str, Any]] = [
-        {name: line.get(name) for name in Prediction.__slots__} for line in predictions(protocol)
+        {name: line.get(name) for name in PredictedIncline.__slots__}
+        for line in predictions(protocol)
     ]
-    return [Prediction(**line) for line in lines]
+    return [PredictedIncline(**line) for line in lines]
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
+class PredictedIncline:
     """What the model says of one incline; `None` is what the scene does not have or tell.
 
     Attributes
@@ -133,10 +143,10 @@ class Edges(NamedTuple):
     blocked: NDArray[np.bool_]
 
 
-class Session:
+class RecordedSession:
     """A session, open for reading; also a context manager."""
 
-    def __init__(self, file: SessionFile) -> None:
+    def __init__(self, file: Session) -> None:
         self._file = file
 
     @property
@@ -149,7 +159,7 @@ class Session:
         """What was planned, as the session keeps it."""
         return protocol_of(self._file)
 
-    def analyze(self, progress: Callable[[int, int], None] | None = None) -> Found:
+    def analyze(self, progress: Callable[[int, int], None] | None = None) -> Results:
         """Compute everything from the raw edges, as `rig analyze` does.
 
         Parameters
@@ -158,7 +168,7 @@ class Session:
             Called with the number of drops done and the number of all.
         """
         said, analysis = with_analysis(self._file, progress)
-        return Found(said, analysis)
+        return Results(said, analysis)
 
     def edges(self, run: int, attempt: int | None = None) -> Edges:
         """Return the recorded edges of a run, by default of its latest attempt.
@@ -239,7 +249,7 @@ class _Quantities:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Run(_Quantities):
+class RunResult(_Quantities):
     """One drop.
 
     Attributes
@@ -260,7 +270,7 @@ class Run(_Quantities):
     reasons: tuple[str, ...] = field(kw_only=True)
 
     @classmethod
-    def _of(cls, one: DropResult) -> Run:
+    def _of(cls, one: DropResult) -> RunResult:
         return cls(
             one.quantities,
             run=one.run.number,
@@ -293,7 +303,7 @@ class Run(_Quantities):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Line(_Quantities):
+class MeanResult(_Quantities):
     """The mean of all good runs at one incline, or of one of two unlike chains there.
 
     Attributes
@@ -312,7 +322,7 @@ class Line(_Quantities):
     predicted: Mapping[str, Quantity] = field(kw_only=True)
 
     @classmethod
-    def _of(cls, one: Incline) -> Line:
+    def _of(cls, one: Incline) -> MeanResult:
         return cls(
             one.means,
             incline_deg=one.incline_deg,
@@ -325,7 +335,7 @@ class Line(_Quantities):
         return f"<{self.incline_deg:g}°, mean of {self.n}: {self._written()}>"
 
 
-class Found:
+class Results:
     """What a session says.
 
     Attributes
@@ -338,8 +348,8 @@ class Found:
 
     def __init__(self, said: dict[str, Any], analysis: Analysis) -> None:
         self._said = said
-        self.runs = tuple(Run._of(one) for one in analysis.runs)
-        self.summary = tuple(Line._of(one) for one in analysis.summary)
+        self.runs = tuple(RunResult._of(one) for one in analysis.runs)
+        self.summary = tuple(MeanResult._of(one) for one in analysis.summary)
 
     def json(self) -> dict[str, Any]:
         """Return what `rig analyze --json` prints."""

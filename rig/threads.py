@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -21,15 +22,15 @@ def one_thread(work: Callable[P, T]) -> Callable[P, T]:
 
     @wraps(work)
     def bounded(*args: P.args, **kwargs: P.kwargs) -> T:
-        with _libraries().limit(limits=1, user_api="blas"):
+        with _libraries("scipy" in sys.modules).limit(limits=1, user_api="blas"):
             return work(*args, **kwargs)
 
     return bounded
 
 
 @cache
-def _libraries() -> Any:
-    """Find the libraries that numpy has loaded; they stay the same from then on."""
+def _libraries(_scipy: bool) -> Any:
+    """Find the libraries that numpy has loaded, and scipy, which brings one of its own."""
     import numpy as np  # noqa: F401, PLC0415 - it is what loads them
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - only with numpy
 
