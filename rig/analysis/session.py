@@ -206,15 +206,18 @@ def _fit_jointly(
     joint = None
     while joint is None and len(good) >= FEWEST:
         joint = joint_fit(list(good.values()))
-        if not joint.settled:  # nobody is to blame for edges that such an adjustment loses
-            joint = None
+        fewer = {
+            n: f"only {drop.matched} of its {fit.matched} edges go with the other runs: {_MOVED}"
+            for (n, fit), drop in zip(good.items(), joint.drops, strict=True)
+            if drop.matched < _KEPT * fit.matched
+        }
+        if not joint.settled or 2 * len(fewer) > len(good):
+            joint = None  # it is the adjustment that fails, and no drop is to blame for that
             break
-        for (n, fit), drop in zip(list(good.items()), joint.drops, strict=True):
-            if drop.matched < _KEPT * fit.matched:
-                why = f"only {drop.matched} of its {fit.matched} edges go with the other runs"
-                found[n] = replace(found[n], reasons=(*found[n].reasons, f"{why}: {_MOVED}"))
-                del good[n]
-                joint = None
+        for n, why in fewer.items():
+            found[n] = replace(found[n], reasons=(*found[n].reasons, why))
+            del good[n]
+            joint = None
     keys = [(results[n].run.number, results[n].attempt) for n in good]
     if joint is None:
         return found, None, dict(zip(keys, good.values(), strict=True))
