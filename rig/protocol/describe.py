@@ -15,6 +15,7 @@ from rig.units import Quantity, format_quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rig.errors import Problem
     from rig.protocol.protocol import Drag, Gate, Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
@@ -167,9 +168,15 @@ def _consequences(protocol: Protocol) -> list[str]:
         f"recorded for {seconds:g} s; the longest fall takes {longest_fall(protocol):.2g} s"
     )
     for word, board in BOARDS.items():
-        if problems := lacking(protocol, board):
-            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-            lines.append(f"note: not with board {word}: {problems[0]}{more}")
+        gates: list[Problem] = []
+        for problem in lacking(protocol, board):
+            if problem.key.startswith("gates"):
+                gates.append(problem)  # of many alike the first will do
+            else:
+                lines.append(f"note: not with board {word}: {problem}")
+        if gates:
+            more = f" (and {len(gates) - 1} more)" if len(gates) > 1 else ""
+            lines.append(f"note: not with board {word}: {gates[0]}{more}")
     minutes = len(planned) * (plan.settle + seconds) / 60
     lines.append(f"about {minutes:.0f} min, settling {plan.settle:g} s before each drop; "
                  "hanging the chains comes on top")  # fmt: skip
