@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -22,15 +21,18 @@ def one_thread(work: Callable[P, T]) -> Callable[P, T]:
 
     @wraps(work)
     def bounded(*args: P.args, **kwargs: P.kwargs) -> T:
-        with _libraries("scipy" in sys.modules).limit(limits=1, user_api="blas"):
+        with libraries().limit(limits=1, user_api="blas"):
             return work(*args, **kwargs)
 
     return bounded
 
 
 @cache
-def _libraries(_scipy: bool) -> Any:
-    """Find the libraries that numpy has loaded, and scipy, which brings one of its own."""
+def libraries() -> Any:
+    """Find the libraries that multiply numpy's matrices; to look takes some milliseconds.
+
+    scipy may bring another one later, which special functions do not use.
+    """
     import numpy as np  # noqa: F401, PLC0415 - it is what loads them
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - only with numpy
 
