@@ -45,6 +45,7 @@ def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(processes
     state = one.call("subscribe")["state"]
     assert state["phase"] == "trouble"
     assert state["error"]["kind"] == "SessionError"
+    processes.await_phase(Phase.HOLDING)
     assert list(processes.happened())[-1]["phase"] == Phase.HOLDING
     with Session.open(processes.session, readonly=True) as session:
         assert session.drop(1, 1) is None, "it is readable, and does not claim to have the drop"
