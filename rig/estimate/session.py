@@ -193,7 +193,7 @@ def _alphas(
     tests = {}
     if len(forms) > len(cases):
         tests["runs_share_alpha"] = _test(by_case.chi2 - by_run.chi2, len(forms) - len(cases))
-    if found is not None and found.parameters and not found.held:
+    if found is not None and outcome is not None and found.parameters and not found.held:
         degrees = len(set(map(case, found.forms))) - len(found.parameters)
         if degrees > 0:
             # Without the nuisances, so that both suppose the same but for α.
