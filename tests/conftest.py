@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
@@ -14,6 +16,8 @@ settings.load_profile("same")
 
 
 def pytest_configure() -> None:
+    # A shell has what runs in its background ignore Ctrl-C, and so would all that tests start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     # Hypothesis also tries numbers that stand in the project's modules, those loaded so far: what
     # they are depends on which tests ran before in this process.
     if settings().derandomize:
