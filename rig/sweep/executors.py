@@ -7,6 +7,7 @@ import os
 import signal
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from threading import Thread
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -14,6 +15,7 @@ from rig.errors import RigError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from types import FrameType
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -44,6 +46,7 @@ def processes(jobs: int) -> Iterator[Executor]:
     WorkersError
         If one of them dies.
     """
+    resource_tracker.ensure_running()  # its first start would let Ctrl-C through in `submit`
     pool = _Pool(
         jobs,
         # A copy of a process with threads may hang, so they start afresh.
@@ -73,12 +76,18 @@ class _Pool(ProcessPoolExecutor):
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         # Processes start in here and inherit what is blocked, so not even one that is still
-        # starting can be hit; this process gets its own signal at the end.
+        # starting can be hit. This process gets its own signal afterwards: its start of another
+        # one must not be torn, and any thread of a library may take a signal for it.
+        held: list[FrameType | None] = []
+        handler = signal.signal(signal.SIGINT, lambda _number, frame: held.append(frame))
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             return super().submit(fn, *args, **kwargs)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            signal.signal(signal.SIGINT, handler)
+            if held and callable(handler):
+                handler(signal.SIGINT, held[0])
 
 
 def _end_with_parent() -> None:
