@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import sys
 
 import pytest
 
@@ -329,3 +330,23 @@ def test_a_terminal_without_greek_letters_is_served(finished, tmp_path):
     done = rig("analyze", finished.copy(tmp_path), env=environment, encoding="latin-1")
     assert (done.returncode, done.stderr) == (0, "")
     assert "?z ± U (cm)" in done.stdout
+
+
+def test_an_interrupt_while_a_class_is_made_from_text_is_one_like_any_other(tmp_path):
+    """It may strike anywhere in an import, and there Python would end by the signal."""
+    (tmp_path / "struck.py").write_text(
+        "import sys, rig.cli, rig.commands.ports as ports\n"
+        "ports.main = lambda arguments: exec('raise KeyboardInterrupt')\n"
+        "sys.exit(rig.cli.main(['ports']))\n",
+        "utf-8",
+    )
+    places = f"{tmp_path}{os.pathsep}{ROOT}"
+    done = subprocess.run(
+        [sys.executable, "-m", "struck"],
+        env=os.environ | {"PYTHONPATH": places},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 130
+    assert done.stderr == "rig: interrupted; the same command goes on from here\n"
