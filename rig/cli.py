@@ -326,6 +326,19 @@ def _parser() -> argparse.ArgumentParser:
         help="seconds that one Monte Carlo setting may take (default 120)",
     )
     _json(every)
+    layouts = benches.add_parser("layouts", help="which layouts of gates let drops be read")
+    layouts.set_defaults(module="bench_layouts")
+    layouts.add_argument(
+        "-o", "--output", required=True, metavar="DIR", help="folder for CSV, JSON, page and map"
+    )
+    layouts.add_argument(
+        "--drops", type=_count, metavar="N", help="on each layout with each disturbance"
+    )
+    layouts.add_argument(
+        "--only", metavar="TEXT", help="layouts with this in their names, such as '25 rods: 2 + 2'"
+    )
+    layouts.add_argument("--jobs", type=_count, metavar="N", help="layouts at a time")
+    _json(layouts)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")

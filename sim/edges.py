@@ -1,7 +1,8 @@
 """Falls without a device: edges as a perfect recorder would keep them, and their hidden truth.
 
-``python -m sim.edges URL SEEDS RUNS`` prints one line of JSON a drop. Benchmarks that need
-thousands of falls ask here; everything that a board, a line and a host do to edges is left out.
+``python -m sim.edges URL SEEDS RUNS …`` prints one line of JSON a drop, of one simulation after the
+other. Benchmarks that need thousands of falls ask here; everything that a board, a line and a host
+do to edges is left out.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ def falls(url: str, seeds: list[int], runs: list[list[int]]) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    url, seeds, runs = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[3])
-    for line in falls(url, seeds, runs):
-        print(line)
+    asked = iter(sys.argv[1:])
+    for url, seeds, runs in zip(asked, asked, asked, strict=True):
+        for line in falls(url, json.loads(seeds), json.loads(runs)):
+            print(line)

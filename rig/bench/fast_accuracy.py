@@ -1,40 +1,32 @@
 """Accuracy over many rigs: falls straight from the simulation into the analysis, without a device.
 
-Drops on one rig share errors, so many rigs with few drops each tell most about intervals. The
-simulation runs in a process of its own and hands over edges; what is true goes to the tally alone.
+Drops on one rig share errors, so many rigs with few drops each tell most about intervals. What is
+true goes to the tally alone.
 """
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
-from subprocess import PIPE, Popen
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-import numpy as np
-
 from rig.analysis.session import analyze
 from rig.bench.accuracy import AccuracyTally
-from rig.clock.calibration import TimeScale
-from rig.errors import RigError
+from rig.bench.falls import Asked, falls, time_scale
 from rig.protocol import reader
 from rig.protocol.plan import runs
-from rig.records import Drop, Edge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable
 
+    from rig.bench.falls import Fall
     from rig.protocol.protocol import Protocol
 
 BLOCK = 4
 """Drops in a block: A, B, B, A."""
-HZ = 16_000_000
-CLOCK_U = 1e-6
-"""How well the time scale is known, relative: a few minutes of clock samples."""
 DOUBLED = {
     "skew_sd": "4 ms",
     "delay_sd": "2 ms",
@@ -83,7 +75,8 @@ def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
     scene = reader.read(protocol)
     tally = AccuracyTally()
     source = with_setting(url, "protocol", str(Path(protocol).resolve()))
-    for seed, told in _falls(source, _sessions(scene, rigs)):
+    asked = Asked(source, range(1, rigs + 1), _sessions(scene, rigs))
+    for seed, told in groupby(falls([asked]), key=attrgetter("seed")):
         begin = time.perf_counter()
         _session(scene, seed, told, tally)
         tally.seconds.append(time.perf_counter() - begin)
@@ -105,39 +98,16 @@ def _sessions(protocol: Protocol, rigs: int) -> list[list[int]]:
     return [blocks[rig % len(blocks)] for rig in range(rigs)]
 
 
-def _falls(url: str, sessions: Sequence[Sequence[int]]) -> Iterator[tuple[int, list[Any]]]:
-    """Let the simulation make the drops of one rig after another."""
-    seeds = list(range(1, len(sessions) + 1))
-    command = [sys.executable, "-m", "sim.edges", url, json.dumps(seeds), json.dumps(sessions)]
-    with Popen(command, stdout=PIPE, text=True) as simulation:  # noqa: S603 - our own
-        assert simulation.stdout is not None
-        lines = map(json.loads, simulation.stdout)
-        for seed, told in groupby(lines, key=lambda line: int(line["seed"])):
-            yield seed, list(told)
-    if simulation.returncode:
-        raise RigError(f"the simulation {url} ended with exit code {simulation.returncode}")
-
-
-def _session(
-    protocol: Protocol, seed: int, told: Iterable[dict[str, Any]], tally: AccuracyTally
-) -> None:
+def _session(protocol: Protocol, seed: int, told: Iterable[Fall], tally: AccuracyTally) -> None:
     """Analyse one rig's drops and judge the results."""
-    # A calibration is off by chance, as far as it says.
-    known = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
-    scale = TimeScale(float(known), CLOCK_U)
-    drops, truths = [], {}
-    for one in told:
-        truth = one["truth"]
-        edges = tuple(Edge(round(when * HZ), channel, dark) for when, channel, dark in one["edges"])
-        drops.append(Drop(truth["run"], truth["attempt"], HZ, edges))
-        truths[truth["run"], truth["attempt"]] = truth
-    by_key = {(drop.run, drop.attempt): drop for drop in drops}
+    scale = time_scale(seed)
+    by_key = {(fall.drop.run, fall.drop.attempt): fall for fall in told}
     begin = time.process_time()
-    found = analyze(protocol, drops, lambda _: scale)
+    found = analyze(protocol, [fall.drop for fall in by_key.values()], lambda _: scale)
     tally.analysis_s += time.process_time() - begin
     for result in (*found.runs, *found.superseded):
-        key = result.run.number, result.attempt
-        tally.add(protocol, result, by_key[key], scale.hz, truths[key])
+        fall = by_key[result.run.number, result.attempt]
+        tally.add(protocol, result, fall.drop, scale.hz, fall.truth)
 
 
 def doubled(url: str, dial: str) -> str:

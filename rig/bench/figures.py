@@ -40,6 +40,12 @@ _PRECISION_PANELS = (
 )
 _ESTIMATOR_PANELS = (("separation_rms_m", 1e3, "rms error of Δz (mm)"),
            ("speed_rms_m_s", 1e3, "rms error of V (mm/s)"))  # fmt: skip
+_ROW_IN = 0.17
+_LONGEST_LABEL = 24
+"""Characters; more gates than that are only counted."""
+_VOID_DARKEST = 0.2
+"""Share of void drops from which on a layout is drawn as dark as can be."""
+_SHADES = "Oranges"
 _STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), ("v", INK))
 
 
@@ -184,6 +190,52 @@ def scenes_figure(costs: Sequence[Cost]) -> str:
         for label in work.get_xticklabels():
             label.set_horizontalalignment("right")
             label.set_rotation_mode("anchor")
+    return drawing.svg
+
+
+def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
+    """Draw the map of layouts: a row each, a column a disturbance, void and wrong side by side.
+
+    Parameters
+    ----------
+    found
+        ``layouts`` of ``rig bench layouts --json``.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    columns = list(dict.fromkeys(one["disturbance"] for one in found))
+    rows = list(dict.fromkeys((one["chain"], one["gates"], one["heights_mm"]) for one in found))
+    # Whether wrong rods were accepted is a matter of some or none.
+    panels = (
+        ("void drops", "void_share", _VOID_DARKEST),
+        ("good drops with a wrong rod", "wrong", 1.0),
+    )
+    with canvas(
+        (_ROW_IN * len(rows) + 0.6,), 8.0, simulated=True, columns=2, sharex=False
+    ) as drawing:
+        for axes, (title, field, darkest) in zip(drawing.axes, panels, strict=True):
+            values = [one[field] for one in found]
+            table = [values[n : n + len(columns)] for n in range(0, len(values), len(columns))]
+            axes.imshow(table, cmap=_SHADES, vmin=0.0, vmax=darkest, aspect="auto")
+            for row, line in enumerate(table):
+                for column, value in enumerate(line):
+                    text = f"{value:.0%}" if field == "void_share" else f"{value:d}"
+                    color = PAPER if value > 0.6 * darkest else INK if value else MUTED
+                    axes.text(
+                        column, row, text, ha="center", va="center", fontsize=6.5, color=color
+                    )
+            axes.set_xticks(range(len(columns)), columns)
+            axes.set_yticks([])
+            axes.set_title(title, fontsize=9.0)
+            axes.grid(visible=False)
+        labels = [
+            f"{chain}: {heights if len(heights) <= _LONGEST_LABEL else gates}"
+            for chain, gates, heights in rows
+        ]
+        drawing.axes[0].set_yticks(range(len(rows)), labels, fontsize=6.5)
     return drawing.svg
 
 

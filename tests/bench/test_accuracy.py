@@ -10,10 +10,10 @@ import pytest
 from rig.bench.acceptance import acceptance_table, failures
 from rig.bench.accuracy import Errors
 from rig.bench.baselines import plain_fit, two_gate_timer
+from rig.bench.falls import Asked, falls
 from rig.bench.fast_accuracy import (
     DOUBLED,
     STACK,
-    _falls,
     _sessions,
     doubled,
     fast_accuracy,
@@ -63,18 +63,20 @@ SOURCE = str(PROTOCOLS / "single-chain.yaml")
 def test_falls_without_a_device_are_the_simulation_s():
     one = case(SINGLE, Dials(skew_sd=4e-3), seed=2, run=3)
     url = with_setting(doubled("sim://", "skew_sd"), "protocol", SOURCE)
-    found = dict(_falls(url, [[1], [2, 3]]))
-    assert [len(told) for told in found.values()] == [1, 2]
-    told = found[2][1]
-    assert told["truth"]["run"] == 3
-    assert [tuple(edge) for edge in told["edges"]] == [tuple(edge[:3]) for edge in one.truth.edges]
-    assert told["truth"]["speed_m_s"] == one.truth.speed_m_s
+    quiet = with_setting("sim://?quiet=1", "protocol", SOURCE)
+    found = list(falls([Asked(url, [1, 2], [[1], [2, 3]]), Asked(quiet, [1], [[1]])]))
+    assert [(fall.seed, fall.drop.run) for fall in found] == [(1, 1), (2, 2), (2, 3), (1, 1)]
+    assert found[0].truth["speed_m_s"] != found[3].truth["speed_m_s"]
+    told = found[2]
+    assert [tuple(edge) for edge in told.truth["edges"]] == [*map(tuple, one.truth.edges)]
+    assert [edge[1:] for edge in told.drop.edges] == [edge[1:] for edge in one.drop.edges]
+    assert told.truth["speed_m_s"] == one.truth.speed_m_s
 
 
 def test_a_simulation_that_gives_up_is_said(capfd):
     url = with_setting("sim://?no_such_dial=1", "protocol", SOURCE)
     with pytest.raises(RigError, match="exit code 1"):
-        list(_falls(url, [[1]]))
+        list(falls([Asked(url, [1], [[1]])]))
     assert "no_such_dial" in capfd.readouterr().err
 
 

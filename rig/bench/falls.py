@@ -1,0 +1,88 @@
+"""Falls straight from the simulation, in a process of its own that hands over edges and truths."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from subprocess import PIPE, Popen
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rig.clock.calibration import TimeScale
+from rig.errors import RigError
+from rig.records import Drop, Edge
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+HZ = 16_000_000
+CLOCK_U = 1e-6
+"""How well the time scale is known, relative: a few minutes of clock samples."""
+
+
+class Asked(NamedTuple):
+    """Rigs of one simulation by their seeds, and the runs that are made on each."""
+
+    url: str
+    seeds: Sequence[int]
+    runs: Sequence[Sequence[int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Fall:
+    """One drop on the rig of a seed, and what is true of it."""
+
+    seed: int
+    drop: Drop
+    truth: Mapping[str, Any]
+
+    def rods(self, matches: Mapping[int, int]) -> tuple[int, int]:
+        """Count edges given to another rod than they came from, and strays taken for a rod.
+
+        Parameters
+        ----------
+        matches
+            For each edge, by its number in the drop, its rod.
+        """
+        origins = {number: self.truth["edges"][number][3] for number in matches}
+        wrong = sum(origins[n] not in (STRAY, rod) for n, rod in matches.items())
+        return wrong, sum(origin == STRAY for origin in origins.values())
+
+
+STRAY = -1
+"""The truth's rod number of what was no rod."""
+
+
+def falls(asked: Sequence[Asked]) -> Iterator[Fall]:
+    """Let the simulation make the drops of one rig after another.
+
+    Raises
+    ------
+    RigError
+        The simulation gave up.
+    """
+    requests = [
+        text
+        for url, seeds, runs in asked
+        for text in (url, json.dumps([*seeds]), json.dumps([*runs]))
+    ]
+    command = [sys.executable, "-m", "sim.edges", *requests]
+    with Popen(command, stdout=PIPE, text=True) as simulation:  # noqa: S603 - our own
+        assert simulation.stdout is not None
+        for line in simulation.stdout:
+            told = json.loads(line)
+            truth = told["truth"]
+            edges = tuple(Edge(round(when * HZ), *rest) for when, *rest in told["edges"])
+            drop = Drop(truth["run"], truth["attempt"], HZ, edges)
+            yield Fall(int(told["seed"]), drop, truth)
+    if simulation.returncode:
+        urls = ", ".join(one.url for one in asked)
+        raise RigError(f"the simulation {urls} ended with exit code {simulation.returncode}")
+
+
+def time_scale(seed: int) -> TimeScale:
+    """Calibrate a rig's clock: it is off by chance, as far as it says."""
+    known = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
+    return TimeScale(float(known), CLOCK_U)

@@ -1,0 +1,251 @@
+"""On which layouts of gates are drops read, and rightly? Against the simulation's hidden truth."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from itertools import islice
+from multiprocessing import get_context
+from pathlib import Path
+from statistics import fmean
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.drop import fit_drop
+from rig.analysis.result import GOOD
+from rig.bench.falls import STRAY, Asked, falls, time_scale
+from rig.bench.fast_accuracy import DOUBLED, STACK, with_setting
+from rig.protocol import reader
+from rig.protocol.plan import runs
+from rig.threads import one_thread
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from rig.analysis.result import DropResult
+    from rig.bench.falls import Fall
+    from rig.bench.layout_catalogue import Layout
+    from rig.protocol.protocol import Protocol, Run
+
+DROPS = 24
+"""On each layout with each disturbance, every one on a rig of its own."""
+DISTURBANCES: Mapping[str, Mapping[str, str]] = {
+    "quiet": {"quiet": "1"},
+    "default": {},
+    "doubled": {dial: size for dial, size in DOUBLED.items() if dial not in STACK},
+}
+"""Settings of the simulated rig by name."""
+MEASURED = ("separation_m", "speed_m_s", "gravity_m_s2")
+"""What a layout's errors are of: the first of these that its scene has."""
+_STRIDE = 7  # from run to run of a plan: all inclinations and either chain come soon
+_NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+@dataclass(slots=True)
+class Cell:
+    """A layout with one disturbance.
+
+    Attributes
+    ----------
+    chain, gates, heights_mm
+        The layout in words.
+    drops
+        Made, of which `beyond` truly miss more edges, or leave more apart, than the protocol
+        accepts; only the others count below.
+    verdicts
+        Of the others.
+    wrong
+        Good drops with an edge given to another rod than it came from.
+    edges, wrong_edges, strays
+        Of good drops: given to a rod, to a wrong one, and strays given to one.
+    measured, errors, ratios
+        Which measurand, its errors, and these over u.
+    reasons
+        Kinds of reasons for voids, numbers left out, by their number.
+    seconds
+        Processor time of identification and adjustment.
+    """
+
+    chain: str
+    gates: str
+    heights_mm: str
+    disturbance: str
+    drops: int = 0
+    beyond: int = 0
+    verdicts: Counter[str] = field(default_factory=Counter)
+    wrong: int = 0
+    edges: int = 0
+    wrong_edges: int = 0
+    strays: int = 0
+    measured: str | None = None
+    errors: list[float] = field(default_factory=list)
+    ratios: list[float] = field(default_factory=list)
+    reasons: Counter[str] = field(default_factory=Counter)
+    seconds: float = 0.0
+
+    def add(self, protocol: Protocol, fall: Fall, result: DropResult, seconds: float) -> None:
+        """Compare one drop with its truth."""
+        self.drops += 1
+        self.seconds += seconds
+        if _beyond(protocol, fall, result):
+            self.beyond += 1
+            return
+        self.verdicts[result.verdict] += 1
+        if result.verdict not in GOOD:
+            self.reasons.update(_NUMBER.sub("…", reason) for reason in result.reasons)
+            return
+        wrong, strays = fall.rods(result.matches)
+        self.wrong += wrong > 0
+        self.edges += len(result.matches)
+        self.wrong_edges += wrong
+        self.strays += strays
+        self.measured = next((name for name in MEASURED if name in result.quantities), None)
+        if self.measured is not None:
+            found = result.quantities[self.measured]
+            error = found.value - fall.truth[self.measured]
+            self.errors.append(error)
+            self.ratios.append(error / found.u)
+
+    def share(self, verdict: str) -> float:
+        """Share of a verdict in the drops that count; 0 where none does."""
+        return self.verdicts[verdict] / max(1, self.verdicts.total())
+
+    def json(self) -> dict[str, Any]:
+        """Return the figures to report."""
+        told = ("chain", "gates", "heights_mm", "disturbance", "drops", "beyond", "wrong", "edges",
+                "wrong_edges", "strays", "measured")  # fmt: skip
+        errors, ratios = self.errors, self.ratios
+        return {name: getattr(self, name) for name in told} | {
+            "verdicts": dict(sorted(self.verdicts.items())),
+            "void_share": self.share("void"),
+            "marginal_share": self.share("marginal"),
+            "error_rms": _rms(errors),
+            "z_rms": _rms(ratios),
+            "z_worst": max(map(abs, ratios), default=None),
+            "ms_per_drop": 1e3 * self.seconds / max(1, self.drops),
+            "reasons": dict(self.reasons.most_common()),
+        }
+
+
+def _rms(values: Sequence[float]) -> float | None:
+    return math.sqrt(fmean(one**2 for one in values)) if values else None
+
+
+def _beyond(protocol: Protocol, fall: Fall, result: DropResult) -> bool:
+    """Whether a drop is truly beyond the protocol's limits, so that it has to be void."""
+    skew = fall.truth.get("release_skew_s")
+    if skew is not None and abs(skew) > protocol.accept.release_skew:
+        return True
+    seen = {tuple(edge) for _, *edge in fall.truth["edges"] if edge[-1] != STRAY}
+    expected = result.audit.matched + result.audit.missed
+    return expected - len(seen) > protocol.accept.missed_edges * expected
+
+
+def study(
+    layouts: Sequence[Layout], drops: int, jobs: int | None, say: Callable[[str], None]
+) -> list[Cell]:
+    """Let chains fall on every layout with every disturbance.
+
+    Parameters
+    ----------
+    drops
+        In each cell.
+    jobs
+        Layouts at a time; as many as there are processors if not given.
+    say
+        Told how far it is.
+
+    Returns
+    -------
+    list
+        In the order of the layouts, each with its disturbances.
+    """
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        work = {pool.submit(cells, layout, drops): n for n, layout in enumerate(layouts)}
+        found: dict[int, list[Cell]] = {}
+        for done in as_completed(work):
+            found[work[done]] = done.result()
+            first = found[work[done]][0]
+            say(f"{len(found)} of {len(layouts)}: {first.chain}, {first.gates} gates")
+    return [cell for n in sorted(found) for cell in found[n]]
+
+
+@one_thread
+def cells(layout: Layout, drops: int) -> list[Cell]:
+    """Let chains fall on one layout with every disturbance."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "layout.yaml"
+        path.write_text(layout.protocol(), encoding="utf-8")
+        protocol = reader.read(path)
+        planned = {run.number: run for run in runs(protocol)}
+        numbers = [*planned]
+        made = [[numbers[_STRIDE * n % len(numbers)]] for n in range(drops)]
+        asked = [
+            Asked(_url(path, settings), range(1, drops + 1), made)
+            for settings in DISTURBANCES.values()
+        ]
+        all_falls = falls(asked)
+        return [
+            _cell(layout, name, protocol, planned, islice(all_falls, drops))
+            for name in DISTURBANCES
+        ]
+
+
+def _url(path: Path, settings: Mapping[str, str]) -> str:
+    url = with_setting("sim://", "protocol", str(path))
+    for name, value in settings.items():
+        url = with_setting(url, name, value)
+    return url
+
+
+def _cell(
+    layout: Layout,
+    disturbance: str,
+    protocol: Protocol,
+    planned: Mapping[int, Run],
+    made: Iterable[Fall],
+) -> Cell:
+    cell = Cell(layout.kind.name, layout.gates, layout.heights, disturbance)
+    for fall in made:
+        begin = time.process_time()
+        result, _ = fit_drop(protocol, planned[fall.drop.run], fall.drop, time_scale(fall.seed))
+        cell.add(protocol, fall, result, time.process_time() - begin)
+    return cell
+
+
+def totals(found: Sequence[Cell]) -> list[dict[str, Any]]:
+    """Sum up over layouts, one line a disturbance."""
+    return [
+        _total(name, [one for one in found if one.disturbance == name]) for name in DISTURBANCES
+    ]
+
+
+def _total(name: str, of: Sequence[Cell]) -> dict[str, Any]:
+    verdicts = sum((one.verdicts for one in of), Counter[str]())
+    counted = max(1, verdicts.total())
+    return {
+        "disturbance": name,
+        "drops": sum(one.drops for one in of),
+        "beyond": sum(one.beyond for one in of),
+        "void_share": verdicts["void"] / counted,
+        "marginal_share": verdicts["marginal"] / counted,
+        "wrong": sum(one.wrong for one in of),
+        "edges": sum(one.edges for one in of),
+        "wrong_edges": sum(one.wrong_edges for one in of),
+        "z_rms": _rms([ratio for one in of for ratio in one.ratios]),
+        "ms_per_drop": 1e3 * sum(one.seconds for one in of) / max(1, sum(one.drops for one in of)),
+    }
+
+
+def as_json(found: Sequence[Cell]) -> dict[str, Any]:
+    """``{"layouts": [...], "totals": [...], "reasons": {...}}``, the most frequent reason first."""
+    reasons = sum((one.reasons for one in found), Counter[str]())
+    return {
+        "layouts": [cell.json() for cell in found],
+        "totals": totals(found),
+        "reasons": dict(reasons.most_common()),
+    }

@@ -1,0 +1,150 @@
+"""``rig bench layouts``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+from rig.bench.figures import layouts_figure
+from rig.bench.layout_catalogue import LAYOUTS
+from rig.bench.layouts import DISTURBANCES, DROPS, as_json, study
+from rig.commands.output import print_json, say
+from rig.errors import InputError
+from rig.files import make_folder, write_atomic
+from rig.report.columns import Column, filled
+from rig.text_table import text_table
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Callable, Mapping, Sequence
+
+    Record = Mapping[str, Any]
+
+_SHOWN_REASONS = 8
+
+
+def main(arguments: Namespace) -> int:
+    """Drop chains on every layout; keep table, picture and page, and print the table."""
+    wanted = arguments.only or ""
+    chosen = [one for one in LAYOUTS if wanted in f"{one.kind.name}: {one.gates}"]
+    if not chosen:
+        names = ", ".join(dict.fromkeys(f"{one.kind.name}: {one.gates}" for one in LAYOUTS))
+        raise InputError(f"no layout has {wanted!r} in its name", f"there are {names}")
+    folder = make_folder(arguments.output)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
+    found = study(chosen, arguments.drops or DROPS, arguments.jobs, say)
+    whole = as_json(found)
+    lines = _lines(whole)
+    write_atomic(folder / "layouts.json", json.dumps(whole, indent=2, ensure_ascii=False) + "\n")
+    write_atomic(folder / "layouts.csv", _csv(whole["layouts"]))
+    write_atomic(folder / "layouts.svg", layouts_figure(whole["layouts"]))
+    write_atomic(folder / "layouts.md", _page(lines))
+    if arguments.json:
+        print_json(whole)
+    else:
+        print("\n".join(["SIMULATED DATA", *lines]))
+    return 0
+
+
+def _csv(cells: Sequence[Record]) -> str:
+    """One line a layout and disturbance; what lies deeper is in the JSON."""
+    table = io.StringIO()
+    flat = [name for name, value in cells[0].items() if not isinstance(value, dict)]
+    writer = csv.DictWriter(table, flat, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(cells)
+    return table.getvalue()
+
+
+def _lines(whole: Record) -> list[str]:
+    """One row a layout, with its disturbances side by side, then what all have together."""
+    by_layout: dict[tuple[str, str], list[Record]] = {}
+    for cell in whole["layouts"]:
+        by_layout.setdefault((cell["chain"], cell["heights_mm"]), []).append(cell)
+    rows = [{"of": cells[0], "cells": cells} for cells in by_layout.values()]
+    names = " / ".join(DISTURBANCES)
+    lines = [
+        f"void, marginal, drops with a wrong rod, error and its ratio to u: {names}",
+        *_table(_COLUMNS, rows),
+        "",
+        *_table(_TOTALS, whole["totals"]),
+    ]
+    if whole["reasons"]:
+        lines += ["", "why drops were void:"]
+        lines += [f"{n:6}  {why}" for why, n in [*whole["reasons"].items()][:_SHOWN_REASONS]]
+    return lines
+
+
+def _table(columns: Sequence[Column], records: Sequence[Record]) -> list[str]:
+    """Write records as aligned text; what a line is of begins it."""
+    kept, rows = filled(columns, records)
+    words = {n for n, column in enumerate(kept) if not column.numeric}
+    return text_table([[column.heading for column in kept], *rows], left=words, rule=True)
+
+
+def _page(lines: Sequence[str]) -> str:
+    """The same as a page, with the picture."""
+    return "\n".join(
+        [
+            "# On which layouts of gates drops are read",
+            "",
+            "Written by `rig bench layouts`: falls of the simulated rig without disturbances, with",
+            "the default ones, and with all of them doubled. Every drop is on a rig of its own and",
+            "judged against the hidden truth; drops that truly miss more edges than the protocol",
+            "accepts are left out. Every number is in `layouts.csv` and `layouts.json`.",
+            "",
+            "![Map of layouts](layouts.svg)",
+            "",
+            "```text",
+            *lines,
+            "```",
+            "",
+        ]
+    )
+
+
+def _each(text: Callable[[Record], str]) -> Callable[[Record], str]:
+    return lambda row: " / ".join(text(cell) for cell in row["cells"])
+
+
+def _share(name: str) -> Callable[[Record], str]:
+    return lambda cell: f"{cell[name]:.0%}"
+
+
+def _size(cell: Record) -> str:
+    """Error in the unit of its measurand: mm, mm/s or mm/s²."""
+    return "–" if cell["error_rms"] is None else f"{1e3 * cell['error_rms']:.3g}"
+
+
+def _ratio(cell: Record) -> str:
+    return "–" if cell["z_rms"] is None else f"{cell['z_rms']:.2g}"
+
+
+_SYMBOLS = {"separation_m": "Δz (mm)", "speed_m_s": "V (mm/s)", "gravity_m_s2": "g (mm/s²)"}
+_COLUMNS = (
+    Column("chain", lambda row: row["of"]["chain"], numeric=False),
+    Column("gates (mm)", lambda row: row["of"]["heights_mm"], numeric=False),
+    Column("void", _each(_share("void_share"))),
+    Column("marginal", _each(_share("marginal_share"))),
+    Column("wrong", _each(lambda cell: str(cell["wrong"]))),
+    Column("of", lambda row: next(
+        (_SYMBOLS[cell["measured"]] for cell in row["cells"] if cell["measured"]), ""
+    ), numeric=False),
+    Column("rms error", _each(_size)),
+    Column("rms error/u", _each(_ratio)),
+)  # fmt: skip
+_TOTALS = (
+    Column("disturbances", lambda one: one["disturbance"], numeric=False),
+    Column("drops", lambda one: str(one["drops"])),
+    Column("beyond limits", lambda one: str(one["beyond"])),
+    Column("void", lambda one: f"{one['void_share']:.1%}"),
+    Column("marginal", lambda one: f"{one['marginal_share']:.1%}"),
+    Column("wrong drops", lambda one: str(one["wrong"])),
+    Column("edges", lambda one: str(one["edges"])),
+    Column("wrong edges", lambda one: str(one["wrong_edges"])),
+    Column("rms error/u", _ratio),
+    Column("ms a drop", lambda one: f"{one['ms_per_drop']:.1f}"),
+)

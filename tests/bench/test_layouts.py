@@ -1,0 +1,100 @@
+"""Layouts of gates: that all are protocols, and that void and wrong are counted by the truth."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import asdict, replace
+
+import pytest
+
+from rig.bench.falls import Fall
+from rig.bench.layout_catalogue import LAYOUTS, STANDARD
+from rig.bench.layouts import DISTURBANCES, Cell, as_json
+from rig.cli import main
+from rig.protocol.measurable import unmeasurable
+from rig.protocol.reader import parse
+from sim.dials import Dials, read_dials
+from tests.analysis.drops import UNIFORM, case
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda one: f"{one.kind.name}: {one.heights}")
+def test_every_layout_is_a_protocol_that_can_be_measured(layout):
+    protocol = parse(layout.protocol())
+    assert not unmeasurable(protocol)
+    assert len(protocol.gates.gates) == len(layout.impact) + len(layout.free)
+    assert (protocol.surface is None) == (layout.kind.scene == "fence")
+    assert protocol.two_chains == (layout.kind.scene == "two")
+
+
+def test_from_one_gate_a_side_to_eight():
+    sizes = {
+        len(side) for one in LAYOUTS for side in (one.impact, one.free) if one.kind is STANDARD
+    }
+    assert {1, 2, 3, 4, 5, 6, 8} <= sizes
+    rods = {len(parse(one.protocol()).chains["A"].widths) for one in LAYOUTS}
+    assert {2, 100} <= rods
+
+
+def test_disturbances_are_those_of_the_simulated_rig():
+    dials = {name: read_dials(settings) for name, settings in DISTURBANCES.items()}
+    assert dials["quiet"] == Dials.quiet()
+    assert dials["default"] == Dials()
+    assert dials["doubled"].missed == 2 * Dials().missed
+
+
+def judged(change=lambda result: result, dials=None, drop=lambda one: one):
+    """One drop of the standard rig in a cell of its own."""
+    one = drop(case(UNIFORM, dials or Dials.quiet(), incline=40.0))
+    cell = Cell("25 rods", "8 + 8", "", "quiet")
+    cell.add(UNIFORM, Fall(1, one.drop, asdict(one.truth)), change(one.analyze()), 0.01)
+    return cell
+
+
+def shifted(result):
+    """Every edge of a rod given to the next one."""
+    return replace(result, matches={n: rod + 1 for n, rod in result.matches.items()})
+
+
+def test_a_wrong_rod_is_counted_and_a_right_one_is_not():
+    right, wrong = judged(), judged(shifted)
+    assert (right.wrong, right.wrong_edges) == (0, 0)
+    assert right.edges == len(case(UNIFORM, Dials.quiet(), incline=40.0).drop.edges)
+    assert (wrong.wrong, wrong.wrong_edges) == (1, wrong.edges)
+    (total, *_) = as_json([right, wrong])["totals"]
+    assert (total["wrong"], total["drops"], total["void_share"]) == (1, 2, 0.0)
+
+
+def test_a_void_drop_is_counted_with_its_reason_and_no_number():
+    cell = judged(lambda found: replace(found, verdict="void", reasons=("12 of 30 missed (40 %)",)))
+    assert cell.json()["void_share"] == 1.0
+    assert cell.json()["reasons"] == {"… of … missed (… %)": 1}
+    assert cell.json()["z_rms"] is None
+
+
+def test_a_drop_that_truly_is_beyond_the_limits_does_not_count():
+    worse = Dials(**(asdict(Dials.quiet()) | {"missed": 0.3}))
+    cell = judged(dials=worse)
+    assert (cell.drops, cell.beyond, cell.verdicts.total()) == (1, 1, 0)
+
+
+def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
+    arguments = ["bench", "layouts", "-o", str(tmp_path), "--only", "3 rods: 2 + 2", "--drops", "3"]
+    assert main([*arguments, "--jobs", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["disturbance"] for one in found["layouts"]] == [*DISTURBANCES]
+    for one in found["layouts"]:
+        assert (one["drops"], one["wrong_edges"]) == (3, 0)
+        assert sum(one["verdicts"].values()) + one["beyond"] == 3
+    quiet = found["layouts"][0]
+    assert (quiet["void_share"], quiet["beyond"]) == (0.0, 0)
+    assert quiet["error_rms"] < 1e-5
+    rows = list(csv.DictReader((tmp_path / "layouts.csv").read_text("utf-8").splitlines()))
+    assert [row["chain"] for row in rows] == ["3 rods"] * 3
+    assert "SIMULATED" in (tmp_path / "layouts.svg").read_text("utf-8")
+    assert "36, 117 + 32.4, 108" in (tmp_path / "layouts.md").read_text("utf-8")
+
+
+def test_an_unknown_layout_is_told_with_those_there_are(tmp_path, capsys):
+    assert main(["bench", "layouts", "-o", str(tmp_path), "--only", "17 gates"]) == 2
+    assert "25 rods: 1 + 1" in capsys.readouterr().err
