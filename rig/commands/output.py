@@ -60,8 +60,8 @@ def print_results(found: Mapping[str, Any], *, as_json: bool) -> int:
         if found["simulated"]:
             print("SIMULATED DATA")
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
-        from rig.report.remarks import air_lines, clock_lines  # noqa: PLC0415
+        from rig.report.remarks import air_lines, clock_lines, void_lines  # noqa: PLC0415
 
         print(summary_table(found))
-        print("\n".join([*clock_lines(found), *air_lines(found)]))
+        print("\n".join([*void_lines(found), *clock_lines(found), *air_lines(found)]))
     return VOID if any(run["verdict"] == "void" for run in found["runs"]) else 0

@@ -10,6 +10,7 @@ from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.remedies import remedies
 from rig.files import write_atomic
 from rig.report.columns import AUDIT, Column, filled, run_columns, summary_columns
 from rig.report.embed import dark_figure_css, embedded
@@ -207,13 +208,20 @@ def _table(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> s
             _cell(column, text, side) for column, text, side in zip(kept, row, sides, strict=True)
         )
         body += f"<tr{off}>{cells}</tr>\n"
-        reasons = "; ".join(map(str, record.get("reasons") or ()))
-        if reasons:  # a line of their own: sentences do not fit beside so many numbers
-            body += f'<tr class="why"><td colspan="{len(kept)}">{escape(reasons)}</td></tr>\n'
+        why = _why(record)
+        if why:  # a line of their own: sentences do not fit beside so many numbers
+            body += f'<tr class="why"><td colspan="{len(kept)}">{escape(why)}</td></tr>\n'
     return (
         f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n'
         f"<tbody>\n{body}</tbody></table></div>"
     )
+
+
+def _why(record: Mapping[str, Any]) -> str:
+    """Reasons of a verdict, and of a void drop what to do."""
+    reasons = [str(reason) for reason in record.get("reasons") or ()]
+    what = remedies(reasons) if record.get("verdict") == "void" else []
+    return " → ".join(filter(None, ["; ".join(reasons), "; ".join(what)]))
 
 
 def _cell(column: Column, text: str, side: str) -> str:

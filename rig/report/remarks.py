@@ -1,9 +1,11 @@
-"""What is remarked below results: where seconds come from, and what the air took."""
+"""What is remarked below results: why drops are void, where seconds come from, the air's share."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.remedies import remedies, void_runs
+from rig.report.columns import incline
 from rig.report.numbers import decimals_for, fixed, plus_minus
 
 if TYPE_CHECKING:
@@ -12,6 +14,27 @@ if TYPE_CHECKING:
 _CLOCK_COVERAGE = 2.0  # about 95 %
 _AIR_COVERAGE = 1.96
 _FOUND = 4.0  # standard uncertainties beyond which κ is worth a remark
+
+
+def void_lines(analysis: Mapping[str, Any]) -> list[str]:
+    """Say of every void drop why, a line each, and below them what to do.
+
+    Parameters
+    ----------
+    analysis
+        What ``rig analyze --json`` prints.
+    """
+    voids = void_runs(analysis)
+    if not voids:
+        return []
+    lines = ["void drops:"]
+    for one in voids:
+        tilt = incline(one)
+        at = f" at {tilt}°" if tilt else ""
+        reasons = "; ".join(one["reasons"])
+        lines.append(f"  run {one['run']}, attempt {one['attempt']}{at}: {reasons}")
+    what = remedies(reason for one in voids for reason in one["reasons"])
+    return [*lines, "what to do:", *(f"  {one}" for one in what)]
 
 
 def clock_lines(analysis: Mapping[str, Any]) -> list[str]:

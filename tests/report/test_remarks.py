@@ -1,13 +1,63 @@
-"""What is said of the air, and that a session in air says it."""
+"""What is said of void drops and of the air, and that sessions say it."""
 
 from __future__ import annotations
 
 import json
+from html import unescape
 
 import pytest
 
-from rig.report.remarks import air_lines
+from rig.analysis.remedies import ELSE, remedies, remedy
+from rig.report.remarks import air_lines, void_lines
 from tests.cli.lab import rig, short
+
+
+def void(run, attempt, *reasons, verdict="void", incline_deg=40.0):
+    return {
+        "run": run, "attempt": attempt, "incline_deg": incline_deg, "impact_chain": "A",
+        "verdict": verdict, "reasons": list(reasons),
+    }  # fmt: skip
+
+
+SKEW, MISSED = (
+    "release skew 9.19 ms is beyond 5 ms",
+    "34 of 660 edges missed (5.2%), more than 5.0%",
+)
+
+
+def test_every_void_drop_is_told_with_its_reasons_and_what_to_do():
+    found = {
+        "runs": [void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, "moths")],
+        "superseded": [void(3, 1, SKEW)],
+    }
+    lines = void_lines(found)
+    assert lines[1:4] == [
+        f"  run 2, attempt 1 at 40°: {SKEW}; {MISSED}",
+        f"  run 3, attempt 1 at 40°: {SKEW}",
+        "  run 4, attempt 1 at 40°: moths",
+    ]
+    assert [line.strip() for line in lines[5:]] == [remedy(SKEW), remedy(MISSED)]
+    assert void_lines({"runs": [void(1, 1, verdict="marginal")]}) == []
+
+
+def test_what_nobody_foresaw_has_a_general_remedy_if_it_is_all_there_is():
+    assert remedies(["moths", "a lorry"]) == [ELSE]
+    assert remedies(["moths", SKEW, SKEW]) == [remedy(SKEW)] != [ELSE]
+
+
+def test_a_session_without_a_good_run_says_why(tmp_path):
+    protocol, session = tmp_path / "p.yaml", tmp_path / "s"
+    protocol.write_text(short("40 deg", 1), "utf-8")
+    done = rig("run", protocol, "--port", "sim://?skew_sd=1s", "--session", session, "--yes")
+    assert done.returncode == 3
+    told = rig("analyze", session).stdout
+    assert "No accepted runs" in told
+    runs = [line for line in told.splitlines() if line.startswith("  run 1, attempt ")]
+    assert len(runs) == 3
+    assert all(" at 40°: " in line for line in runs)
+    assert rig("report", session, "-o", tmp_path / "r.html").returncode == 0
+    what = told.splitlines()[told.splitlines().index("what to do:") + 1].strip()
+    assert f" → {what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
 def learned(value: float, u: float) -> dict:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from rig.analysis.remedies import remedy
 from rig.campaign.machine import Flow, Stage
 from rig.records import Job
 from rig.tui.indicators import Indicators
@@ -35,6 +36,11 @@ def test_what_comes_from_outside_is_shown_as_text(text):
         assert all(text in content.plain for content in shown)
     assert len(shown[0].plain) == 78
     assert "▲ SIMULATED" in shown[0].plain
+
+
+def test_a_void_drop_says_what_to_do():
+    reason = "release skew 9.19 ms is beyond 5 ms"
+    assert verdict_words(model(reason)).plain.endswith(f"{reason}\n  → {remedy(reason)}")
 
 
 @pytest.mark.parametrize("width", [20, 40, 78, 198])

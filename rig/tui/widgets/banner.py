@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from rig.analysis.remedies import remedies
 from rig.tui.widgets.text import Words
 from rig.tui.words import plain
 
@@ -24,6 +25,8 @@ LOOKS = {
     "planned": ("·", "$foreground 70%"),
 }
 """Symbol and colour of every state of a run."""
+_REMEDIES = 2
+"""Things to do that are shown: what else is wrong shows when these are mended."""
 
 
 class Banner(Words):
@@ -58,4 +61,6 @@ def verdict_words(model: Model) -> Content:
     lines += [Content.assemble("  ", (plain(reason, 200), "")) for reason in reasons[:4]]
     if len(reasons) > 4:
         lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))
+    if verdict == "void":
+        lines += [Content(f"  → {what}") for what in remedies(reasons)[:_REMEDIES]]
     return Content("\n").join(lines)

@@ -1,0 +1,67 @@
+"""What to do about a reason for a void drop: one table, which every face reads."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+_REMEDIES: tuple[tuple[str, str], ...] = (
+    ("in the wrong way round", "exchange the two plugs, or their channels in the protocol"),
+    ("upside down", "turn the chain round"),
+    (
+        r"has \d+ rods, not",
+        "hang the chain that the protocol describes, or write its rods into the protocol",
+    ),
+    ("gave no edges", "plug the gate in, and see that it changes when a hand is in its beam"),
+    (
+        "sees something else",
+        "clear the gate's beam and align it, or measure its height again",
+    ),
+    ("off its height", "measure the gate's height again and write it into the protocol"),
+    (
+        "ambiguous",
+        "add a gate near the contact point, or move one: rig design PROTOCOL says where",
+    ),
+    (
+        "does not look like",
+        "hold what hangs there against rig check PROTOCOL: chain, drop, incline, gates' heights "
+        "and channels",
+    ),
+    (
+        "edges missed",
+        "align the gates' beams with the chains; rig report SESSION shows which gate misses most",
+    ),
+    (
+        "release skew",
+        "adjust the releases until both chains leave together, or allow more skew in accept:",
+    ),
+    ("memory was full", "find the gate that flickers, and shield or unplug it"),
+    (
+        "certificate|no longer kept|missing, from number|restarted|identified itself",
+        "look at cable and supply of the board, and drop once more; rig selftest tries it out",
+    ),
+)
+"""What a reason says (a regular expression), and what to do then; the first that fits counts."""
+ELSE = "look at the drop's edges: rig report SESSION draws them beside the fall that was expected"
+
+
+def remedy(reason: str) -> str:
+    """Say what to do about one reason."""
+    found = (what for pattern, what in _REMEDIES if re.search(pattern, reason))
+    return next(found, ELSE)
+
+
+def remedies(reasons: Iterable[str]) -> list[str]:
+    """Say what to do about a drop's reasons, each thing once; the general one only if alone."""
+    found = list(dict.fromkeys(map(remedy, reasons)))
+    return [one for one in found if one != ELSE] or found
+
+
+def void_runs(analysis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Every void drop of what ``rig analyze --json`` prints, by run and attempt."""
+    drops = [*analysis.get("runs", ()), *analysis.get("superseded", ())]
+    void = [drop for drop in drops if drop["verdict"] == "void"]
+    return sorted(void, key=lambda drop: (drop["run"], drop["attempt"]))
