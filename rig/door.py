@@ -14,13 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+from rig.analysis.result import GOOD
 from rig.errors import InputError
-from rig.measurands import MEASURANDS
+from rig.measurands import MEASURANDS, SEPARATION
 from rig.predictions import predictions
 from rig.protocol import reader
 from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
-from rig.results import calibration, protocol_of, with_analysis
+from rig.results import calibration, protocol_of, results
 from rig.session.export import flatten
 from rig.session.store import Session
 
@@ -32,9 +33,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.result import DropResult, Measured
-    from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.protocol.protocol import Protocol
+    from rig.results import SessionResults
     from rig.units import Quantity
 
 __all__ = [
@@ -167,8 +168,7 @@ class RecordedSession:
         progress
             Called with the number of drops done and the number of all.
         """
-        said, analysis = with_analysis(self._file, progress)
-        return Results(said, analysis)
+        return Results(results(self._file, progress))
 
     def edges(self, run: int, attempt: int | None = None) -> Edges:
         """Return the recorded edges of a run, by default of its latest attempt.
@@ -226,7 +226,7 @@ class _Quantities:
     @property
     def separation(self) -> Measured:
         """Δz at level, corrected to simultaneous release, m."""
-        return self._one("separation_m")
+        return self._one(SEPARATION.name)
 
     @property
     def speed(self) -> Measured:
@@ -241,7 +241,7 @@ class _Quantities:
     def _written(self) -> str:
         rows = (MEASURANDS[name] for name in self.quantities)
         said = (
-            f"{row.symbol} {plus_minus(self.quantities[row.name].json(), row.scale)} {row.unit}"
+            f"{row.symbol} {plus_minus(self.quantities[row.name], row.scale)} {row.unit}"
             for row in rows
             if row.told
         )
@@ -346,14 +346,14 @@ class Results:
         Means, in order of incline.
     """
 
-    def __init__(self, said: dict[str, Any], analysis: Analysis) -> None:
-        self._said = said
-        self.runs = tuple(RunResult._of(one) for one in analysis.runs)
-        self.summary = tuple(MeanResult._of(one) for one in analysis.summary)
+    def __init__(self, found: SessionResults) -> None:
+        self._found = found
+        self.runs = tuple(RunResult._of(one) for one in found.analysis.runs)
+        self.summary = tuple(MeanResult._of(one) for one in found.analysis.summary)
 
     def json(self) -> dict[str, Any]:
         """Return what `rig analyze --json` prints."""
-        return self._said
+        return self._found.json()
 
     def to_frame(self) -> Any:
         """Return the runs as a pandas table, a row a run, columns as in `rig export`'s runs.csv.
@@ -370,15 +370,15 @@ class Results:
         left_out = {"budget", "causes"}
         rows = [
             flatten({key: value for key, value in run.items() if key not in left_out})
-            for run in self._said["runs"]
+            for run in self.json()["runs"]
         ]
         return pd.DataFrame(rows).set_index("run")
 
     def __str__(self) -> str:
-        stamp = "SIMULATED DATA\n" if self._said["simulated"] else ""
-        return stamp + summary_table(self._said)
+        stamp = "SIMULATED DATA\n" if self._found.simulated else ""
+        return stamp + summary_table(self._found.analysis.summary)
 
     def __repr__(self) -> str:
-        good = sum(run.verdict in {"accepted", "marginal"} for run in self.runs)
-        stamp = ", simulated" if self._said["simulated"] else ""
+        good = sum(run.verdict in GOOD for run in self.runs)
+        stamp = ", simulated" if self._found.simulated else ""
         return f"<results of {len(self.runs)} runs, {good} of them good{stamp}>"

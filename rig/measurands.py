@@ -110,6 +110,13 @@ MEASURANDS: dict[str, Measurand] = {
     )
 }  # fmt: skip
 
+SEPARATION = MEASURANDS["separation_m"]
+SEPARATION_RAW = MEASURANDS["separation_raw_m"]
+SPEED = MEASURANDS["speed_m_s"]
+RELEASE_SKEW = MEASURANDS["release_skew_s"]
+FALL_TIME = MEASURANDS["fall_time_s"]
+GRAVITY = MEASURANDS["gravity_m_s2"]
+
 
 def averaged() -> Iterator[Measurand]:
     """Yield those that have a mean over the runs of an incline."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import FALL_TIME, GRAVITY, SEPARATION, SPEED
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -94,12 +95,12 @@ def predict_incline(
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     """What the model says of one run, by JSON name; nothing where it has no answer."""
     if run.impact is None:
-        return {"gravity_m_s2": protocol.gravity}
+        return {GRAVITY.name: protocol.gravity}
     one = predict_incline(protocol, run.incline_deg, run.impact, run.free)
     found = {
-        "separation_m": (one.separation if run.free is not None else None, one.separation_u),
-        "speed_m_s": (one.speed, one.speed_u),
-        "fall_time_s": (one.time, one.time_u),
+        SEPARATION.name: (one.separation if run.free is not None else None, one.separation_u),
+        SPEED.name: (one.speed, one.speed_u),
+        FALL_TIME.name: (one.time, one.time_u),
     }
     return {
         name: Quantity(value, u or 0.0) for name, (value, u) in found.items() if value is not None

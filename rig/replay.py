@@ -47,8 +47,7 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     else:
         lines.append("no bytes were recorded: the edges come from a file")
     stored = session.results()
-    found = results(session, progress)
-    again = sorted([*found["runs"], *found.get("superseded", [])], key=_number)
+    again = sorted(results(session, progress).records(), key=_number)
     if stored:
         compare("results", again, stored, len(stored))
     else:

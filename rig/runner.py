@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.campaign.events import (
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from rig.daemon.connecting import Rig
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
+    from rig.results import SessionResults
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def run_protocol(
     seed: int | None = None,
     interrupts: Interrupts | None = None,
     socket: Path | None = None,
-) -> dict[str, Any]:
+) -> SessionResults:
     """Carry out a plan, or what is left of it, and analyse the session.
 
     Parameters
@@ -97,11 +98,6 @@ def run_protocol(
         What stops the campaign: see `rig.recorder.recorder.Recorder`.
     socket
         Of the daemon to go through: see `rig.daemon.connecting.connect`.
-
-    Returns
-    -------
-    dict
-        As `rig.results.results` gives it.
 
     Raises
     ------
@@ -132,7 +128,7 @@ def run_protocol(
         operator.say("analysing the session …")
         found = results(session)
         with interrupts.held():
-            session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
+            session.put_results(found.records(), __version__)
             session.commit()
         return found
 
@@ -314,7 +310,7 @@ class Campaign:
 
 def narration(result: DropResult, planned: int) -> str:
     """One line about a drop."""
-    run, found = result.run, {name: q.json() for name, q in result.quantities.items()}
+    run, found = result.run, result.quantities
     parts = [f"run {run.number:>{len(str(planned))}}/{planned}"]
     if run.impact is not None:
         parts.append(f"{run.incline_deg:g}° impact {run.impact}")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
 _REMEDIES: tuple[tuple[str, str], ...] = (
     ("in the wrong way round", "exchange the two plugs, or their channels in the protocol"),
@@ -58,10 +58,3 @@ def remedies(reasons: Iterable[str]) -> list[str]:
     """Say what to do about a drop's reasons, each thing once; the general one only if alone."""
     found = list(dict.fromkeys(map(remedy, reasons)))
     return [one for one in found if one != ELSE] or found
-
-
-def void_runs(analysis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Every void drop of what ``rig analyze --json`` prints, by run and attempt."""
-    drops = [*analysis.get("runs", ()), *analysis.get("superseded", ())]
-    void = [drop for drop in drops if drop["verdict"] == "void"]
-    return sorted(void, key=lambda drop: (drop["run"], drop["attempt"]))

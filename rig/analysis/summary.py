@@ -13,6 +13,7 @@ from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import GOOD, Measured
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
+from rig.protocol.protocol import Condition
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -59,6 +60,11 @@ class Incline:
     predicted: dict[str, Quantity]
     impact_chain: str | None = None
 
+    @property
+    def condition(self) -> Condition:
+        """What its runs have in common."""
+        return Condition(self.incline_deg, self.impact_chain)
+
     def normalized_error(self, name: str) -> float | None:
         """E_n = (measured − predicted)/√(U² + U_p²); within ±1 they agree (ISO 13528)."""
         if name not in self.means or name not in self.predicted:
@@ -69,9 +75,7 @@ class Incline:
 
     def json(self) -> dict[str, Any]:
         """One member of ``summary``."""
-        found: dict[str, Any] = {"incline_deg": self.incline_deg}
-        found |= {"impact_chain": self.impact_chain} if self.impact_chain is not None else {}
-        found["n"] = self.n
+        found: dict[str, Any] = {**self.condition.json(), "n": self.n}
         for name, mean in self.means.items():
             found[name] = mean.json()
             if name in self.deviations:
@@ -108,10 +112,9 @@ def summarize(
 
 def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
     """Sort by incline and, where chains are unlike, by the one that strikes."""
-    found: dict[tuple[float, str], list[T]] = {}
+    found: dict[Condition, list[T]] = {}
     for one in members:
-        run = run_of(one)
-        found.setdefault((run.incline_deg, protocol.striker(run) or ""), []).append(one)
+        found.setdefault(protocol.condition(run_of(one)), []).append(one)
     return [group for _, group in sorted(found.items())]
 
 
@@ -129,7 +132,7 @@ def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
             if len(found) > 1
         },
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
-        protocol.striker(run),
+        protocol.condition(run).impact_chain,
     )
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.commands.output import print_results, progress
 from rig.errors import SessionError
 from rig.report.columns import aligned
 from rig.report.parts import effects_parts, scatter_part
-from rig.results import with_analysis
+from rig.results import results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -27,24 +27,25 @@ def main(arguments: Namespace) -> int:
         return budget.main(arguments)
     with Session.open(arguments.session, readonly=True) as session:
         extent = _extent(session)
-        found, analysis = with_analysis(session, progress("analysing run"))
+        found = results(session, progress("analysing run"))
+    more: dict[str, Any] = {}
     if arguments.session_trials is not None:
         from rig.commands.trials import session_trials  # noqa: PLC0415 - likewise
 
-        found["monte_carlo"] = session_trials(analysis, arguments.session_trials)
+        more["monte_carlo"] = session_trials(found.analysis, arguments.session_trials)
     # A session that is being written, or on a read-only disk, is analysed all the same.
     with suppress(SessionError), Session.open(arguments.session) as session:
         if _extent(session) == extent:  # else it went on meanwhile, and these are out of date
-            session.put_results([*found["runs"], *found.get("superseded", [])], __version__)
-    code = print_results(found, as_json=arguments.json)
+            session.put_results(found.records(), __version__)
+    code = print_results(found, as_json=arguments.json, more=more)
     if not arguments.json:
-        more = [scatter_part(found)] if arguments.scatter else []
-        for part in (*more, *effects_parts(found)):
+        scatter = [scatter_part(found.analysis.summary)] if arguments.scatter else []
+        for part in (*scatter, *effects_parts(found.analysis.effects)):
             print("\n".join(["", part.heading, *aligned(part.columns, part.records)]))
-        if "monte_carlo" in found:
+        if more:
             from rig.commands.trials import trials_lines  # noqa: PLC0415 - likewise
 
-            print("\n".join(["", *trials_lines(found["monte_carlo"])]))
+            print("\n".join(["", *trials_lines(more["monte_carlo"])]))
     return code
 
 

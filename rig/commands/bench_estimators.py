@@ -6,7 +6,7 @@ import csv
 import io
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.bench.estimators import as_json, estimators
 from rig.bench.figures import estimators_figure
@@ -17,7 +17,7 @@ from rig.report.columns import Column, aligned
 if TYPE_CHECKING:
     from argparse import Namespace
 
-_COLUMNS = (
+_COLUMNS: tuple[Column[dict[str, Any]], ...] = (
     Column("estimator", lambda one: one["name"], numeric=False),
     Column("M", lambda one: f"{one['trials']:.0e}" if one["trials"] else ""),
     Column("runs", lambda one: str(one["runs"])),

@@ -101,10 +101,8 @@ def _said(
                 "name": name,
                 "u_run": expected.typical(name),
                 "inclines": [
-                    {"incline_deg": incline}
-                    | ({} if struck is None else {"impact_chain": struck})
-                    | {"u_run": u, "u_mean": expected.mean[name][incline, struck]}
-                    for (incline, struck), u in single.items()
+                    {**at.json(), "u_run": u, "u_mean": expected.mean[name][at]}
+                    for at, u in single.items()
                 ],
             }
             for name, single in expected.single.items()

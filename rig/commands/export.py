@@ -17,6 +17,6 @@ def main(arguments: Namespace) -> int:
     """Write a session as CSV files."""
     with Session.open(arguments.session, readonly=True) as session:
         found = results(session, progress("analysing run"))
-        export_csv(arguments.csv, session, found, tick_rates(session))
+        export_csv(arguments.csv, session, found.json(), tick_rates(session))
     say(f"CSV files: {arguments.csv}")
     return 0

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import suppress
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    from rig.results import SessionResults
 
 VOID = 3
 
@@ -52,16 +55,18 @@ def _indented(value: object, level: int) -> str:
     return f"{begin}{margin}{f',{margin}'.join(parts)}\n{(level - 1) * '  '}{end}"
 
 
-def print_results(found: Mapping[str, Any], *, as_json: bool) -> int:
-    """Print an analysis; the exit code says whether a run is void."""
+def print_results(
+    found: SessionResults, *, as_json: bool, more: Mapping[str, Any] = MappingProxyType({})
+) -> int:
+    """Print an analysis, as JSON with more members; the exit code says whether a run is void."""
     if as_json:
-        print_json(found)
+        print_json({**found.json(), **more})
     else:
-        if found["simulated"]:
+        if found.simulated:
             print("SIMULATED DATA")
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
-        from rig.report.remarks import air_lines, clock_lines, void_lines  # noqa: PLC0415
+        from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 
-        print(summary_table(found))
-        print("\n".join([*void_lines(found), *clock_lines(found), *air_lines(found)]))
-    return VOID if any(run["verdict"] == "void" for run in found["runs"]) else 0
+        print(summary_table(found.analysis.summary))
+        print("\n".join([*void_lines(found.analysis), *remarks(found)]))
+    return VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0

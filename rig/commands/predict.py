@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.commands.output import print_json
 from rig.errors import InputError
-from rig.measurands import MEASURANDS
+from rig.measurands import SEPARATION, SPEED
 from rig.predictions import label, predictions
 from rig.protocol import reader
 from rig.text_table import text_table
@@ -41,7 +41,7 @@ def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
     if protocol.surface is None:
         columns = {"speed (m/s)": ("speed_m_s", 1.0, ".4f"), "t (s)": ("fall_time_s", 1.0, ".5f")}
         return _laid_out(columns, found)
-    apart, end = MEASURANDS["separation_m"], MEASURANDS["speed_m_s"]
+    apart, end = SEPARATION, SPEED
     columns = {
         "incline (°)": ("incline_deg", 1.0, "g"),
         "strikes": ("impact_chain", 1, ""),

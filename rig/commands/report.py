@@ -15,8 +15,8 @@ from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
 from rig.report.parts import effects_parts
 from rig.report.pictures import pictures
-from rig.report.remarks import air_lines, clock_lines
-from rig.results import protocol_of, with_analysis
+from rig.report.remarks import remarks
+from rig.results import protocol_of, results
 from rig.sections import Sections
 from rig.session.store import Session
 
@@ -33,23 +33,24 @@ def main(arguments: Namespace) -> int:
     """Write a session's report."""
     with Session.open(arguments.session, readonly=True) as session:
         protocol = protocol_of(session)
-        found, analysis = with_analysis(session, progress("analysing run"))
+        found = results(session, progress("analysing run"))
         sections = Sections()
         curves = sections.make("The model's curve", lambda: model_curves(protocol))
         figures = pictures(
-            found,
+            found.analysis,
             curves,
             session.simulated,
             skew_limit_s=protocol.accept.release_skew,
-            site_m_s2={"value": protocol.gravity.value, "U95": 2.0 * protocol.gravity.u},
+            site_m_s2=protocol.gravity.value,
             bars=arguments.bars,
             sections=sections,
         )
-        parts = sections.make("The paired differences", lambda: list(effects_parts(found))) or []
+        effects = found.analysis.effects
+        parts = sections.make("The paired differences", lambda: list(effects_parts(effects))) or []
         simulated = session.simulated
         estimated = sections.make(
             "The estimate of the impacts",
-            lambda: _estimated(protocol, analysis, simulated=simulated),
+            lambda: _estimated(protocol, found.analysis, simulated=simulated),
         )
         if estimated:
             figures += estimate_pictures(estimated, sections).values()
@@ -58,7 +59,7 @@ def main(arguments: Namespace) -> int:
             arguments.output,
             ReportContext(
                 title=protocol.title,
-                analysis=found,
+                analysis=found.analysis,
                 simulated=session.simulated,
                 figures=figures,
                 protocol_text=session.protocol_text,
@@ -72,8 +73,8 @@ def main(arguments: Namespace) -> int:
                     "analysed with": f"rig {__version__}",
                 },
                 identities=[identity for _, identity in session.identities()],
-                clock=found["clock"],
-                notes=[*clock_lines(found), *air_lines(found)],
+                clock=found.clock.details,
+                notes=remarks(found),
                 parts=parts,
                 sections=sections,
             ),

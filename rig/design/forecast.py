@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.design.cases import Case, Cases
-    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Condition, Protocol
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -34,14 +34,13 @@ class Forecast:
     ----------
     single, mean
         Of a measurand in one run, and of its mean over an incline's runs with what makes the runs
-        themselves differ, in the light of the whole session; by JSON name, then by incline and,
-        where chains are unlike, the one that strikes.
+        themselves differ, in the light of the whole session; by JSON name, then by condition.
     coefficients
         Of the coefficients that the edges tell, by name; without any prior.
     """
 
-    single: Mapping[str, Mapping[tuple[float, str | None], float]]
-    mean: Mapping[str, Mapping[tuple[float, str | None], float]]
+    single: Mapping[str, Mapping[Condition, float]]
+    mean: Mapping[str, Mapping[Condition, float]]
     coefficients: Mapping[str, float]
 
     def typical(self, name: str) -> float:
@@ -82,11 +81,10 @@ def forecast(
     for part in parts:
         total[part.grid] += part.case.count * part.without_alpha
     covariance = np.linalg.inv(total)  # once a layout, then asked by every measurand and incline
-    single: dict[str, dict[tuple[float, str | None], float]] = {}
-    mean: dict[str, dict[tuple[float, str | None], float]] = {}
+    single: dict[str, dict[Condition, float]] = {}
+    mean: dict[str, dict[Condition, float]] = {}
     for here in by_case(protocol, parts, lambda part: part.case.run):
-        run = here[0].case.run
-        at = run.incline_deg, protocol.striker(run)
+        at = protocol.condition(here[0].case.run)
         n = sum(part.case.count for part in here)
         for name in here[0].spreads:
             alone, together, common = 0.0, 0.0, np.zeros(size)

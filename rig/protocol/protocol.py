@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import nan
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.units import Quantity
 
@@ -213,17 +213,29 @@ class Protocol:
         names = tuple(self.chains)
         return names if self.unlike_chains and self.plan.order != "fixed" else names[:1]
 
-    def striker(self, run: Run) -> str | None:
-        """Name of the chain that strikes, where that makes a result of its own.
-
-        A session's results are by incline and striking chain; like chains are one.
-        """
-        return run.impact if self.unlike_chains else None
+    def condition(self, run: Run) -> Condition:
+        """Return what a run has in common with those that it is averaged with."""
+        return Condition(run.incline_deg, run.impact if self.unlike_chains else None)
 
     def case(self, run: Run) -> dict[str, float | str]:
-        """Name what a run's result is of: ``incline_deg`` and, if it has one, ``impact_chain``."""
-        striker = self.striker(run)
-        return {"incline_deg": run.incline_deg} | ({"impact_chain": striker} if striker else {})
+        """Name the condition of a run as JSON does."""
+        return self.condition(run).json()
+
+
+class Condition(NamedTuple):
+    """What runs have in common whose results are averaged.
+
+    `impact_chain` is the one that strikes where that makes a result of its own; like chains are
+    one, and it is `None`.
+    """
+
+    incline_deg: float
+    impact_chain: str | None = None
+
+    def json(self) -> dict[str, float | str]:
+        """``incline_deg`` and, if there is one, ``impact_chain``."""
+        chain = {} if self.impact_chain is None else {"impact_chain": self.impact_chain}
+        return {"incline_deg": self.incline_deg, **chain}
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
-
-from rig.measurands import MEASURANDS
-from rig.report.numbers import expanded, nested, value_of
+import math
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from rig.analysis.summary import Incline
 
 Bars = Literal["U95", "u", "SE", "SD", "half-SD"]
 
@@ -21,25 +19,23 @@ LABELS: dict[Bars, str] = {
 }
 
 
-def bar(line: Mapping[str, Any], name: str, bars: Bars) -> float | None:
+def bar(line: Incline, name: str, bars: Bars) -> float | None:
     """Half the length of a bar; `None` where there is none, as of the scatter of a single run.
 
     Parameters
     ----------
     line
-        Of the summary of ``rig analyze --json``.
+        Of the summary.
     name
-        Of the quantity there, ``separation_m``.
+        Of a quantity that has a mean there, as in JSON.
     bars
         Expanded or standard uncertainty of the mean; standard error by scatter alone; standard
         deviation of one run, or half of it, as in Pantaleone's figures.
     """
-    row = MEASURANDS[name]
     if bars == "U95":
-        return expanded(line.get(name))
+        return line.means[name].expanded
     if bars == "u":
-        return value_of(nested(line, name, "u"))
-    if bars == "SE":
-        return value_of(line.get(row.key("se")))
-    found = value_of(line.get(row.key("sd")))
-    return found if found is None or bars == "SD" else found / 2.0
+        return line.means[name].u
+    if name not in line.deviations:
+        return None
+    return line.deviations[name] / {"SE": math.sqrt(line.n), "SD": 1.0, "half-SD": 2.0}[bars]

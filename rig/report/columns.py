@@ -2,109 +2,112 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from rig.measurands import averaged, listed
-from rig.report.numbers import fixed, nested, plus_minus, value_of
+from rig.analysis.result import Audit
+from rig.measurands import GRAVITY, averaged, listed
+from rig.report.numbers import MINUS, fixed, plus_minus, value_of
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.summary import Incline
     from rig.measurands import Measurand
 
-    Record = Mapping[str, Any]
-    Cell = Callable[[Record], str]
+T = TypeVar("T")
 
+AUDIT = tuple(field.name for field in fields(Audit))
+"""Counts of edges in the order in which the runs table gives them."""
 
 AUDIT = ("received", "matched", "missed", "spurious", "lost")
 """Counts of edges in the order in which the runs table gives them."""
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class Column(Generic[T]):
     """A heading with its unit, and how a record fills the cell."""
 
     heading: str
-    cell: Cell
+    cell: Callable[[T], str]
     numeric: bool = True
 
 
-def _quantity(scale: float, decimals: int, *path: str) -> Cell:
-    return lambda record: plus_minus(nested(record, *path), scale, decimals)
+def degrees(incline_deg: float) -> str:
+    """Write an inclination."""
+    return f"{incline_deg:g}".replace("-", MINUS)
 
 
-def _number(scale: float, decimals: int, *path: str) -> Cell:
-    def cell(record: Record) -> str:
-        value = value_of(nested(record, *path))
-        return "" if value is None else fixed(value * scale, decimals)
-
-    return cell
+def summary_incline(line: Incline) -> str:
+    """Write the inclination of a mean; nothing where nothing is struck, so nothing is inclined."""
+    return "" if GRAVITY.name in line.means else degrees(line.incline_deg)
 
 
-def _count(*path: str) -> Cell:
-    return _number(1, 0, *path)
+def run_incline(one: DropResult) -> str:
+    """Write the inclination of a run; likewise."""
+    return "" if one.run.impact is None else degrees(one.run.incline_deg)
 
 
-def _text(key: str) -> Cell:
-    return lambda record: str(record.get(key) or "")
+def main_error(line: Incline) -> float | None:
+    """Eₙ of the first of the quantities, which is what the scene is for."""
+    return line.normalized_error(next(iter(line.means)))
 
 
-def incline(record: Record) -> str:
-    """Write a record's inclination; nothing where nothing is struck, so nothing is inclined."""
-    value = value_of(record.get("incline_deg"))
-    if value is None or "gravity_m_s2" in record or record.get("impact_chain", "") is None:
-        return ""
-    return f"{value:g}".replace("-", "−")
-
-
-def _audit(record: Record) -> str:
-    counts = [fixed(value_of(nested(record, "edges", kind)), 0) for kind in AUDIT]
-    return " / ".join(count or "–" for count in counts) if any(counts) else ""
-
-
-def summary_columns() -> list[Column]:
-    """Columns of `summary`; unlike chains have a line each.
+def summary_columns() -> list[Column[Incline]]:
+    """Columns of the summary; unlike chains have a line each.
 
     Eₙ is the normalized error; within ±1 measurement and prediction agree.
     """
     return [
-        Column("incline (°)", incline),
-        Column("strikes", _text("impact_chain"), numeric=False),
-        Column("n", _count("n")),
+        Column("incline (°)", summary_incline),
+        Column("strikes", lambda line: line.impact_chain or "", numeric=False),
+        Column("n", lambda line: str(line.n)),
         *(column for row in averaged() for column in _beside_model(row)),
-        Column("Eₙ", _number(1, 2, "normalized_error")),
+        Column("Eₙ", lambda line: fixed(main_error(line), 2)),
     ]
 
 
-def _beside_model(row: Measurand) -> tuple[Column, Column]:
-    predicted = _number(row.scale, row.decimals, "predicted", row.name)
-    return measured(row), Column(f"predicted {row.symbol} ({row.unit})", predicted)
+def _beside_model(row: Measurand) -> tuple[Column[Incline], Column[Incline]]:
+    def predicted(line: Incline) -> str:
+        value = value_of(line.predicted.get(row.name))
+        return "" if value is None else fixed(value * row.scale, row.decimals)
+
+    return (
+        Column(_heading(row), lambda line: _written(row, line.means)),
+        Column(f"predicted {row.symbol} ({row.unit})", predicted),
+    )
 
 
-def measured(row: Measurand) -> Column:
-    """Make the column of a quantity with its U."""
-    heading = f"{row.symbol} ± U ({row.unit})"
-    return Column(heading, _quantity(row.scale, row.decimals, row.name))
+def _heading(row: Measurand) -> str:
+    return f"{row.symbol} ± U ({row.unit})"
 
 
-def run_columns() -> list[Column]:
-    """Columns of `runs`; raw Δz is as it happened, not corrected to simultaneous release."""
+def _written(row: Measurand, quantities: Mapping[str, Measured]) -> str:
+    return plus_minus(quantities.get(row.name), row.scale, row.decimals)
+
+
+def run_columns() -> list[Column[DropResult]]:
+    """Columns of the runs; raw Δz is as it happened, not corrected to simultaneous release."""
     return [
-        Column("run", _count("run")),
-        Column("attempt", _count("attempt")),
-        Column("incline (°)", incline),
-        Column("impact chain", _text("impact_chain"), numeric=False),
-        *(measured(row) for row in listed()),
-        Column("edges", _audit),
-        Column("verdict", _text("verdict"), numeric=False),
+        Column("run", lambda one: str(one.run.number)),
+        Column("attempt", lambda one: str(one.attempt)),
+        Column("incline (°)", run_incline),
+        Column("impact chain", lambda one: one.run.impact or "", numeric=False),
+        *(_measured(row) for row in listed()),
+        Column("edges", lambda one: " / ".join(map(str, one.audit.json().values()))),
+        Column("verdict", lambda one: one.verdict, numeric=False),
     ]
+
+
+def _measured(row: Measurand) -> Column[DropResult]:
+    return Column(_heading(row), lambda one: _written(row, one.quantities))
 
 
 def filled(
-    columns: Sequence[Column], records: Sequence[Record]
-) -> tuple[list[Column], list[list[str]]]:
+    columns: Sequence[Column[T]], records: Sequence[T]
+) -> tuple[list[Column[T]], list[list[str]]]:
     """Fill a table and leave out the columns in which no record has anything.
 
     Returns
@@ -117,26 +120,20 @@ def filled(
     return [columns[index] for index in kept], [[row[index] for index in kept] for row in table]
 
 
-def aligned(columns: Sequence[Column], records: Sequence[Record]) -> list[str]:
+def aligned(columns: Sequence[Column[T]], records: Sequence[T]) -> list[str]:
     """Write records as lines of aligned text below their headings; empty columns are left out."""
     columns, rows = filled(columns, records)
     return text_table([[column.heading for column in columns], *rows], rule=True)
 
 
-def summary_table(analysis: Mapping[str, Any]) -> str:
+def summary_table(summary: Sequence[Incline]) -> str:
     """Write the summary as aligned text.
-
-    Parameters
-    ----------
-    analysis
-        What ``rig analyze --json`` prints.
 
     Returns
     -------
     str
         Lines without an end of line at the last; one sentence where there is no summary.
     """
-    summary = analysis.get("summary") or ()
     if not summary:
         return "No accepted runs, so no summary."
     return "\n".join(aligned(summary_columns(), summary))

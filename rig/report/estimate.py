@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rig.measurands import MEASURANDS
+from rig.measurands import MEASURANDS, SEPARATION
 from rig.report.columns import Column, aligned
 from rig.report.numbers import decimals_for, fixed, plus_minus, value_of
 from rig.report.parts import Part
@@ -137,7 +137,7 @@ def symbol(name: str) -> str:
 
 def has_free_chain(found: Mapping[str, Any]) -> bool:
     """Whether a chain falls beside the one that strikes."""
-    return any("separation_m" in curve for curve in found.get("curves") or ())
+    return any(SEPARATION.name in curve for curve in found.get("curves") or ())
 
 
 def _tests(found: Record) -> Iterator[str]:
@@ -183,16 +183,18 @@ def _p(line: Record) -> str:
     return "" if line["p"] is None else f"{line['p']:.2g}"
 
 
-_STRIKES = Column("strikes", lambda line: str(line.get("impact_chain", "")), numeric=False)
+_STRIKES: Column[Record] = Column(
+    "strikes", lambda line: str(line.get("impact_chain", "")), numeric=False
+)
 """Which chain, where chains are unlike."""
-_COEFFICIENTS = (
+_COEFFICIENTS: tuple[Column[Record], ...] = (
     Column("coefficient", lambda line: symbol(line["name"]), numeric=False),
     Column("least squares ± U", lambda line: plus_minus(line["least_squares"])),
     Column("posterior, 95 %", _posterior),
     Column("protocol", _stated),
     Column("from", lambda line: "edges" if line["identified"] else "held", numeric=False),
 )
-_ALPHAS = (
+_ALPHAS: tuple[Column[Record], ...] = (
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
     _STRIKES,
     Column("n", lambda line: str(line["n"])),
@@ -200,7 +202,7 @@ _ALPHAS = (
     Column("α by coefficients", lambda line: fixed(value_of(line.get("model")), 5)),
     Column("contact point ± U (mm)", _contact),
 )
-_IMPULSES = (
+_IMPULSES: tuple[Column[Record], ...] = (
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
     _STRIKES,
     Column("rods", lambda line: str(line["rods"])),
@@ -209,7 +211,7 @@ _IMPULSES = (
     Column("p", _p),
     Column("largest |Eₙ|", _worst),
 )
-_INCLINES = (
+_INCLINES: tuple[Column[Record], ...] = (
     Column("quantity", lambda line: MEASURANDS[line["quantity"]].symbol, numeric=False),
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
     _STRIKES,
@@ -220,7 +222,7 @@ _INCLINES = (
     Column("χ²", lambda line: fixed(line["chi2"], 2)),
     Column("p", _p),
 )
-_RODS = (
+_RODS: tuple[Column[Record], ...] = (
     Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
     _STRIKES,
     Column("rod", lambda line: "–".join(map(str, dict.fromkeys(line["rods"])))),
@@ -228,7 +230,7 @@ _RODS = (
     Column("Eq. 9 (m/s)", lambda line: fixed(line["eq9_m_s"], 5)),
     Column("Eₙ", lambda line: fixed(line["normalized_error"], 2)),
 )
-_COMPARISON = (
+_COMPARISON: tuple[Column[Record], ...] = (
     Column("quantity", lambda line: MEASURANDS[line["quantity"]].symbol, numeric=False),
     Column("χ²", lambda line: fixed(line["chi2"], 1)),
     Column("inclines", lambda line: str(line["degrees"])),

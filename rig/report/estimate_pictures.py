@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.measurands import SEPARATION
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
 from rig.report.embed import PageFigure
 from rig.report.estimate import has_free_chain
@@ -140,14 +141,15 @@ def _impulses(found: Mapping[str, Any]) -> PageFigure:
 def _curves(found: Mapping[str, Any]) -> PageFigure:
     """Δz(t) and V²(z) with bands (Fig. 4)."""
     curves = _spread(found["curves"])
-    free = all("separation_m" in curve for curve in curves)
+    row = SEPARATION
+    free = all(SEPARATION.name in curve for curve in curves)
     with canvas((2.6,), 7.0 if free else 4.5, simulated=found["simulated"],
                 columns=2 if free else 1, sharex=False) as drawing:  # fmt: skip
         for curve, (_, color) in zip(curves, _STYLES, strict=False):
             label = f"{curve['incline_deg']:g}°, run {curve['run']}"
             if free:
                 axes = drawing.axes[0]
-                _banded(axes, curve["time_s"], curve, "separation_m", 100.0, color, label)
+                _banded(axes, curve["time_s"], curve, row.name, row.scale, color, label)
             axes = drawing.axes[-1]
             _banded(axes, curve["height_m"], curve, "speed2_m2_s2", 1.0, color, label)
         if free:

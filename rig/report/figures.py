@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from itertools import groupby
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.measurands import MEASURANDS, averaged
+from rig.analysis.result import GOOD
+from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, averaged
 from rig.report.bars import LABELS, bar
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
-from rig.report.numbers import expanded, fixed, nested, value_of
+from rig.report.numbers import fixed, value_of
 from rig.report.panels import (
-    COUNTED,
     legend_above,
     limit_lines,
     mark_inclines,
@@ -23,7 +24,11 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from rig.analysis.result import DropResult
+    from rig.analysis.session import Analysis
+    from rig.analysis.summary import Incline
     from rig.measurands import Measurand
+    from rig.protocol.protocol import Condition
     from rig.report.bars import Bars
 
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2, "markeredgewidth": 0}
@@ -43,7 +48,7 @@ _SEGMENTS: dict[str, tuple[Any, str]] = {
 
 
 def incline_figure(
-    analysis: Mapping[str, Any],
+    analysis: Analysis,
     curves: Mapping[str, Any] | None = None,
     simulated: bool = False,
     bars: Bars = "U95",
@@ -52,13 +57,8 @@ def incline_figure(
 
     Parameters
     ----------
-    analysis
-        What ``rig analyze --json`` prints.
     curves
-        The model: lists of one length ``incline_deg``, ``separation_m``, ``speed_m_s`` and
-        ``segments``, the last naming the part each point is on (``surface``, ``pile`` or any
-        other words; of unlike chains ``surface, chain A``). ``separation_U95_m`` and
-        ``speed_U95_m_s`` add bands, a single number ``free_fall_speed_m_s`` adds that line.
+        The model, as `rig.analysis.curves.model_curves` gives it; without, there are no lines.
     simulated
         Whether to stamp the figure.
     bars
@@ -70,19 +70,15 @@ def incline_figure(
         SVG.
     """
     curves = curves or {}
-    measured = [*(analysis.get("summary") or ()), *(analysis.get("runs") or ())]
-    panels = [
-        row
-        for row in averaged()
-        if row.name in curves or any(value_of(line.get(row.name)) is not None for line in measured)
-    ] or [MEASURANDS["separation_m"]]
+    measured = {name for one in analysis.runs for name in one.quantities}
+    panels = [row for row in averaged() if row.name in {*curves, *measured}] or [SEPARATION]
     with canvas((3.1,) * len(panels), simulated=simulated) as drawing:
         for axes, row in zip(drawing.axes, panels, strict=True):
             _incline_panel(axes, analysis, curves, row, bars)
             axes.set_ylabel(row.axis)
-            if row.name == "separation_m":
+            if row == SEPARATION:
                 axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-            elif row.name == "speed_m_s":
+            elif row == SPEED:
                 _free_fall_line(axes, value_of(curves.get("free_fall_speed_m_s")))
         # The empty corner: both quantities fall towards steep surfaces, but for a chain whose α is
         # given beside one whose α is not.
@@ -94,7 +90,7 @@ def incline_figure(
 
 
 def runs_figure(
-    analysis: Mapping[str, Any], simulated: bool = False, skew_limit_s: float | None = None
+    analysis: Analysis, simulated: bool = False, skew_limit_s: float | None = None
 ) -> str:
     """Every run in order: separation less its prediction, and below it the release skew.
 
@@ -103,8 +99,6 @@ def runs_figure(
 
     Parameters
     ----------
-    analysis
-        What ``rig analyze --json`` prints.
     simulated
         Whether to stamp the figure.
     skew_limit_s
@@ -115,20 +109,20 @@ def runs_figure(
     str
         SVG.
     """
-    runs = sorted(analysis.get("runs") or (), key=lambda run: run["run"])
-    skewed = any(value_of(run.get("release_skew_s")) is not None for run in runs)
+    runs = sorted(analysis.runs, key=attrgetter("run.number"))
+    skewed = any(RELEASE_SKEW.name in one.quantities for one in runs)
     with canvas((3.0, 2.2) if skewed else (3.0,), simulated=simulated) as drawing:
         top, *rest = drawing.axes
-        references, words = _references(analysis.get("summary") or ())
+        references, words = _references(analysis.summary)
         top.axhline(0, color=MUTED, linewidth=0.9)
-        run_points(top, runs, "separation_m", 100.0, references)
-        top.set_ylabel(f"Δz − {words} (cm)")
+        run_points(top, runs, SEPARATION, references)
+        top.set_ylabel(f"{SEPARATION.symbol} − {words} ({SEPARATION.unit})")
         for axes in rest:
             axes.axhline(0, color=MUTED, linewidth=0.9)
-            run_points(axes, runs, "release_skew_s", 1000.0)
-            axes.set_ylabel("release skew (ms)")
+            run_points(axes, runs, RELEASE_SKEW)
+            axes.set_ylabel(f"{RELEASE_SKEW.label} ({RELEASE_SKEW.unit})")
             if skew_limit_s:
-                limit_lines(axes, skew_limit_s * 1000)
+                limit_lines(axes, skew_limit_s * RELEASE_SKEW.scale)
         legend_above(top)
         run_axis(drawing.axes[-1])
         mark_inclines(drawing.axes, runs)
@@ -136,55 +130,51 @@ def runs_figure(
 
 
 def gravity_figure(
-    analysis: Mapping[str, Any], simulated: bool = False, site_m_s2: object = None
+    analysis: Analysis, simulated: bool = False, site_m_s2: float | None = None
 ) -> str:
     """Draw the acceleration of each run, their mean with its uncertainty and the site's value.
 
     Parameters
     ----------
     analysis
-        What ``rig analyze --json`` prints for a scene without a surface.
+        Of a scene without a surface.
     simulated
         Whether to stamp the figure.
     site_m_s2
-        Expected gravity: a number, a quantity object, or `None` for what the summary predicts.
+        Expected gravity; `None` for what the summary predicts.
 
     Returns
     -------
     str
         SVG.
     """
-    runs = sorted(analysis.get("runs") or (), key=lambda run: run["run"])
-    summary: Mapping[str, Any] = next(iter(analysis.get("summary") or ()), {})
-    if site_m_s2 is None:
-        site_m_s2 = nested(summary, "predicted", "gravity_m_s2")
+    runs = sorted(analysis.runs, key=attrgetter("run.number"))
+    mean = None
+    if analysis.summary:
+        mean = analysis.summary[0].means.get(GRAVITY.name)
+        if site_m_s2 is None:
+            site_m_s2 = value_of(analysis.summary[0].predicted.get(GRAVITY.name))
     with canvas((3.2,), simulated=simulated) as drawing:
         (axes,) = drawing.axes
-        mean, uncertainty = (
-            value_of(summary.get("gravity_m_s2")),
-            expanded(summary.get("gravity_m_s2")),
-        )
         if mean is not None:
-            if uncertainty is not None:
-                axes.axhspan(
-                    mean - uncertainty,
-                    mean + uncertainty,
-                    color=MODEL_BAND,
-                    alpha=0.7,
-                    linewidth=0,
-                    label="mean ± U (95 %)",
-                )
-            axes.axhline(mean, color=MODEL, label="mean of runs")
-        site = value_of(site_m_s2)
-        if site is not None:
+            axes.axhspan(
+                mean.value - mean.expanded,
+                mean.value + mean.expanded,
+                color=MODEL_BAND,
+                alpha=0.7,
+                linewidth=0,
+                label="mean ± U (95 %)",
+            )
+            axes.axhline(mean.value, color=MODEL, label="mean of runs")
+        if site_m_s2 is not None:
             axes.axhline(
-                site,
+                site_m_s2,
                 color=SECOND,
                 linestyle=(0, (5, 2.5)),
-                label=f"site, {fixed(site, 4)} m/s²",
+                label=f"site, {fixed(site_m_s2, GRAVITY.decimals)} {GRAVITY.unit}",
             )
-        run_points(axes, runs, "gravity_m_s2", 1.0)
-        axes.set_ylabel(MEASURANDS["gravity_m_s2"].axis)
+        run_points(axes, runs, GRAVITY)
+        axes.set_ylabel(GRAVITY.axis)
         axes.ticklabel_format(axis="y", useOffset=False)
         legend_above(axes)
         run_axis(axes)
@@ -193,7 +183,7 @@ def gravity_figure(
 
 def _incline_panel(
     axes: Axes,
-    analysis: Mapping[str, Any],
+    analysis: Analysis,
     curves: Mapping[str, Any],
     row: Measurand,
     bars: Bars,
@@ -215,15 +205,15 @@ def _incline_panel(
             low = [value - width for value, width in zip(values, widths, strict=True)]
             high = [value + width for value, width in zip(values, widths, strict=True)]
             axes.fill_between(inclines, low, high, color=MODEL_BAND, alpha=0.6, linewidth=0)
-    dots = list(_single_runs(analysis.get("runs") or (), key))
+    dots = list(_single_runs(analysis.runs, key))
     if dots:
         xs, ys = zip(*dots, strict=True)
         axes.plot(xs, [y * scale for y in ys], color=MUTED, alpha=0.45, label="single runs", **_DOT)
-    lines = [line for line in analysis.get("summary") or () if value_of(line.get(key)) is not None]
+    lines = [line for line in analysis.summary if key in line.means]
     if lines:
         axes.errorbar(
-            [line["incline_deg"] for line in lines],
-            [_scaled(line[key], scale) for line in lines],
+            [line.incline_deg for line in lines],
+            [line.means[key].value * scale for line in lines],
             yerr=[(bar(line, key, bars) or 0.0) * scale for line in lines],
             label=f"mean of runs ± {LABELS[bars]}",
             **_MEAN,
@@ -237,17 +227,15 @@ def _segments(curves: Mapping[str, Any]) -> Iterator[tuple[str, list[int]]]:
         yield str(name), list(indices)
 
 
-def _single_runs(runs: Sequence[Mapping[str, Any]], key: str) -> Iterator[tuple[float, float]]:
+def _single_runs(runs: Sequence[DropResult], name: str) -> Iterator[tuple[float, float]]:
     """Yield runs that count, spread a little sideways so that they do not hide each other."""
-    counted = [
-        run for run in runs if run.get("verdict") in COUNTED and value_of(run.get(key)) is not None
-    ]
-    counted.sort(key=lambda run: (run["incline_deg"], run["run"]))
-    for incline, group in groupby(counted, key=lambda run: float(run["incline_deg"])):
+    counted = [one for one in runs if one.verdict in GOOD and name in one.quantities]
+    counted.sort(key=attrgetter("run.incline_deg", "run.number"))
+    for incline, group in groupby(counted, key=attrgetter("run.incline_deg")):
         members = list(group)
         step = min(0.28, 2.2 / len(members))
-        for place, run in enumerate(members):
-            yield incline + step * (place - (len(members) - 1) / 2), value_of(run[key]) or 0.0
+        for place, one in enumerate(members):
+            yield incline + step * (place - (len(members) - 1) / 2), one.quantities[name].value
 
 
 def _incline_axis(axes: Axes) -> None:
@@ -273,21 +261,14 @@ def _free_fall_line(axes: Axes, speed: float | None) -> None:
     )
 
 
-def _references(
-    summary: Sequence[Mapping[str, Any]],
-) -> tuple[dict[tuple[float, str | None], float], str]:
-    """Return what runs are compared with, by incline and unlike chain, and the words for it."""
-
-    def case(line: Mapping[str, Any]) -> tuple[float, str | None]:
-        return float(line["incline_deg"]), line.get("impact_chain")
-
-    predicted = {
-        case(line): value_of(nested(line, "predicted", "separation_m")) for line in summary
-    }
-    words = "model" if any(value is not None for value in predicted.values()) else "mean"
-    if words == "mean":
-        predicted = {case(line): value_of(line.get("separation_m")) for line in summary}
-    return {key: value for key, value in predicted.items() if value is not None}, words
+def _references(summary: Sequence[Incline]) -> tuple[dict[Condition, float], str]:
+    """Return what runs are compared with, by condition, and the words for it."""
+    model = {line.condition: line.predicted.get(SEPARATION.name) for line in summary}
+    found = {key: one.value for key, one in model.items() if one is not None}
+    if found:
+        return found, "model"
+    means = {line.condition: line.means.get(SEPARATION.name) for line in summary}
+    return {key: one.value for key, one in means.items() if one is not None}, "mean"
 
 
 def _scaled(quantity: object, scale: float) -> float:

@@ -8,20 +8,27 @@ from dataclasses import dataclass, field
 from functools import partial
 from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from rig.analysis.remedies import remedies
+from rig.analysis.result import GOOD, Verdict
 from rig.files import write_atomic
-from rig.report.columns import AUDIT, Column, filled, run_columns, summary_columns
+from rig.measurands import SEPARATION_RAW
+from rig.report.columns import AUDIT, Column, filled, main_error, run_columns, summary_columns
 from rig.report.embed import dark_figure_css, embedded
 from rig.sections import Sections
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Container, Sequence
 
+    from rig.analysis.result import DropResult
+    from rig.analysis.session import Analysis
+    from rig.analysis.summary import Incline
     from rig.report.embed import PageFigure
     from rig.report.parts import Part
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +39,6 @@ class ReportContext:
     ----------
     title
         Of the protocol.
-    analysis
-        What ``rig analyze --json`` prints; runs may also carry ``budget``, a list of ``{"name",
-        "quantity", "u"}``.
     simulated
         Whether to stamp the page.
     figures
@@ -56,7 +60,7 @@ class ReportContext:
     """
 
     title: str
-    analysis: Mapping[str, Any]
+    analysis: Analysis
     simulated: bool
     figures: Sequence[PageFigure] = ()
     protocol_text: str = ""
@@ -94,14 +98,14 @@ def report_html(context: ReportContext) -> str:
     mark = "SIMULATED – " if context.simulated else ""
     make = context.sections.make
     parts = [
-        make("The table of results", lambda: _summary(context.analysis)),
+        make("The table of results", lambda: _summary(context.analysis.summary)),
         *(
             make(f"Figure {number}", partial(embedded, picture, number))
             for number, picture in enumerate(context.figures, 1)
         ),
         make("The table of runs", lambda: _runs(context.analysis)),
         *(make(f'The section "{part.heading}"', partial(_part, part)) for part in context.parts),
-        make("The uncertainty budget", lambda: _budget(context.analysis)),
+        make("The uncertainty budget", lambda: _budget(context.analysis.runs)),
         make("The provenance", lambda: _provenance(context)),
     ]
     header = f"<header><h1>{title}</h1>{_subtitle(context)}{stamp}</header>"
@@ -120,11 +124,11 @@ def report_html(context: ReportContext) -> str:
 
 
 def _subtitle(context: ReportContext) -> str:
-    runs = context.analysis.get("runs") or ()
-    verdicts = [str(run.get("verdict")) for run in runs]
+    runs = context.analysis.runs
+    verdicts = [one.verdict for one in runs]
     counts = [
         f"{verdicts.count(verdict)} {verdict}"
-        for verdict in ("accepted", "marginal", "void", "rejected")
+        for verdict in get_args(Verdict)
         if verdict in verdicts
     ]
     noun = "run" if len(runs) == 1 else "runs"
@@ -137,12 +141,11 @@ def _notes(context: ReportContext) -> str:
     return "".join(f'<p class="note">{escape(note)}</p>' for note in notes)
 
 
-def _summary(analysis: Mapping[str, Any]) -> str:
-    lines = analysis.get("summary") or ()
+def _summary(lines: Sequence[Incline]) -> str:
     if not lines:
         return "<h2>Summary</h2><p>No accepted runs, so no summary.</p>"
     note = "U is the expanded uncertainty of the mean (95 %)."
-    if any(line.get("normalized_error") is not None for line in lines):
+    if any(main_error(line) is not None for line in lines):
         note += (
             " Eₙ is the difference from the prediction over its expanded uncertainty: within ±1 "
             "they agree."
@@ -150,19 +153,18 @@ def _summary(analysis: Mapping[str, Any]) -> str:
     return f'<h2>Summary</h2>{_table(summary_columns(), lines)}<p class="note">{note}</p>'
 
 
-def _runs(analysis: Mapping[str, Any]) -> str:
+def _runs(analysis: Analysis) -> str:
     html = ""
-    if analysis.get("runs"):
-        html += f"<h2>Runs</h2>{_table(run_columns(), analysis['runs'])}"
-        if any(run.get("separation_raw_m") for run in analysis["runs"]):
+    if analysis.runs:
+        html += f"<h2>Runs</h2>{_run_table(analysis.runs)}"
+        if any(SEPARATION_RAW.name in one.quantities for one in analysis.runs):
             html += (
                 '<p class="note">Δz is corrected to simultaneous release, raw Δz is as it '
                 "happened. Skew is the free chain's release less the impact chain's.</p>"
             )
-        if any(run.get("edges") for run in analysis["runs"]):
-            html += f'<p class="note">Edges: {" / ".join(AUDIT)}.</p>'
-    if analysis.get("superseded"):
-        html += f"<h2>Earlier attempts</h2>{_table(run_columns(), analysis['superseded'])}"
+        html += f'<p class="note">Edges: {" / ".join(AUDIT)}.</p>'
+    if analysis.superseded:
+        html += f"<h2>Earlier attempts</h2>{_run_table(analysis.superseded)}"
     return html
 
 
@@ -174,18 +176,19 @@ def _part(part: Part) -> str:
     return f"<h2>{escape(part.heading)}</h2>{table}{notes}"
 
 
-def _budget(analysis: Mapping[str, Any]) -> str:
+def _budget(runs: Sequence[DropResult]) -> str:
     lines = [
-        {**line, "run": run.get("run")}
-        for run in analysis.get("runs") or ()
-        for line in run.get("budget") or ()
+        {"run": one.run.number, "source": source, "quantity": name, "u": u}
+        for one in runs
+        for name, value in one.quantities.items()
+        for source, u in value.budget.items()
     ]
     if not lines:
         return ""
-    columns = (
+    columns: tuple[Column[Mapping[str, Any]], ...] = (
         Column("run", lambda line: str(line["run"])),
-        Column("source", lambda line: str(line.get("name", "")), numeric=False),
-        Column("quantity", lambda line: str(line.get("quantity", "")), numeric=False),
+        Column("source", lambda line: str(line["source"]), numeric=False),
+        Column("quantity", lambda line: str(line["quantity"]), numeric=False),
         Column("standard uncertainty (SI)", lambda line: f"{line['u']:.2g}"),
     )
     return (
@@ -194,7 +197,18 @@ def _budget(analysis: Mapping[str, Any]) -> str:
     )
 
 
-def _table(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> str:
+def _run_table(runs: Sequence[DropResult]) -> str:
+    off = {n for n, one in enumerate(runs) if one.verdict not in GOOD}
+    return _table(run_columns(), runs, off, [_why(one) for one in runs])
+
+
+def _table(
+    columns: Sequence[Column[T]],
+    records: Sequence[T],
+    off: Container[int] = (),
+    reasons: Sequence[str] = (),
+) -> str:
+    """Make a table; rows may be struck off, and have reasons."""
     kept, rows = filled(columns, records)
     sides = [' class="num"' if column.numeric else "" for column in kept]
     head = "".join(
@@ -202,14 +216,14 @@ def _table(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> s
         for column, side in zip(kept, sides, strict=True)
     )
     body = ""
-    for record, row in zip(records, rows, strict=True):
-        off = ' class="off"' if record.get("verdict") in {"void", "rejected"} else ""
+    for n, row in enumerate(rows):
         cells = "".join(
             _cell(column, text, side) for column, text, side in zip(kept, row, sides, strict=True)
         )
-        body += f"<tr{off}>{cells}</tr>\n"
-        why = _why(record)
-        if why:  # a line of their own: sentences do not fit beside so many numbers
+        struck_off = ' class="off"' if n in off else ""
+        body += f"<tr{struck_off}>{cells}</tr>\n"
+        if n < len(reasons) and (why := reasons[n]):
+            # A line of their own: sentences do not fit beside so many numbers.
             body += f'<tr class="why"><td colspan="{len(kept)}">{escape(why)}</td></tr>\n'
     return (
         f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n'
@@ -217,14 +231,13 @@ def _table(columns: Sequence[Column], records: Sequence[Mapping[str, Any]]) -> s
     )
 
 
-def _why(record: Mapping[str, Any]) -> str:
+def _why(one: DropResult) -> str:
     """Reasons of a verdict, and of a void drop what to do."""
-    reasons = [str(reason) for reason in record.get("reasons") or ()]
-    what = remedies(reasons) if record.get("verdict") == "void" else []
-    return " → ".join(filter(None, ["; ".join(reasons), "; ".join(what)]))
+    what = remedies(one.reasons) if one.verdict == "void" else []
+    return " → ".join(filter(None, ["; ".join(one.reasons), "; ".join(what)]))
 
 
-def _cell(column: Column, text: str, side: str) -> str:
+def _cell(column: Column[Any], text: str, side: str) -> str:
     if column.heading == "verdict":
         side = f' class="{escape(text)}"'
     return f"<td{side}>{escape(text)}</td>"

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 MINUS = "−"
 
 
 def value_of(quantity: object) -> float | None:
-    """Best estimate of a quantity object, a bare number, or `None` where there is none."""
+    """Best estimate of a quantity, be it typed or as in JSON, or a bare number.
+
+    `None` where there is none, or none that is finite.
+    """
     if isinstance(quantity, Mapping):
         quantity = quantity.get("value")
+    else:
+        quantity = getattr(quantity, "value", quantity)
     if isinstance(quantity, bool) or not isinstance(quantity, (int, float)):
         return None
     return float(quantity) if math.isfinite(quantity) else None
 
 
 def expanded(quantity: object) -> float | None:
-    """Return the expanded uncertainty U95 of a quantity object, `None` where it has none."""
-    return value_of(quantity.get("U95")) if isinstance(quantity, Mapping) else None
+    """Return the expanded uncertainty U95 of a quantity, `None` where it has none."""
+    if isinstance(quantity, Mapping):
+        return value_of(quantity.get("U95"))
+    return value_of(getattr(quantity, "expanded", None))
 
 
 def fixed(value: float | None, decimals: int) -> str:
@@ -49,7 +55,7 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
     Parameters
     ----------
     quantity
-        ``{"value", "u", "U95"}``, a bare number or `None`.
+        Measured, ``{"value", "u", "U95"}`` as in JSON, a bare number or `None`.
     scale
         Factor to the unit of the column, for example 100 from m to cm.
     default
@@ -62,13 +68,3 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
         return fixed(value * scale, default)
     decimals = decimals_for(uncertainty * scale, default)
     return f"{fixed(value * scale, decimals)} ± {fixed(uncertainty * scale, decimals)}"
-
-
-def nested(record: Mapping[str, Any], *path: str) -> Any:
-    """Return a member of a member, `None` where the way ends early."""
-    found: Any = record
-    for key in path:
-        if not isinstance(found, Mapping):
-            return None
-        found = found.get(key)
-    return found

@@ -3,54 +3,54 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rig.analysis.result import GOOD
+from rig.measurands import RELEASE_SKEW
+from rig.protocol.protocol import Condition
 from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND
-from rig.report.numbers import expanded, value_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
 
-COUNTED = ("accepted", "marginal")
-"""Verdicts of runs that enter the mean."""
+    from rig.analysis.result import DropResult
+    from rig.measurands import Measurand
 
 _CHAIN_STYLES = (("o", MODEL, MODEL), ("s", SECOND, PAPER), ("^", INK, INK), ("D", MUTED, PAPER))
 
 
 def run_points(
     axes: Axes,
-    runs: Sequence[Mapping[str, Any]],
-    key: str,
-    scale: float,
-    references: Mapping[tuple[float, str | None], float] | None = None,
+    runs: Sequence[DropResult],
+    row: Measurand,
+    references: Mapping[Condition, float] | None = None,
 ) -> None:
     """Plot a quantity of every run, a marker for each chain, a cross for runs that do not count."""
-    chains = sorted({str(run.get("impact_chain") or "") for run in runs})
+    chains = sorted({one.run.impact or "" for one in runs})
     groups: dict[tuple[str, bool], list[tuple[int, float, float]]] = {}
-    for run in runs:
-        value = value_of(run.get(key))
-        reference = 0.0
+    for one in runs:
+        measured = one.quantities.get(row.name)
+        reference: float | None = 0.0
         if references is not None:
-            incline = float(run.get("incline_deg") or 0.0)
-            found = references.get(
-                (incline, run.get("impact_chain")), references.get((incline, None))
+            like = Condition(one.run.incline_deg)  # where it makes no difference which one strikes
+            reference = references.get(
+                like._replace(impact_chain=one.run.impact), references.get(like)
             )
-            value, reference = (None, 0.0) if found is None else (value, found)
-        if value is None:
+        if measured is None or reference is None:
             continue
-        counts = run.get("verdict") in COUNTED
-        group = (str(run.get("impact_chain") or "") if counts else "", counts)
-        bar = (expanded(run[key]) or 0.0) * scale
-        groups.setdefault(group, []).append((run["run"], (value - reference) * scale, bar))
+        counts = one.verdict in GOOD
+        group = ((one.run.impact or "") if counts else "", counts)
+        point = (measured.value - reference) * row.scale, measured.expanded * row.scale
+        groups.setdefault(group, []).append((one.run.number, *point))
     for (chain, counts), points in sorted(groups.items(), key=lambda item: not item[0][1]):
         numbers, values, bars = zip(*points, strict=True)
         if not counts:
             # Plotted last, on the scale of the runs that count: one lost edge can put a void run
             # a metre off.
             low, high = axes.get_ylim()
-            if len(groups) > 1 and key != "release_skew_s":
+            if len(groups) > 1 and row != RELEASE_SKEW:
                 axes.set_ylim(low, high)
             else:
                 low, high = min(values), max(values)
@@ -110,11 +110,11 @@ def run_axis(axes: Axes) -> None:
     axes.margins(x=0.02)
 
 
-def mark_inclines(panels: Sequence[Axes], runs: Sequence[Mapping[str, Any]]) -> None:
+def mark_inclines(panels: Sequence[Axes], runs: Sequence[DropResult]) -> None:
     """Mark where the inclination changes, as long as the marks stay readable."""
     blocks = [
-        (incline, [run["run"] for run in block])
-        for incline, block in groupby(runs, key=lambda run: run.get("incline_deg"))
+        (incline, [one.run.number for one in block])
+        for incline, block in groupby(runs, key=lambda one: one.run.incline_deg)
     ]
     if not 1 < len(blocks) <= 16:
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.measurands import MEASURANDS
+from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
 from rig.model.fall import free_fall_speed
 from rig.report.canvas import INK, MODEL, MUTED, SECOND, canvas
@@ -54,13 +54,12 @@ def _caption() -> str:
 
 def _figure_3(axes: list[Axes], columns: Columns) -> None:
     """Δz above, V below."""
-    for panel, name in ((axes[0], "separation_m"), (axes[1], "speed_m_s")):
-        row = MEASURANDS[name]
+    for panel, row in ((axes[0], SEPARATION), (axes[1], SPEED)):
         for pile, style, words in ((0.0, "-", "rods on the surface"), (1.0, "--", "on a pile")):
             rows = [i for i, flag in enumerate(columns["pile"]) if flag == pile]
             # The rod does not slide between level and arctan μ: no line across.
             inclines = [columns["incline_deg"][i] for i in rows]
-            values = [columns[name][i] * row.scale for i in rows]
+            values = [columns[row.name][i] * row.scale for i in rows]
             start = 1 if not pile and inclines[0] == 0.0 else 0
             if start:
                 panel.plot(inclines[:1], values[:1], "o", color=MODEL, markersize=4)
@@ -101,8 +100,8 @@ def _figure_4(axes: list[Axes], columns: Columns) -> None:
 def _figure_6(axes: list[Axes], columns: Columns) -> None:
     """Against ξ, with the closed forms beside the discrete model."""
     for panel, row, other, words in (
-        (axes[0], MEASURANDS["separation_m"], "eq15_separation_m", "Eq. 15"),
-        (axes[1], MEASURANDS["speed_m_s"], "eq14_speed_m_s", "Eq. 14"),
+        (axes[0], SEPARATION, f"eq15_{SEPARATION.name}", "Eq. 15"),
+        (axes[1], SPEED, f"eq14_{SPEED.name}", "Eq. 14"),
     ):
         inertia = columns["inertia"]
         discrete, closed = ([row.scale * v for v in columns[key]] for key in (row.name, other))

@@ -8,28 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 from rig.measurands import averaged, told
 from rig.report.bars import LABELS, bar
-from rig.report.columns import Column, incline
-from rig.report.numbers import fixed, nested, plus_minus, value_of
+from rig.report.columns import Column, degrees, summary_incline
+from rig.report.numbers import fixed, plus_minus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from rig.analysis.pairs import Effects
+    from rig.analysis.result import Measured
+    from rig.analysis.summary import Incline
     from rig.measurands import Measurand
 
-    Record = Mapping[str, Any]
-
-_SCATTER_HEADINGS = {"incline": "incline (°)", "strikes": "strikes", "n": "n", "quantity": ""}
-_SCATTER_HEADINGS |= {
-    "mean": "mean",
-    "SD": "SD",
-    "SE": "SE",
-    "u": "u",
-    "U95": "U95",
-    "half-SD": "SD/2",
-}
-_SCATTER = tuple(
-    Column(heading, itemgetter(key), numeric=key not in {"quantity", "strikes"})
-    for key, heading in _SCATTER_HEADINGS.items()
+_SCATTER: tuple[Column[Mapping[str, str]], ...] = (
+    Column("incline (°)", itemgetter("incline")),
+    Column("strikes", itemgetter("strikes"), numeric=False),
+    Column("n", itemgetter("n")),
+    Column("", itemgetter("quantity"), numeric=False),
+    Column("mean", itemgetter("mean")),
+    Column("SD", itemgetter("SD")),
+    Column("SE", itemgetter("SE")),
+    Column("u", itemgetter("u")),
+    Column("U95", itemgetter("U95")),
+    Column("SD/2", itemgetter("half-SD")),
 )
 
 
@@ -45,22 +45,15 @@ class Part:
 
     heading: str
     sentences: Sequence[str] = ()
-    columns: Sequence[Column] = ()
-    records: Sequence[Mapping[str, Any]] = ()
+    columns: Sequence[Column[Any]] = ()
+    records: Sequence[Any] = ()
     folded: str = ""
 
 
-def effects_parts(found: Mapping[str, Any]) -> Iterator[Part]:
-    """Yield the section on effects where an analysis has any.
-
-    Parameters
-    ----------
-    found
-        What ``rig analyze --json`` prints.
-    """
-    effects = found.get("effects") or ()
+def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
+    """Yield the section on effects of chains and sides where there are any."""
     if effects:
-        first, second = effects[0]["chains"]
+        first, second = effects[0].first, effects[0].second
         yield Part(
             f"Chain {first} less chain {second}, and sides",
             [
@@ -74,36 +67,27 @@ def effects_parts(found: Mapping[str, Any]) -> Iterator[Part]:
         )
 
 
-def _number(name: str) -> Callable[[Record], str]:
-    return lambda record: fixed(value_of(record.get(name)), 0)
-
-
-def _effect_columns() -> Iterator[Column]:
-    yield Column("incline (°)", incline)
-    yield Column("blocks", _number("blocks"))
+def _effect_columns() -> Iterator[Column[Effects]]:
+    yield Column("incline (°)", lambda one: degrees(one.incline_deg))
+    yield Column("blocks", lambda one: str(one.blocks))
     for row in told():
         if row.by_chain:
-            yield _effect("chain", row.symbol, row)
+            yield _effect(row.symbol, row, lambda one: one.chain)
     for row in told():
         if row.by_side:
-            yield _effect("side", f"sides' {row.symbol}", row)
+            yield _effect(f"sides' {row.symbol}", row, lambda one: one.side)
 
 
-def _effect(of: str, what: str, row: Measurand) -> Column:
-    def cell(record: Record) -> str:
-        return plus_minus(nested(record, of, row.name), row.fine_scale)
+def _effect(
+    what: str, row: Measurand, of: Callable[[Effects], Mapping[str, Measured]]
+) -> Column[Effects]:
+    return Column(
+        f"{what} ± U ({row.fine})", lambda one: plus_minus(of(one).get(row.name), row.fine_scale)
+    )
 
-    return Column(f"{what} ± U ({row.fine})", cell)
 
-
-def scatter_part(found: Mapping[str, Any]) -> Part:
-    """Make the table.
-
-    Parameters
-    ----------
-    found
-        What ``rig analyze --json`` prints.
-    """
+def scatter_part(summary: Sequence[Incline]) -> Part:
+    """Make the table of scatter."""
     return Part(
         "Scatter of the runs",
         [
@@ -112,21 +96,21 @@ def scatter_part(found: Mapping[str, Any]) -> Part:
             "expanded one. SD/2 are the bars of Pantaleone's figures."
         ],
         _SCATTER,
-        [*_scatters(found.get("summary") or ())],
+        [*_scatters(summary)],
     )
 
 
-def _scatters(summary: Any) -> Iterator[Record]:
+def _scatters(summary: Sequence[Incline]) -> Iterator[Mapping[str, str]]:
     for line in summary:
         for row in averaged():
-            if row.name not in line:
+            if row.name not in line.means:
                 continue
-            values: dict[str, float | None] = {"mean": value_of(line[row.name])}
+            values: dict[str, float | None] = {"mean": line.means[row.name].value}
             values |= {kind: bar(line, row.name, kind) for kind in LABELS}
             yield {
-                "incline": incline(line),
-                "strikes": str(line.get("impact_chain", "")),
-                "n": fixed(line["n"], 0),
+                "incline": summary_incline(line),
+                "strikes": line.impact_chain or "",
+                "n": str(line.n),
                 "quantity": f"{row.symbol} ({row.fine})",
                 **{
                     key: "" if value is None else fixed(value * row.fine_scale, row.fine_decimals)

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.measurands import GRAVITY, SEPARATION, SPEED
 from rig.report.embed import PageFigure
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
-from rig.report.numbers import value_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rig.analysis.session import Analysis
     from rig.report.bars import Bars
     from rig.sections import Sections
 
 
 def pictures(
-    analysis: Mapping[str, Any],
+    analysis: Analysis,
     curves: Mapping[str, Any] | None = None,
     simulated: bool = False,
     *,
     skew_limit_s: float | None = None,
-    site_m_s2: object = None,
+    site_m_s2: float | None = None,
     bars: Bars = "U95",
     sections: Sections,
 ) -> list[PageFigure]:
@@ -29,8 +30,6 @@ def pictures(
 
     Parameters
     ----------
-    analysis
-        What ``rig analyze --json`` prints.
     curves
         The model, see `incline_figure`.
     simulated
@@ -44,16 +43,13 @@ def pictures(
     sections
         Where a figure that cannot be drawn is noted.
     """
-    runs = analysis.get("runs") or ()
-
-    def measured(key: str) -> bool:
-        return any(value_of(run.get(key)) is not None for run in runs)
-
+    measured = {name for one in analysis.runs for name in one.quantities}
+    two = SEPARATION.name in measured
     drawn = []
-    if measured("separation_m") or measured("speed_m_s"):
-        both = "Separation and end speed" if measured("separation_m") else "End speed"
-        apart = "Separation of the top rods and speed" if measured("separation_m") else "Speed"
-        chain = "impact chain" if measured("separation_m") else "chain"
+    if two or SPEED.name in measured:
+        both = "Separation and end speed" if two else "End speed"
+        apart = "Separation of the top rods and speed" if two else "Speed"
+        chain = "impact chain" if two else "chain"
         drawn.append(
             (
                 lambda: incline_figure(analysis, curves, simulated, bars),
@@ -62,7 +58,7 @@ def pictures(
                 "inclination; lines are the model.",
             )
         )
-    if measured("separation_m"):
+    if two:
         drawn.append(
             (
                 lambda: runs_figure(analysis, simulated, skew_limit_s),
@@ -70,7 +66,7 @@ def pictures(
                 "Every run in the order of execution. Bars are expanded uncertainties (95 %).",
             )
         )
-    if measured("gravity_m_s2"):
+    if GRAVITY.name in measured:
         drawn.append(
             (
                 lambda: gravity_figure(analysis, simulated, site_m_s2),

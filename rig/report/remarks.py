@@ -2,52 +2,56 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.remedies import remedies, void_runs
-from rig.report.columns import incline
+from rig.analysis.remedies import remedies
+from rig.analysis.result import Measured
+from rig.report.columns import run_incline
 from rig.report.numbers import decimals_for, fixed, plus_minus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rig.analysis.joint_fit import JointFit
+    from rig.analysis.session import Analysis
+    from rig.results import SessionResults
+
 _CLOCK_COVERAGE = 2.0  # about 95 %
-_AIR_COVERAGE = 1.96
 _FOUND = 4.0  # standard uncertainties beyond which κ is worth a remark
 
 
-def void_lines(analysis: Mapping[str, Any]) -> list[str]:
-    """Say of every void drop why, a line each, and below them what to do.
+def remarks(found: SessionResults) -> list[str]:
+    """Make the remarks on a session's clock and air."""
+    return [*clock_lines(found.calibration), *air_lines(found.analysis.joint)]
 
-    Parameters
-    ----------
-    analysis
-        What ``rig analyze --json`` prints.
-    """
-    voids = void_runs(analysis)
+
+def void_lines(analysis: Analysis) -> list[str]:
+    """Say of every void drop why, a line each, and below them what to do."""
+    drops = sorted(
+        (*analysis.runs, *analysis.superseded), key=lambda one: (one.run.number, one.attempt)
+    )
+    voids = [one for one in drops if one.verdict == "void"]
     if not voids:
         return []
     lines = ["void drops:"]
     for one in voids:
-        tilt = incline(one)
+        tilt = run_incline(one)
         at = f" at {tilt}°" if tilt else ""
-        reasons = "; ".join(one["reasons"])
-        lines.append(f"  run {one['run']}, attempt {one['attempt']}{at}: {reasons}")
-    what = remedies(reason for one in voids for reason in one["reasons"])
+        reasons = "; ".join(one.reasons)
+        lines.append(f"  run {one.run.number}, attempt {one.attempt}{at}: {reasons}")
+    what = remedies(reason for one in voids for reason in one.reasons)
     return [*lines, "what to do:", *(f"  {one}" for one in what)]
 
 
-def clock_lines(analysis: Mapping[str, Any]) -> list[str]:
+def clock_lines(said: Mapping[str, Any]) -> list[str]:
     """Say in words where seconds come from, and what to know before trusting them.
 
     Parameters
     ----------
-    analysis
-        What ``rig analyze --json`` prints.
+    said
+        ``calibration`` of ``rig analyze --json``.
     """
-    said = analysis.get("calibration") or {}
-    if not said:
-        return []
     expanded = _CLOCK_COVERAGE * said["u_ppm"]
     u = fixed(expanded, decimals_for(expanded))
     if said["source"] == "pings":
@@ -62,20 +66,16 @@ def clock_lines(analysis: Mapping[str, Any]) -> list[str]:
     return [f"time scale: board {rate} ± {u} ppm off (95 %), {where}", *said["notes"]]
 
 
-def air_lines(analysis: Mapping[str, Any]) -> list[str]:
-    """Say what the air took, where it is more than nothing: the predictions are without it.
-
-    Parameters
-    ----------
-    analysis
-        What ``rig analyze --json`` prints.
-    """
-    for one in (analysis.get("learned") or {}).get("unknowns") or ():
-        if one["name"] != "drag" or abs(one["value"][0]) <= _FOUND * one["u"][0]:
-            continue
-        kappa = {"value": one["value"][0], "U95": _AIR_COVERAGE * one["u"][0]}
-        return [
-            f"air: takes κv² from g, κ = {plus_minus(kappa)} per m; what is measured is in this "
-            "air, what is predicted is not (rig estimate takes it into account)"
-        ]
-    return []
+def air_lines(joint: JointFit | None) -> list[str]:
+    """Say what the air took, where it is more than nothing: the predictions are without it."""
+    block = None if joint is None else joint.shared.blocks.get("drag")
+    if joint is None or block is None:
+        return []
+    value = float(joint.x[block][0])
+    u = math.sqrt(joint.covariance.diagonal()[block][0]) * float(joint.sd[block][0])
+    if abs(value) <= _FOUND * u:
+        return []
+    return [
+        f"air: takes κv² from g, κ = {plus_minus(Measured(value, u))} per m; what is measured is "
+        "in this air, what is predicted is not (rig estimate takes it into account)"
+    ]

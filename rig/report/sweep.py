@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.measurands import MEASURANDS
+from rig.measurands import SEPARATION, SPEED
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, canvas
 from rig.sweep.compute import PILE
 from rig.sweep.variables import VARIABLES
@@ -46,7 +46,6 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
     caption = _caption(facts)
     foot = _LINE_HEIGHT * (caption.count("\n") + 2)
     flat = len(layout.grid.axes) == 2
-    apart, end = MEASURANDS["separation_m"], MEASURANDS["speed_m_s"]
     with canvas(
         (3.4, foot) if flat else (2.9, 2.9, foot),
         9.0 if flat else 7.0,
@@ -55,8 +54,8 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
         description=json.dumps(facts, ensure_ascii=False),
     ) as drawing:
         for panel, values, label in (
-            (drawing.axes[0], apart.scale * swept.separation_m, apart.axis),
-            (drawing.axes[1], end.scale * swept.speed_m_s, end.axis),
+            (drawing.axes[0], SEPARATION.scale * swept.separation_m, SEPARATION.axis),
+            (drawing.axes[1], SPEED.scale * swept.speed_m_s, SPEED.axis),
         ):
             if flat:
                 image = _map(panel, layout.grid.axes, values, swept.in_domain)

@@ -2,22 +2,22 @@
 
 from rig.clock.calibration import Calibration
 from rig.results.whole import (
+    SessionResults,
     calibration,
     detailed,
     protocol_of,
     rejected,
     results,
     tick_rates,
-    with_analysis,
 )
 
 __all__ = [
     "Calibration",
+    "SessionResults",
     "calibration",
     "detailed",
     "protocol_of",
     "rejected",
     "results",
     "tick_rates",
-    "with_analysis",
 ]

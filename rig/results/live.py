@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult, Measured
+    from rig.analysis.session import Analysis
     from rig.clock.calibration import Calibration, TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
@@ -52,8 +53,8 @@ class SessionView:
     gravity
         What each good drop's free chain says of gravity, m/s².
     analysis
-        What ``rig analyze --json`` prints: of the drops that `fitted` counts, or, before there is
-        a joint fit, of all of them by themselves.
+        Of the drops that `fitted` counts, or, before there is a joint fit, of all of them by
+        themselves.
     fitted
         How many drops were fitted jointly in `analysis`; 0 for none.
     lagging
@@ -74,7 +75,7 @@ class SessionView:
     results: Mapping[Job, DropResult]
     scales: Mapping[Job, TimeScale]
     gravity: Mapping[Job, Measured]
-    analysis: Mapping[str, Any]
+    analysis: Analysis
     fitted: int
     lagging: bool
     curves: Mapping[str, Any]
@@ -93,11 +94,6 @@ class SessionView:
         gates = self.protocol.gates
         return () if gates is None else tuple(gate.channel for gate in gates.gates)
 
-    def record(self, job: Job) -> Mapping[str, Any]:
-        """One attempt's result as `rig analyze --json` prints it; empty when not analysed."""
-        result = self.results.get(job)
-        return {} if result is None else result.json()
-
 
 class _Analysed(NamedTuple):
     """One drop by itself, at a tick rate."""
@@ -113,7 +109,7 @@ class _JointFit(NamedTuple):
 
     of: object
     size: int
-    analysis: Mapping[str, Any]
+    analysis: Analysis
 
 
 @dataclass(slots=True)
@@ -193,7 +189,7 @@ class LiveAnalysis:
                 results=results,
                 scales=scales,
                 gravity={job: g for job in drops if (g := self._known[job].gravity) is not None},
-                analysis=joint.analysis if joint else sum_up(protocol, results.values()).json(),
+                analysis=joint.analysis if joint else sum_up(protocol, results.values()),
                 fitted=joint.size if joint else 0,
                 lagging=enough and (joint is None or joint.of != self._members(results)),
                 curves=self._curves,
@@ -216,7 +212,7 @@ class LiveAnalysis:
         fits = [self._known[job].fit for job in view.results]
         found = gather(view.protocol, list(view.results.values()), fits)
         size = sum(result.learned for result in (*found.runs, *found.superseded))
-        self._joint_fit = _JointFit(of, size, found.json())
+        self._joint_fit = _JointFit(of, size, found)
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
         return {job: (result.verdict, self._known[job].hz) for job, result in results.items()}
@@ -246,8 +242,3 @@ def _pace(states: Sequence[StateEntry]) -> float | None:
     at = [entry.host_ns for entry in states if entry.state is RunState.RECORDED]
     gaps = [(b - a) * 1e-9 for a, b in itertools.pairwise(at) if b > a]
     return median(gaps) if len(gaps) > 1 else None
-
-
-def good(record: Mapping[str, Any]) -> bool:
-    """Whether a run takes part in the summary."""
-    return record.get("verdict") in GOOD

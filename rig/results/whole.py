@@ -1,8 +1,8 @@
-"""The whole analysis of a session, as `rig analyze` prints it."""
+"""The whole analysis of a session: what `rig analyze` says."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.gravity import check_gravity
@@ -12,12 +12,57 @@ from rig.protocol import reader
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.session.reading import Reader
+
+
+@dataclass(frozen=True, slots=True)
+class SessionResults:
+    """All that follows from a session.
+
+    Attributes
+    ----------
+    simulated
+        Whether no chain ever fell.
+    analysis
+        Of all drops.
+    clock
+        The time scale.
+    gravity
+        What the free chain says of it; `None` where there is none that can be asked.
+    time_scales
+        The calibration that each drop has, by run and attempt.
+    """
+
+    simulated: bool
+    analysis: Analysis
+    clock: Calibration
+    gravity: GravityCheck | None
+    time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
+
+    @property
+    def calibration(self) -> dict[str, Any]:
+        """``calibration`` of `json`: what is known of the clock, the free chain's word included."""
+        return self.clock.said | _checked(self.clock.said["notes"], self.gravity)
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return each drop as JSON has it, those with a later attempt last, as a session keeps."""
+        found = self.json()
+        return [*found["runs"], *found.get("superseded", [])]
+
+    def json(self) -> dict[str, Any]:
+        """As `rig analyze --json` prints it."""
+        said = self.analysis.json()
+        for run in (*said["runs"], *said.get("superseded", [])):
+            run["calibration"] = self.time_scales[run["run"], run["attempt"]]
+        head = {"simulated": self.simulated, "clock": self.clock.details}
+        return head | {"calibration": self.calibration} | said
 
 
 def protocol_of(session: Reader) -> Protocol:
@@ -38,8 +83,8 @@ def calibration(session: Reader) -> Calibration:
     return Calibrator().look(session, protocol_of(session).reference_u)
 
 
-def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]:
-    """Analyse a session: what `rig analyze --json` prints.
+def results(session: Reader, progress: Progress | None = None) -> SessionResults:
+    """Analyse a session.
 
     Parameters
     ----------
@@ -48,24 +93,17 @@ def results(session: Reader, progress: Progress | None = None) -> dict[str, Any]
     progress
         Called with the number of drops done and the number of all.
     """
-    return with_analysis(session, progress)[0]
-
-
-def with_analysis(
-    session: Reader, progress: Progress | None = None
-) -> tuple[dict[str, Any], Analysis]:
-    """Like `results`, with the analysis that they are of."""
     protocol = protocol_of(session)
     found, clock, drops = _analysed(session, protocol, progress)
     by_key = {(drop.run, drop.attempt): drop for drop in drops}
-    said = found.json()
-    for run in (*said["runs"], *said.get("superseded", [])):
-        run["calibration"] = clock.used(by_key[run["run"], run["attempt"]])
     cases = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
-    check = check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in cases])
-    head = {"simulated": session.simulated, "clock": clock.details}
-    said = head | {"calibration": clock.said | _checked(clock.said["notes"], check)} | said
-    return said, found
+    return SessionResults(
+        session.simulated,
+        found,
+        clock,
+        check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in cases]),
+        {key: clock.used(drop) for key, drop in by_key.items()},
+    )
 
 
 def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:

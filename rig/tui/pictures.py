@@ -141,10 +141,8 @@ def screenshots(view: SessionView) -> list[Screenshot]:
             for line in whole.runs
         ),
     )
-    record = view.record(job)
-    result = Flow(
-        Stage.RESULT, job, verdict=record["verdict"], reasons=tuple(record["reasons"])
-    )  # fmt: skip
+    said = view.results[job]
+    result = Flow(Stage.RESULT, job, verdict=said.verdict, reasons=said.reasons)
     return [
         Screenshot("device", Flow(Stage.DEVICE), before),
         Screenshot("run", Flow(Stage.PREPARE, job), before),

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.measurands import averaged
+from rig.analysis.result import GOOD
+from rig.measurands import GRAVITY, RELEASE_SKEW, averaged
 from rig.records import Job
-from rig.report.numbers import expanded, value_of
-from rig.results.live import good
 from rig.tui.motion import motions, separation
 from rig.tui.widgets.figure import Picture, Series
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from rig.analysis.result import DropResult, Measured
     from rig.protocol.protocol import Protocol, Run
     from rig.results.live import SessionView
     from rig.tui.motion import Motion, Table
@@ -77,27 +77,32 @@ def incline_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
         A run whose numbers must not be seen yet.
     """
     found = []
-    runs = [run for run in view.analysis["runs"] if run["run"] != hidden and good(run)]
-    summary = [] if hidden is not None else view.analysis["summary"]
+    runs = [one for one in _shown(view, hidden) if one.verdict in GOOD]
+    summary = view.analysis.summary if hidden is None else ()
     for row in averaged():
         name, scale, title = row.name, row.scale, f"{row.symbol} ({row.unit}), incline (°)"
         curve = view.curves.get(name)
         if curve is None:
             continue
-        dots = [(r["incline_deg"], value_of(r.get(name))) for r in runs]
-        dots = [(x, y) for x, y in dots if y is not None]
-        means = [(s["incline_deg"], value_of(s.get(name)), expanded(s.get(name))) for s in summary]
-        means = [m for m in means if m[1] is not None]
+        dots = [
+            (one.run.incline_deg, one.quantities[name].value * scale)
+            for one in runs
+            if name in one.quantities
+        ]
+        means = [
+            (line.incline_deg, line.means[name].value * scale, line.means[name].expanded * scale)
+            for line in summary
+            if name in line.means
+        ]
         found.append(
             Picture(
                 title,
                 (
                     *_model_lines(view.curves, name, scale),
-                    Series("dots", [x for x, _ in dots], _scaled([y for _, y in dots], scale),
+                    Series("dots", [x for x, _ in dots], [y for _, y in dots],
                            "secondary", "·", "runs"),
-                    Series("bars", [x for x, *_ in means], _scaled([y for _, y, _ in means], scale),
-                           "primary", "●", "mean ± U",
-                           _scaled([u or 0.0 for *_, u in means], scale)),
+                    Series("bars", [x for x, *_ in means], [y for _, y, _ in means],
+                           "primary", "●", "mean ± U", [u for *_, u in means]),
                 ),
             )
         )  # fmt: skip
@@ -131,38 +136,42 @@ def control_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
     list of Picture
         Those of quantities that this scene has.
     """
-    runs = [run for run in view.analysis["runs"] if run["run"] != hidden]
+    runs = _shown(view, hidden)
     found = []
     if view.protocol.two_chains:
-        limit = view.protocol.accept.release_skew * 1e3
+        row = RELEASE_SKEW
+        limit = view.protocol.accept.release_skew * row.scale
         lines = ((0.0, "foreground", ""), (limit, "warning", f"limit ±{limit:g}"),
                  (-limit, "warning", ""))  # fmt: skip
-        points = [(run, _measured(run.get("release_skew_s"), 1e3)) for run in runs]
-        found.append(_chart("release skew (ms), run", view, lines, points))
-    points = [(run, _gravity(view, run)) for run in runs]
+        points = [(one, _point(one.quantities.get(row.name), row.scale)) for one in runs]
+        found.append(_chart(f"{row.label} ({row.unit}), run", view, lines, points))
+    points = [(one, _gravity(view, one)) for one in runs]
     if view.gravity or any(point for _, point in points):
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
         found.append(_chart("g of the free chain (m/s²), run", view, expected, points))
     return found
 
 
-def _measured(told: Mapping[str, float] | None, scale: float = 1.0) -> tuple[float, float] | None:
-    """Take value and U95 out of a number of ``rig analyze --json``."""
-    value = value_of(told)
-    return None if value is None else (value * scale, (expanded(told) or 0.0) * scale)
+def _shown(view: SessionView, hidden: int | None) -> list[DropResult]:
+    """All runs but one whose numbers must not be seen yet."""
+    return [one for one in view.analysis.runs if one.run.number != hidden]
 
 
-def _gravity(view: SessionView, run: Mapping[str, Any]) -> tuple[float, float] | None:
-    own = _measured(run.get("gravity_m_s2"))
-    seen = view.gravity.get(Job(run["run"], run["attempt"]))
-    return own or (None if seen is None else (seen.value, seen.expanded))
+def _point(measured: Measured | None, scale: float = 1.0) -> tuple[float, float] | None:
+    """Value and U95."""
+    return None if measured is None else (measured.value * scale, measured.expanded * scale)
+
+
+def _gravity(view: SessionView, one: DropResult) -> tuple[float, float] | None:
+    seen = view.gravity.get(Job(one.run.number, one.attempt))
+    return _point(one.quantities.get(GRAVITY.name, seen))
 
 
 def _chart(
     title: str,
     view: SessionView,
     lines: Sequence[tuple[float, str, str]],
-    points: Sequence[tuple[Mapping[str, Any], tuple[float, float] | None]],
+    points: Sequence[tuple[DropResult, tuple[float, float] | None]],
 ) -> Picture:
     """Draw one number a run, with U95, in order of the runs."""
     ends = (0.5, len(view.plan) + 0.5)
@@ -170,7 +179,11 @@ def _chart(
               for level, color, label in lines]  # fmt: skip
     for counts, color, mark, label in ((True, "primary", "●", "counts ± U"),
                                        (False, "error", "×", "void")):  # fmt: skip
-        some = [(run["run"], *point) for run, point in points if point and good(run) is counts]
+        some = [
+            (one.run.number, *point)
+            for one, point in points
+            if point and (one.verdict in GOOD) is counts
+        ]
         bars = len(points) <= _WITH_BARS
         series.append(
             Series("bars" if bars else "dots", [x for x, *_ in some], [y for _, y, _ in some],

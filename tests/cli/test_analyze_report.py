@@ -8,6 +8,7 @@ import re
 import pytest
 
 from rig.report.bars import LABELS, bar
+from rig.results import detailed
 from rig.session.store import Session
 from tests.cli.lab import rig, short
 
@@ -152,15 +153,17 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(call, finished, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("bars", ["U95", "u", "SE", "SD", "half-SD"])
-def test_bars_are_as_long_as_the_analysis_says(analysis, bars):
-    words = {"U95": "U (95 %)", "SD": "SD of one run", "half-SD": "SD/2 of one run"}
-    assert LABELS[bars] == words.get(bars, bars)
-    line = analysis["summary"][0]
+def test_bars_are_as_long_as_the_analysis_says(finished):
+    with Session.open(finished.session, readonly=True) as session:
+        drawn = detailed(session)[0].summary[0]
+    line = drawn.json()
     sd = line["separation_sd_m"]
     expected = {"U95": line["separation_m"]["U95"], "u": line["separation_m"]["u"],
                 "SE": sd / line["n"] ** 0.5, "SD": sd, "half-SD": sd / 2}  # fmt: skip
-    assert bar(line, "separation_m", bars) == pytest.approx(expected[bars], rel=1e-9)
+    words = {"U95": "U (95 %)", "SD": "SD of one run", "half-SD": "SD/2 of one run"}
+    for bars, label in LABELS.items():
+        assert label == words.get(bars, bars)
+        assert bar(drawn, "separation_m", bars) == pytest.approx(expected[bars], rel=1e-9), bars
 
 
 def test_the_reader_chooses_what_bars_stand_for(call, finished, tmp_path):

@@ -113,7 +113,7 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
     for session, ends in made:
         with Session.open(session, readonly=True) as opened:
             clock = calibration(opened).details
-            found = results(opened)
+            found = results(opened).json()
         assert abs(clock["error_ppm"] + 1300.0) < 5.0 * clock["u_ppm"], ends
         assert clock["u_ppm"] < 200.0
         truth = {(line["run"], line["attempt"]): line for line in truth_of(session)}

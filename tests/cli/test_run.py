@@ -418,7 +418,7 @@ def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
     call, finished, tmp_path, monkeypatch
 ):
     session = finished.copy(tmp_path)
-    compute = analyze.with_analysis
+    compute = analyze.results
 
     def slowly(opened, progress):
         found = compute(opened, progress)
@@ -427,7 +427,7 @@ def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
             writer.put_results([], "a later one")
         return found
 
-    monkeypatch.setattr(analyze, "with_analysis", slowly)
+    monkeypatch.setattr(analyze, "results", slowly)
     assert call("analyze", session).code == 0
     monkeypatch.undo()
     with sqlite3.connect(session) as connection:

@@ -2,7 +2,14 @@
 
 import math
 import random
+from dataclasses import replace
 from typing import Any
+
+from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.session import Analysis
+from rig.analysis.summary import Incline
+from rig.protocol.protocol import Run
+from rig.units import Quantity
 
 MODEL = {
     0.0: (0.0801755, 6.2857635),
@@ -15,14 +22,17 @@ MODEL = {
 }
 
 
-def quantity(value: float, u: float) -> dict[str, float]:
-    return {"value": value, "u": u, "U95": 2 * u}
+def analysis(runs: list[DropResult], summary: list[Incline]) -> Analysis:
+    return Analysis(tuple(runs), (), tuple(summary))
 
 
-def two_chains(seed: int = 1, repeats: int = 12) -> dict[str, Any]:
+EMPTY = analysis([], [])
+
+
+def two_chains(seed: int = 1, repeats: int = 12) -> Analysis:
     rng = random.Random(seed)
-    runs: list[dict[str, Any]] = []
-    summary: list[dict[str, Any]] = []
+    runs: list[DropResult] = []
+    summary: list[Incline] = []
     inclines = list(MODEL)
     rng.shuffle(inclines)
     for incline in inclines:
@@ -33,49 +43,66 @@ def two_chains(seed: int = 1, repeats: int = 12) -> dict[str, Any]:
             skew = rng.gauss(0.0008, 0.002)
             dz = separation + 0.0008 + rng.gauss(0, 0.0022)
             void = abs(skew) > 0.0049 or number == 33
+            impact, free = ("A", "B") if repeat % 4 in (0, 3) else ("B", "A")
             runs.append(
-                {
-                    "run": number,
-                    "attempt": 1,
-                    "incline_deg": incline,
-                    "impact_chain": "ABBA"[repeat % 4],
-                    "separation_m": quantity(dz, 0.0011),
-                    "separation_raw_m": quantity(dz - 4.9 * skew, 0.0009),
-                    "speed_m_s": quantity(speed + rng.gauss(0, 0.05), 0.02),
-                    "release_skew_s": quantity(skew, 0.0002),
-                    "edges": {
-                        "received": 226,
-                        "matched": 225,
-                        "missed": 1,
-                        "spurious": 0,
-                        "lost": 0,
+                DropResult(
+                    Run(number, incline, impact, free),
+                    1,
+                    "void" if void else "accepted",
+                    ("release skew 5.3 ms is beyond 5 ms",) if void else (),
+                    Audit(226, 225, 1, 0, 0),
+                    {
+                        "separation_m": Measured(dz, 0.0011),
+                        "separation_raw_m": Measured(dz - 4.9 * skew, 0.0009),
+                        "speed_m_s": Measured(speed + rng.gauss(0, 0.05), 0.02),
+                        "release_skew_s": Measured(skew, 0.0002),
                     },
-                    "verdict": "void" if void else "accepted",
-                    "reasons": ["release skew 5.3 ms is beyond 5 ms"] if void else [],
-                }
+                )
             )
             if not void:
                 values.append(dz)
         mean = sum(values) / len(values)
         sd = math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))
         summary.append(
-            {
-                "incline_deg": incline,
-                "n": len(values),
-                "separation_m": quantity(mean, sd / math.sqrt(len(values))),
-                "separation_sd_m": sd,
-                "speed_m_s": quantity(speed + rng.gauss(0, 0.03), 0.03),
-                "predicted": {"separation_m": separation, "speed_m_s": speed},
-                "normalized_error": rng.gauss(0, 0.5),
-            }
+            Incline(
+                incline,
+                len(values),
+                {
+                    "separation_m": Measured(mean, sd / math.sqrt(len(values))),
+                    "speed_m_s": Measured(speed + rng.gauss(0, 0.03), 0.03),
+                },
+                {"separation_m": sd},
+                {"separation_m": Quantity(separation), "speed_m_s": Quantity(speed)},
+            )
         )
-    summary.sort(key=lambda line: line["incline_deg"])
-    runs[5]["budget"] = [
-        {"name": "release skew", "quantity": "separation_m", "u": 0.00098},
-        {"name": "beam heights", "quantity": "separation_m", "u": 0.0003},
-        {"name": "clock", "quantity": "speed_m_s", "u": 0.0004},
-    ]
-    return {"runs": runs, "summary": summary}
+    summary.sort(key=lambda line: line.incline_deg)
+    budgets = {
+        "separation_m": {"release skew": 0.00098, "beam heights": 0.0003},
+        "speed_m_s": {"clock": 0.0004},
+    }
+    for name, budget in budgets.items():
+        runs[5] = measured(runs[5], **{name: replace(runs[5].quantities[name], budget=budget)})
+    return analysis(runs, summary)
+
+
+def measured(one: DropResult, **quantities: Measured) -> DropResult:
+    """Let a drop have measured something else."""
+    return replace(one, quantities={**one.quantities, **quantities})
+
+
+def without(found: Analysis, *names: str) -> Analysis:
+    """Let a session have measured less."""
+
+    def rest(some: Any) -> dict[str, Any]:
+        return {name: value for name, value in some.items() if name not in names}
+
+    return analysis(
+        [replace(one, quantities=rest(one.quantities)) for one in found.runs],
+        [
+            replace(line, means=rest(line.means), predicted=rest(line.predicted))
+            for line in found.summary
+        ],
+    )
 
 
 def curves() -> dict[str, Any]:
@@ -102,38 +129,26 @@ def curves() -> dict[str, Any]:
     }
 
 
-def single_chain() -> dict[str, Any]:
-    analysis = two_chains(repeats=4)
-    for run in analysis["runs"]:
-        del run["separation_raw_m"], run["release_skew_s"]
-        run["impact_chain"] = "A"
-    return analysis
+def single_chain() -> Analysis:
+    """One chain that strikes."""
+    found = without(two_chains(repeats=4), "separation_m", "separation_raw_m", "release_skew_s")
+    runs = [replace(one, run=replace(one.run, impact="A", free=None)) for one in found.runs]
+    return replace(found, runs=tuple(runs))
 
 
-def gravity(seed: int = 3) -> dict[str, Any]:
+def gravity(seed: int = 3) -> Analysis:
     rng = random.Random(seed)
     runs = [
-        {
-            "run": number,
-            "attempt": 1,
-            "incline_deg": 0.0,
-            "impact_chain": None,
-            "gravity_m_s2": quantity(9.8185 + rng.gauss(0, 0.004), 0.0035),
-            "edges": {"received": 50, "matched": 50, "missed": 0, "spurious": 0, "lost": 0},
-            "verdict": "accepted",
-            "reasons": [],
-        }
+        DropResult(
+            Run(number, 0.0, None, None),
+            1,
+            "accepted",
+            (),
+            Audit(50, 50, 0, 0, 0),
+            {"gravity_m_s2": Measured(9.8185 + rng.gauss(0, 0.004), 0.0035)},
+        )
         for number in range(1, 11)
     ]
-    return {
-        "runs": runs,
-        "summary": [
-            {
-                "incline_deg": 0.0,
-                "n": 10,
-                "gravity_m_s2": quantity(9.8188, 0.0014),
-                "predicted": {"gravity_m_s2": 9.8201},
-                "normalized_error": -0.42,
-            }
-        ],
-    }
+    mean, model = Measured(9.8188, 0.0014), Quantity(9.8201)
+    line = Incline(0.0, 10, {"gravity_m_s2": mean}, {}, {"gravity_m_s2": model})
+    return analysis(runs, [line])

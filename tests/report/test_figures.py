@@ -1,10 +1,12 @@
 """Figures are well-formed, repeat byte for byte, and survive what is missing."""
 
-import copy
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
 
+from rig.analysis.result import Audit, DropResult, Measured
+from rig.protocol.protocol import Run
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.pictures import pictures
 from rig.sections import Sections
@@ -18,7 +20,7 @@ def all_three() -> list[str]:
     return [
         incline_figure(TWO, CURVES, True),
         runs_figure(TWO, True, 0.005),
-        gravity_figure(fake_analysis.gravity(), True, {"value": 9.82, "u": 0.0, "U95": 0.0}),
+        gravity_figure(fake_analysis.gravity(), True, 9.82),
     ]
 
 
@@ -49,28 +51,26 @@ def test_what_is_missing_is_left_out() -> None:
     svg = runs_figure(fake_analysis.single_chain())
     assert "skew" not in svg
     assert "free fall" not in incline_figure(TWO, None)
-    assert "site" not in gravity_figure({"runs": fake_analysis.gravity()["runs"], "summary": []})
+    assert "site" not in gravity_figure(replace(fake_analysis.gravity(), summary=()))
 
 
 @pytest.mark.parametrize("figure", [incline_figure, runs_figure, gravity_figure])
 def test_nothing_measured(figure) -> None:
-    void = {"run": 1, "incline_deg": 40.0, "separation_m": None, "verdict": "void", "reasons": []}
-    for analysis in ({}, {"runs": [], "summary": []}, {"runs": [void], "summary": []}):
+    void = DropResult(Run(1, 40.0, "A", "B"), 1, "void", (), Audit(0, 0, 50, 0, 0))
+    for analysis in (fake_analysis.EMPTY, fake_analysis.analysis([void], [])):
         ElementTree.fromstring(figure(analysis))
 
 
 def test_a_void_run_does_not_set_the_scale() -> None:
-    wild = copy.deepcopy(TWO)
-    number = next(i for i, run in enumerate(wild["runs"]) if run["verdict"] == "void")
-    wild["runs"][number]["separation_m"]["value"] = 9.0
-    assert "(1 off the scale)" in runs_figure(wild)
+    runs = list(TWO.runs)
+    number = next(i for i, run in enumerate(runs) if run.verdict == "void")
+    runs[number] = fake_analysis.measured(runs[number], separation_m=Measured(9.0, 0.001))
+    assert "(1 off the scale)" in runs_figure(replace(TWO, runs=tuple(runs)))
 
 
 def test_without_a_prediction_the_mean_takes_its_place() -> None:
-    bare = copy.deepcopy(TWO)
-    for line in bare["summary"]:
-        del line["predicted"]
-    assert "− mean (cm)" in runs_figure(bare)
+    bare = [replace(line, predicted={}) for line in TWO.summary]
+    assert "− mean (cm)" in runs_figure(replace(TWO, summary=tuple(bare)))
 
 
 def test_pictures_follow_the_scene() -> None:
@@ -78,9 +78,6 @@ def test_pictures_follow_the_scene() -> None:
     assert [picture.alt for picture in pictures(fake_analysis.gravity(), sections=Sections())] == [
         "Acceleration of each run"
     ]
-    assert pictures({"runs": [], "summary": []}, sections=Sections()) == []
-    single = fake_analysis.two_chains()
-    for line in (*single["runs"], *single["summary"]):
-        line.pop("separation_m", None)
-    (picture,) = pictures(single, sections=Sections())
+    assert pictures(fake_analysis.EMPTY, sections=Sections()) == []
+    (picture,) = pictures(fake_analysis.single_chain(), sections=Sections())
     assert "eparation" not in picture.alt + picture.caption

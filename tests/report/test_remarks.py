@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 from html import unescape
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from rig.analysis.remedies import ELSE, remedies, remedy
+from rig.analysis.result import Audit, DropResult
+from rig.analysis.session import Analysis
+from rig.protocol.protocol import Run
 from rig.report.remarks import air_lines, void_lines
 from tests.cli.lab import rig, short
 
 
-def void(run, attempt, *reasons, verdict="void", incline_deg=40.0):
-    return {
-        "run": run, "attempt": attempt, "incline_deg": incline_deg, "impact_chain": "A",
-        "verdict": verdict, "reasons": list(reasons),
-    }  # fmt: skip
+def void(run, attempt, *reasons, verdict="void"):
+    planned = Run(run, 40.0, "A", "B")
+    return DropResult(planned, attempt, verdict, reasons, Audit(0, 0, 0, 0, 0))
 
 
 SKEW, MISSED = (
@@ -26,18 +29,15 @@ SKEW, MISSED = (
 
 
 def test_every_void_drop_is_told_with_its_reasons_and_what_to_do():
-    found = {
-        "runs": [void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, "moths")],
-        "superseded": [void(3, 1, SKEW)],
-    }
-    lines = void_lines(found)
+    last = void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, "moths")
+    lines = void_lines(Analysis(last, (void(3, 1, SKEW),), ()))
     assert lines[1:4] == [
         f"  run 2, attempt 1 at 40°: {SKEW}; {MISSED}",
         f"  run 3, attempt 1 at 40°: {SKEW}",
         "  run 4, attempt 1 at 40°: moths",
     ]
     assert [line.strip() for line in lines[5:]] == [remedy(SKEW), remedy(MISSED)]
-    assert void_lines({"runs": [void(1, 1, verdict="marginal")]}) == []
+    assert void_lines(Analysis((void(1, 1, verdict="marginal"),), (), ())) == []
 
 
 def test_what_nobody_foresaw_has_a_general_remedy_if_it_is_all_there_is():
@@ -60,18 +60,23 @@ def test_a_session_without_a_good_run_says_why(tmp_path):
     assert f" → {what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
-def learned(value: float, u: float) -> dict:
-    unknowns = [{"name": "clock", "value": [1.0], "u": [1e-9]}]
-    return {"learned": {"unknowns": [*unknowns, {"name": "drag", "value": [value], "u": [u]}]}}
+def joint(value: float, u: float) -> SimpleNamespace:
+    """Of a joint fit what is asked of it: κ, with half its prior uncertainty."""
+    return SimpleNamespace(
+        shared=SimpleNamespace(blocks={"clock": slice(0, 1), "drag": slice(1, 2)}),
+        x=np.array([1.0, value]),
+        sd=np.array([1.0, 2.0 * u]),
+        covariance=np.diag([1.0, 0.25]),
+    )
 
 
 def test_air_that_may_be_none_is_not_mentioned():
-    for nothing in ({}, {"learned": None}, learned(3e-6, 1e-6), learned(-3e-6, 1e-6)):
+    for nothing in (None, joint(3e-6, 1e-6), joint(-3e-6, 1e-6)):
         assert air_lines(nothing) == []
 
 
 def test_air_is_said_with_its_uncertainty():
-    (line,) = air_lines(learned(0.0312345, 1e-5))
+    (line,) = air_lines(joint(0.0312345, 1e-5))
     assert "κ = 0.031234 ± 0.000020 per m" in line
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import copy
 import json
+from dataclasses import replace
 
 import pytest
 
+from rig.analysis.result import Measured
 from rig.errors import InputError
 from rig.report.estimate import estimate_text, page_parts
 from rig.report.estimate_pictures import estimate_pictures
@@ -102,7 +104,8 @@ def test_a_posterior_without_spread_has_no_picture(found, what):
 
 def test_a_page_says_what_it_lacks():
     two = fake_analysis.two_chains(repeats=4)
-    two["runs"][0]["budget"] = [{"name": "clock", "quantity": "speed_m_s", "u": "much"}]
+    odd = Measured(6.0, 0.1, budget={"clock": "much"})
+    two = replace(two, runs=(fake_analysis.measured(two.runs[0], speed_m_s=odd), *two.runs[1:]))
     sections = Sections()
     uneven = {"incline_deg": [0.0, 10.0], "separation_m": [0.1], "speed_m_s": [6.0]}
     (figure,) = pictures(two, uneven, sections=sections)

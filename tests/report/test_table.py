@@ -1,15 +1,19 @@
 """Tables in the terminal, and the digits of numbers."""
 
+from dataclasses import replace
+
 import pytest
 
+from rig.analysis.result import Measured
 from rig.report.columns import aligned, run_columns, summary_table
 from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.remarks import clock_lines
+from rig.units import Quantity
 from tests.report import fake_analysis
 
 
 def test_summary_is_aligned() -> None:
-    lines = summary_table(fake_analysis.two_chains()).splitlines()
+    lines = summary_table(fake_analysis.two_chains().summary).splitlines()
     assert len(lines) == 9
     assert [word in lines[0] for word in ("incline (°)", "Δz ± U (cm)", "V ± U (m/s)", "Eₙ")]
     ends = {line.index("±", 20) for line in lines[2:]}
@@ -17,14 +21,14 @@ def test_summary_is_aligned() -> None:
 
 
 def test_gravity_summary() -> None:
-    heading, _, line = summary_table(fake_analysis.gravity()).splitlines()
+    heading, _, line = summary_table(fake_analysis.gravity().summary).splitlines()
     assert "Δz" not in heading
-    assert "9.8188 ± 0.0028" in line
-    assert line.endswith("−0.42")
+    assert "9.8188 ± 0.0027" in line
+    assert line.endswith("−0.47")
 
 
 def test_no_summary() -> None:
-    assert summary_table({"runs": []}) == "No accepted runs, so no summary."
+    assert summary_table([]) == "No accepted runs, so no summary."
 
 
 @pytest.mark.parametrize(
@@ -34,6 +38,8 @@ def test_no_summary() -> None:
         ({"value": -1.0, "U95": 0.0996}, "−1.00 ± 0.10"),
         ({"value": 5.0, "U95": 250.0}, "5 ± 250"),
         ({"value": 5.0}, "5.000"),
+        (Measured(0.123456, 0.00119), "0.1235 ± 0.0023"),
+        (Quantity(5.0, 0.1), "5.000"),
         ({"value": 5.0, "U95": 0.0}, "5.000 ± 0.000"),
         ({"value": None}, ""),
         ({"value": float("nan"), "U95": 1.0}, ""),
@@ -52,18 +58,17 @@ def test_small_helpers() -> None:
 
 def test_where_nothing_is_struck_nothing_is_inclined() -> None:
     fence = fake_analysis.gravity()
-    assert "incline" not in summary_table(fence)
-    void = {**fence["runs"][0], "verdict": "void"}
-    del void["gravity_m_s2"]
-    heading = aligned(run_columns(), [void, fence["runs"][1]])[0]
+    assert "incline" not in summary_table(fence.summary)
+    void = replace(fence.runs[0], verdict="void", quantities={})
+    heading = aligned(run_columns(), [void, fence.runs[1]])[0]
     assert "incline" not in heading
     assert "impact" not in heading
-    assert "incline" in aligned(run_columns(), fake_analysis.single_chain()["runs"])[0]
+    assert "incline" in aligned(run_columns(), fake_analysis.single_chain().runs)[0]
 
 
 def test_the_clock_is_told_in_plain_numbers() -> None:
     pings = {"source": "pings", "pings": 6, "rate_ppm": -1214.6, "notes": []}
-    (line,) = clock_lines({"calibration": {**pings, "u_ppm": 74.0}})
+    (line,) = clock_lines({**pings, "u_ppm": 74.0})
     assert "board −1214.60 ± 148 ppm off (95 %)" in line
-    (line,) = clock_lines({"calibration": {**pings, "u_ppm": 0.00049}})
+    (line,) = clock_lines({**pings, "u_ppm": 0.00049})
     assert "± 0.00098 ppm" in line

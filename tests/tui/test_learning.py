@@ -41,8 +41,8 @@ def test_what_is_learned_is_what_rig_analyze_says(recorded):
     with Session.open(recorded, readonly=True) as session:
         expected = detailed(session)[0]
     assert (fitted.fitted, fitted.lagging) == (len(expected.joint.drops), False)
-    assert fitted.analysis == expected.json()
-    assert fitted.analysis["summary"] != alone.analysis["summary"]
+    assert fitted.analysis.json() == expected.json()
+    assert fitted.analysis.summary != alone.analysis.summary
 
 
 def test_both_control_charts_are_there_and_hide_a_blind_run(recorded):

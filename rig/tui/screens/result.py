@@ -9,9 +9,9 @@ from textual.containers import Horizontal
 from textual.content import Content
 
 from rig.analysis.distributions import coverage_factor
-from rig.measurands import listed
+from rig.analysis.result import Measured
+from rig.measurands import RELEASE_SKEW, listed
 from rig.predictions import predicted_run
-from rig.report.columns import AUDIT
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import chain_pictures
 from rig.tui.screens.page import Page
@@ -20,8 +20,6 @@ from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from textual.app import ComposeResult
 
     from rig.records import Job
@@ -77,32 +75,31 @@ def drop_pictures(view: SessionView, job: Job) -> tuple[Picture | None, Picture 
 
 def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     """Write the numbers with U95; where there is room, the model's and the normalized error too."""
-    record = view.record(job)
+    result = view.results[job]
     expected = predicted_run(view.protocol, view.plan[job.run])
     head = f"{'':15}{'measured ± U95':>20}"
     lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
     for row in listed():
-        if row.name not in record:
+        measured = result.quantities.get(row.name)
+        if measured is None:
             continue
-        line = f"{row.label:15}{plus_minus(record[row.name], row.scale):>20} {row.unit:4}"
+        line = f"{row.label:15}{plus_minus(measured, row.scale):>20} {row.unit:4}"
         model = expected.get(row.name)
         if not wide:
             pass
         elif model is not None:
-            own = coverage_factor(math.inf) * model.u
-            told = {"value": model.value, "U95": own} if own else model.value
+            told = Measured(model.value, model.u) if model.u else model.value
             line += f"{plus_minus(told, row.scale):>16}"
-            line += f"   {fixed(_normalized(record[row.name], model), 2):>5}"
-        elif row.name == "release_skew_s":
-            limit = view.protocol.accept.release_skew * 1e3
+            line += f"   {fixed(_normalized(measured, model), 2):>5}"
+        elif row == RELEASE_SKEW:
+            limit = view.protocol.accept.release_skew * row.scale
             line += f"{f'limit ±{limit:g}':>16}"
         lines.append(Content(line))
-    audit = record.get("edges", {})
-    counts = " · ".join(f"{kind} {audit.get(kind, 0)}" for kind in AUDIT)
+    counts = " · ".join(f"{kind} {count}" for kind, count in result.audit.json().items())
     lines.append(Content(f"{'edges':15}{counts}"))
     return Content("\n").join(lines)
 
 
-def _normalized(measured: Mapping[str, float], model: Quantity) -> float | None:
-    width = math.hypot(measured["U95"], coverage_factor(math.inf) * model.u)
-    return (measured["value"] - model.value) / width if width > 0.0 else None
+def _normalized(measured: Measured, model: Quantity) -> float | None:
+    width = math.hypot(measured.expanded, coverage_factor(math.inf) * model.u)
+    return (measured.value - model.value) / width if width > 0.0 else None

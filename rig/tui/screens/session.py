@@ -12,6 +12,8 @@ from textual.content import Content
 from rig.analysis.joint_fit import FEWEST
 from rig.campaign.plan import done
 from rig.measurands import averaged
+from rig.protocol.protocol import Condition
+from rig.report.columns import main_error
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import control_pictures, incline_pictures
 from rig.tui.screens.page import Page
@@ -21,11 +23,11 @@ from rig.tui.widgets.text import Words
 from rig.tui.words import duration, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from typing import Any
+    from collections.abc import Iterator, Sequence
 
     from textual.app import ComposeResult
 
+    from rig.analysis.summary import Incline
     from rig.campaign.plan import RunLine
     from rig.tui.model import Model
 
@@ -125,16 +127,15 @@ def _plan(model: Model) -> Content:
     """One line an incline and, of unlike chains, striker: a symbol a run, and the means so far."""
     unlike = model.protocol is not None and model.protocol.unlike_chains
 
-    def case(line: RunLine) -> tuple[float, str]:
-        return line.incline_deg, (line.impact or "") if unlike else ""
+    def condition(line: RunLine) -> Condition:
+        return Condition(line.incline_deg, line.impact if unlike else None)
 
     summary = {}
     if model.view is not None and not model.blindfold:
-        lines_ = model.view.analysis["summary"]
-        summary = {(one["incline_deg"], one.get("impact_chain", "")): one for one in lines_}
-    ordered = sorted(model.state.runs, key=case)
-    groups = [list(group) for _, group in groupby(ordered, key=case)]
-    means = [_means(summary.get(case(group[0]), {})) for group in groups]
+        summary = {one.condition: one for one in model.view.analysis.summary}
+    ordered = sorted(model.state.runs, key=condition)
+    groups = [list(group) for _, group in groupby(ordered, key=condition)]
+    means = [_means(summary.get(condition(group[0]))) for group in groups]
     most = max(map(len, groups), default=0)
     widths = [max(map(len, column)) for column in zip_longest(*means, fillvalue="")]
     lines = []
@@ -150,7 +151,7 @@ def _plan(model: Model) -> Content:
 def _taught(model: Model) -> tuple[str, str]:
     """Say whether the drops have taught each other what they have in common."""
     view = model.view
-    if view is None or model.blindfold or not view.analysis["summary"]:
+    if view is None or model.blindfold or not view.analysis.summary:
         return "", ""
     more = " · learning from the newest …" if view.lagging else ""
     if view.fitted:
@@ -168,12 +169,14 @@ def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:
         yield symbol, f"{colour} reverse" if now else colour
 
 
-def _means(mean: Mapping[str, Any]) -> list[str]:
+def _means(line: Incline | None) -> list[str]:
     """What is known of an incline so far."""
+    if line is None:
+        return []
     parts = [
-        f"{row.symbol} {plus_minus(mean[row.name], row.scale)} {row.unit}"
+        f"{row.symbol} {plus_minus(line.means[row.name], row.scale)} {row.unit}"
         for row in averaged()
-        if row.name in mean
+        if row.name in line.means
     ]
-    error = mean.get("normalized_error")
+    error = main_error(line)
     return parts if error is None else [*parts, f"Eₙ {fixed(error, 2)}"]
