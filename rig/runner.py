@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from rig import __version__
 from rig.campaign.events import (
     Answered,
-    Arm,
+    ArmRelease,
     Collect,
-    Fire,
+    FireRelease,
     Found,
     GiveUp,
     GoOn,
@@ -23,7 +23,7 @@ from rig.campaign.events import (
     Stop,
     Tick,
     Wait,
-    refused,
+    effect_failed,
 )
 from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, next_job, rest_s, what_to_hang
@@ -249,7 +249,7 @@ class Campaign:
         """Carry out what is wanted, and what comes of that, until nothing is."""
         while self._effects:
             match self._effects[0]:
-                case Fire():
+                case FireRelease():
                     self._fall()
                 case GiveUp():
                     assert self._failed is not None
@@ -262,7 +262,7 @@ class Campaign:
         """Let go, and stay until the drop is recorded: it took somebody minutes to hang."""
         with self.interrupts.held():
             try:
-                while self._effects and isinstance(self._effects[0], Fire | Collect | Stop):
+                while self._effects and isinstance(self._effects[0], FireRelease | Collect | Stop):
                     self._do(self._effects.popleft())
             except KeyboardInterrupt:
                 self._stop("interrupted by the operator")
@@ -278,9 +278,9 @@ class Campaign:
                     return
                 case Wait(seconds):
                     self.rig.wait(seconds)
-                case Arm(job):
+                case ArmRelease(job):
                     token = self.rig.arm(*job)
-                case Fire(armed):
+                case FireRelease(armed):
                     self.rig.fire(armed)
                 case Collect(job):
                     self._drop = self.rig.collect(*job)
@@ -293,7 +293,7 @@ class Campaign:
                     self.operator.say(narration(self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
             self._failed = refusal
-            self._take(refused(self.flow.ticket, refusal))
+            self._take(effect_failed(self.flow.ticket, refusal))
         else:
             self._take(Answered(self.flow.ticket, token))
 

@@ -77,8 +77,8 @@ class Judged(NamedTuple):
     row: VoidRow | None = None
 
 
-class Refused(NamedTuple):
-    """An effect failed; see `refused`.
+class EffectFailed(NamedTuple):
+    """An effect failed; see `effect_failed`.
 
     Attributes
     ----------
@@ -94,12 +94,12 @@ class Refused(NamedTuple):
     detail: int = 0
 
 
-def refused(ticket: int, error: RigError) -> Refused:
+def effect_failed(ticket: int, error: RigError) -> EffectFailed:
     """Make the event of an error."""
     trouble = f"{error.message}\n{error.hint}"
     if isinstance(error, DeviceRefusedError):
-        return Refused(ticket, trouble, error.reason, error.detail)
-    return Refused(ticket, trouble)
+        return EffectFailed(ticket, trouble, error.reason, error.detail)
+    return EffectFailed(ticket, trouble)
 
 
 class Tick(NamedTuple):
@@ -149,7 +149,7 @@ class Again(NamedTuple):
 
 
 Event: TypeAlias = (
-    Opened | Closed | GoOn | Try | Answered | Judged | Refused | Tick | Stopped | Lost | Warned
+    Opened | Closed | GoOn | Try | Answered | Judged | EffectFailed | Tick | Stopped | Lost | Warned
     | Found
     | Reject | Note | Again
 )  # fmt: skip
@@ -163,13 +163,13 @@ class Wait(NamedTuple):
     seconds: float
 
 
-class Arm(NamedTuple):
+class ArmRelease(NamedTuple):
     """Prepare the release."""
 
     job: Job
 
 
-class Fire(NamedTuple):
+class FireRelease(NamedTuple):
     """Let go."""
 
     token: int
@@ -209,4 +209,4 @@ class GiveUp(NamedTuple):
     """Go no further by yourself: only who drives this can say what is to be done."""
 
 
-Effect: TypeAlias = Wait | Arm | Fire | Drive | Collect | Judge | Log | Stop | GiveUp
+Effect: TypeAlias = Wait | ArmRelease | FireRelease | Drive | Collect | Judge | Log | Stop | GiveUp

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, TypeAlias
 from rig.campaign.events import (
     Again,
     Answered,
-    Arm,
+    ArmRelease,
     Closed,
     Collect,
     Drive,
-    Fire,
+    EffectFailed,
+    FireRelease,
     Found,
     GiveUp,
     GoOn,
@@ -27,7 +28,6 @@ from rig.campaign.events import (
     Lost,
     Note,
     Opened,
-    Refused,
     Reject,
     Stage,
     Stop,
@@ -136,8 +136,8 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return replace(flow, trouble=flow.trouble or trouble), ()
         case Answered(ticket, token):
             return _answered(flow, ticket, token)
-        case Refused():
-            return _refused(flow, event)
+        case EffectFailed():
+            return _effect_failed(flow, event)
         case Tick(seconds):
             return _tick(flow, seconds)
         case Judged():
@@ -188,7 +188,7 @@ def _answered(flow: Flow, ticket: int, token: int | None) -> Outcome:
     if job is None:
         return flow, ()
     if flow.stage is Stage.SETTLING:
-        return flow.to(Stage.ARMING), (Arm(job),)
+        return flow.to(Stage.ARMING), (ArmRelease(job),)
     if flow.stage is Stage.ARMING:
         armed = replace(flow.to(Stage.COUNTDOWN), not_armed=0)
         return replace(armed, token=token or 0, left_s=flow.countdown_s), ()
@@ -199,7 +199,7 @@ def _answered(flow: Flow, ticket: int, token: int | None) -> Outcome:
     return replace(flow, logged=True), ()
 
 
-def _refused(flow: Flow, event: Refused) -> Outcome:
+def _effect_failed(flow: Flow, event: EffectFailed) -> Outcome:
     if event.ticket != flow.ticket:
         return flow, ()
     if flow.stage is Stage.ARMING:
@@ -212,7 +212,7 @@ def _refused(flow: Flow, event: Refused) -> Outcome:
     return replace(flow, trouble=event.trouble, logged=True), unlogged
 
 
-def _not_armed(flow: Flow, event: Refused) -> Outcome:
+def _not_armed(flow: Flow, event: EffectFailed) -> Outcome:
     refusals = flow.not_armed + 1
     if event.reason not in _PASSING or (not flow.attended and refusals >= LOOKS):
         return flow.to(flow.home, event.trouble), (GiveUp(),)
@@ -222,7 +222,7 @@ def _not_armed(flow: Flow, event: Refused) -> Outcome:
     return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
 
 
-def _not_fired(flow: Flow, event: Refused) -> Outcome:
+def _not_fired(flow: Flow, event: EffectFailed) -> Outcome:
     refusals = flow.not_fired + 1
     flow = replace(flow.to(Stage.PREPARE, event.trouble), not_fired=refusals)
     # Whether it was let go is not known for sure when the answer is an error.
@@ -238,7 +238,7 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
     left = flow.left_s - seconds
     if left > 0.0:
         return replace(flow, left_s=left), ()
-    return replace(flow.to(Stage.FIRING), left_s=0.0), (Fire(flow.token),)
+    return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
 
 
 def _judged(flow: Flow, event: Judged) -> Outcome:

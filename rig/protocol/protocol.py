@@ -122,7 +122,7 @@ class Drag:
 
 
 @dataclass(frozen=True, slots=True)
-class Release:
+class ReleasePulse:
     """The actuator: its channel and the length of the pulse in seconds."""
 
     channel: int = 0
@@ -180,7 +180,7 @@ class Protocol:
     drop: Quantity
     surface: Surface | None = None
     gates: Gates | None = None
-    release: Release = field(default_factory=Release)
+    release: ReleasePulse = field(default_factory=ReleasePulse)
     plan: Plan = field(default_factory=Plan)
     accept: Accept = field(default_factory=Accept)
     initial_speed: Quantity = AT_REST

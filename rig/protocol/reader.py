@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
 from rig.protocol.fields import FieldFaults, Range, Section
-from rig.protocol.protocol import AT_REST, PPS_U, Accept, Plan, Protocol, Release
+from rig.protocol.protocol import AT_REST, PPS_U, Accept, Plan, Protocol, ReleasePulse
 from rig.protocol.yamltree import Mapping, Place, ScalarNode, load
 from rig.units import Dimension, Quantity
 
@@ -167,10 +167,12 @@ def _version(node: Node, key: str, faults: FieldFaults) -> int | None:
     return None
 
 
-def _settings(top: Section, *, turns: bool) -> tuple[Release | None, Plan | None, Accept | None]:
+def _settings(
+    top: Section, *, turns: bool
+) -> tuple[ReleasePulse | None, Plan | None, Accept | None]:
     """Read ``release``, ``plan`` and ``accept``."""
     if not any(key in top for key in ("release", "plan", "accept")):
-        return Release(), Plan(), Accept()
+        return ReleasePulse(), Plan(), Accept()
     from rig.protocol.settings import read_settings  # noqa: PLC0415 - see above
 
     return read_settings(top, turns=turns)

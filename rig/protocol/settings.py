@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, cast
 from rig.boards import RELEASES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
-from rig.protocol.protocol import Accept, Order, Plan, Release
+from rig.protocol.protocol import Accept, Order, Plan, ReleasePulse
 from rig.protocol.yamltree import ScalarNode
 from rig.units import Dimension
 
@@ -28,7 +28,7 @@ MISSED_EDGES = Range(Dimension.NUMBER, 0.0, 1.0, "%")
 
 def read_settings(
     top: Section, *, turns: bool
-) -> tuple[Release | None, Plan | None, Accept | None]:
+) -> tuple[ReleasePulse | None, Plan | None, Accept | None]:
     """Read all three from the root of a protocol; `None` for what is faulty.
 
     Without a surface there is nothing to incline; `turns` says whether an order may be given in
@@ -36,22 +36,22 @@ def read_settings(
     """
     plan = _plan(surface="surface" in top, turns=turns)
     return (
-        top.take("release", _release, Release()),
+        top.take("release", _release, ReleasePulse()),
         top.take("plan", plan, Plan()),
         top.take("accept", _accept, Accept()),
     )
 
 
-def _release(node: Node, key: str, faults: FieldFaults) -> Release | None:
+def _release(node: Node, key: str, faults: FieldFaults) -> ReleasePulse | None:
     """Convert to the release actuator."""
     inner = fields.mapping(node, key, faults)
     if inner is None:
         return None
     section = Section(inner, key, faults, ("channel", "pulse"))
-    usual = Release()
+    usual = ReleasePulse()
     channel = section.take("channel", fields.whole(0, RELEASES - 1), usual.channel)
     pulse = section.take("pulse", fields.exact(PULSE), usual.pulse)
-    return None if channel is None or pulse is None else Release(channel, pulse)
+    return None if channel is None or pulse is None else ReleasePulse(channel, pulse)
 
 
 def _accept(node: Node, key: str, faults: FieldFaults) -> Accept | None:

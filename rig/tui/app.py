@@ -13,7 +13,7 @@ from textual.css.query import NoMatches
 from textual.theme import Theme
 from textual.widgets import ContentSwitcher, Input
 
-from rig.campaign.events import Refused, Stage, Stopped, Tick
+from rig.campaign.events import EffectFailed, Stage, Stopped, Tick
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands, selectors
 from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, possible, shown_key
@@ -23,7 +23,7 @@ from rig.tui.follow import Follower
 from rig.tui.screens.ask import Ask, Confirm, Pick
 from rig.tui.screens.help import Help
 from rig.tui.screens.protocol import ProtocolPage
-from rig.tui.widgets.status import Status
+from rig.tui.widgets.status import StatusBar
 from rig.tui.widgets.stopbar import StopBar
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from rig.tui.options import Options
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
-    from rig.tui.state import State
+    from rig.tui.state import DaemonState
 
 TICK_S = 0.1
 _REPEAT_S = 0.7
@@ -159,7 +159,7 @@ class RigApp(App[None]):
     # ------------------------------------------------------------------ life
 
     def compose(self) -> ComposeResult:
-        yield Status()
+        yield StatusBar()
         yield ContentSwitcher(id="pages")
         yield StopBar()
 
@@ -211,7 +211,7 @@ class RigApp(App[None]):
             base.query_one("#alarm")
         except NoMatches:
             return  # on its way in, or out
-        base.query_one(Status).show(model, self.page, self.keys, size)
+        base.query_one(StatusBar).show(model, self.page, self.keys, size)
         base.query_one(StopBar).show(model, self.page, self.keys, size.width)
         page = self.pages.get(self.page)
         if page is not None and page.is_mounted:
@@ -225,7 +225,7 @@ class RigApp(App[None]):
         return self.driver.flow
 
     @property
-    def state(self) -> State:
+    def state(self) -> DaemonState:
         """What the daemon said last."""
         return self.follower.state
 
@@ -358,7 +358,7 @@ class RigApp(App[None]):
             return
         if not possible(action, self.flow.stage, driving=self.driving):
             if action.driving and not self.driving:
-                self.driver.take(Refused(self.flow.ticket, "this screen only watches\n"
+                self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
                                    "c takes control when it is free"))  # fmt: skip
             return
         self.begin(commands.do(self, name))

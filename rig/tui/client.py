@@ -13,7 +13,7 @@ from rig.daemon.aclient import AsyncClient
 from rig.daemon.lease import LEASE_S
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
-from rig.tui.state import State, typed
+from rig.tui.state import DaemonState, typed
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -71,12 +71,12 @@ class ReconnectingClient:
         return self._port or self.url
 
     @property
-    def state(self) -> State:
+    def state(self) -> DaemonState:
         """What the daemon said last."""
         if self._client is None:
-            return State()
+            return DaemonState()
         replica = self._client.replica
-        return typed(replica.n, replica.state) if replica.state else State()
+        return typed(replica.n, replica.state) if replica.state else DaemonState()
 
     @property
     def driving(self) -> bool:

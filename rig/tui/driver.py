@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rig.campaign.events import (
     Answered,
-    Arm,
+    ArmRelease,
     Collect,
     Drive,
-    Fire,
+    FireRelease,
     GiveUp,
     Judge,
     Judged,
@@ -18,7 +18,7 @@ from rig.campaign.events import (
     Stage,
     Stop,
     Wait,
-    refused,
+    effect_failed,
 )
 from rig.campaign.machine import step
 from rig.errors import RigError
@@ -83,7 +83,7 @@ class Driver:
 
     def refuse(self, error: RigError) -> None:
         """Say what is wrong and what to do."""
-        self.take(refused(self.flow.ticket, error))
+        self.take(effect_failed(self.flow.ticket, error))
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Have the daemon open a session, now and whenever it had to be started again."""
@@ -109,10 +109,10 @@ class Driver:
                     return
                 case Wait(seconds):
                     await client.call("wait", seconds=seconds)
-                case Arm(job):
+                case ArmRelease(job):
                     answer = await client.call("arm", run=job.run, attempt=job.attempt)
                     token = int(answer["token"])
-                case Fire(armed):
+                case FireRelease(armed):
                     await client.call("fire", token=armed)
                 case Drive():
                     await client.call("test_release")
@@ -129,6 +129,6 @@ class Driver:
                     self.take(Judged(ticket, result.verdict, tuple(result.reasons), row))
                     return
         except RigError as error:
-            self.take(refused(ticket, error))
+            self.take(effect_failed(ticket, error))
         else:
             self.take(Answered(ticket, token))

@@ -13,7 +13,7 @@ from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
 from rig.records import Job
 from rig.tui.indicators import Indicators
-from rig.tui.state import State, state_of
+from rig.tui.state import DaemonState, state_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator, Mapping
@@ -57,7 +57,7 @@ class Follower:
         client: ReconnectingClient | None,
         begin: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
-        self.state = State()
+        self.state = DaemonState()
         self.indicators = Indicators()
         self.view: SessionView | None = None
         self.voids = Voids()
@@ -122,7 +122,7 @@ class Follower:
             events.append(Found(missed))
         return events
 
-    def _back(self, state: State) -> Iterator[Event]:
+    def _back(self, state: DaemonState) -> Iterator[Event]:
         """Say what was wrong with a port that is back: it may have been too short to be read."""
         if state.section("error"):
             self._lost = state.section("error") if state.link != "up" else {}
@@ -131,7 +131,7 @@ class Follower:
                          f"{self._lost['hint']}")  # fmt: skip
             self._lost = {}
 
-    def _look_at_gates(self, state: State, now: float) -> None:
+    def _look_at_gates(self, state: DaemonState, now: float) -> None:
         if self.view and not self.indicators.gates:
             self.indicators, self._counted = Indicators.of(self.view.channels), (None, 0)
         drop = state.section("drop")
@@ -146,7 +146,9 @@ class Follower:
             self.indicators = self.indicators.seen(state.blocked, now)
         self._counted = job, len(state.edges)
 
-    def _look_at_session(self, session: Mapping[str, object], state: State, now: float) -> None:
+    def _look_at_session(
+        self, session: Mapping[str, object], state: DaemonState, now: float
+    ) -> None:
         path = Path(str(session["path"]))
         if self._path != path:
             self._path, self._live, self.indicators = path, None, Indicators()
@@ -213,7 +215,7 @@ def _opened(path: Path) -> LiveAnalysis:
     return LiveAnalysis(path)
 
 
-def _broken(stage: Stage, state: State) -> Iterator[Event]:
+def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
     """Say that what was armed, or would be, is not: nothing here waits for an answer then."""
     if stage not in BEFORE_RELEASE:
         return

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators
-    from rig.tui.state import State
+    from rig.tui.state import DaemonState
 
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""
@@ -53,7 +53,7 @@ class Model:
         How many of its drops were analysed so far.
     """
 
-    state: State
+    state: DaemonState
     flow: Flow
     indicators: Indicators
     protocol: Protocol | None = None

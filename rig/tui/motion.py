@@ -30,7 +30,7 @@ _POINTS = 120  # of a curve: two a column of a wide terminal
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ChainFall:
     """One chain's way down.
 
     Attributes
@@ -71,7 +71,7 @@ def motions(
     edges: Table,
     hz: float,
     matches: Mapping[int, int] | None = None,
-) -> tuple[Motion, ...]:
+) -> tuple[ChainFall, ...]:
     """Turn a drop's edges into heights.
 
     Parameters
@@ -119,7 +119,7 @@ def _table(edges: Table, hz: float, *, thin: bool) -> EdgeArrays:
     return EdgeArrays(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
 
 
-def separation(pair: tuple[Motion, ...], end_s: float) -> tuple[Array, Array, Array, Array]:
+def separation(pair: tuple[ChainFall, ...], end_s: float) -> tuple[Array, Array, Array, Array]:
     """Δz against time, measured and by the model: two pairs of times and metres.
 
     Measured at the impact side's edges, the free chain's height read between its neighbours.
@@ -183,11 +183,11 @@ def _matched(part: EdgeTrain, matches: Mapping[int, int]) -> tuple[Array, Array]
     return part.times[kept], part.levels[levels]
 
 
-def _motion(role: str, times: Array, heights: Array, model: Trajectory | None) -> Motion:
+def _motion(role: str, times: Array, heights: Array, model: Trajectory | None) -> ChainFall:
     delay = 0.0
     if model is not None and times.size:
         delay = float(np.median(times - model.times(heights)))
-    return Motion(role, times, heights, model, delay)
+    return ChainFall(role, times, heights, model, delay)
 
 
 def _model(protocol: Protocol, run: Run, role: str) -> Trajectory | None:

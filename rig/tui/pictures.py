@@ -15,7 +15,7 @@ from rig.tui.app import RigApp
 from rig.tui.client import ReconnectingClient
 from rig.tui.options import Options
 from rig.tui.replay import Player, end_of
-from rig.tui.state import State, state_of
+from rig.tui.state import DaemonState, state_of
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class FakeClient(ReconnectingClient):
         What the daemon would say.
     """
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: DaemonState) -> None:
         super().__init__(str(state.section("port").get("url", "")), None, self._nothing)
         self._state = state
 
@@ -76,7 +76,7 @@ class FakeClient(ReconnectingClient):
         return True
 
     @property
-    def state(self) -> State:
+    def state(self) -> DaemonState:
         """The one it was given."""
         return self._state
 
@@ -98,7 +98,7 @@ class Screenshot(NamedTuple):
 
     name: str
     flow: Flow
-    state: State
+    state: DaemonState
 
 
 def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
@@ -153,13 +153,15 @@ def screenshots(view: SessionView) -> list[Screenshot]:
     ]
 
 
-def _falling(state: State, view: SessionView, job: Job) -> State:
+def _falling(state: DaemonState, view: SessionView, job: Job) -> DaemonState:
     """Stop the clock in the middle of a drop."""
     drop = view.drops[job]
     until = _LIVE_SHARE * drop.edges[-1].tick
     section = {"run": job.run, "attempt": job.attempt, "state": "fired", "tick_hz": drop.tick_hz}
     edges = tuple([*edge] for edge in drop.edges if edge.tick <= until)
-    return State(0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges)
+    return DaemonState(
+        0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges
+    )
 
 
 async def _picture(shot: Screenshot, session: Path, keys: Mapping[str, str]) -> str:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult, Measured
     from rig.protocol.protocol import Protocol, Run
     from rig.results.live import SessionView
-    from rig.tui.motion import Motion, Table
+    from rig.tui.motion import ChainFall, Table
 
 _MARKS = {"impact": ("•", "primary"), "free": ("+", "secondary")}
 _BEFORE_S = 0.02
@@ -62,7 +62,7 @@ def chain_pictures(
     return chains, apart
 
 
-def _expected_end(found: Sequence[Motion]) -> float:
+def _expected_end(found: Sequence[ChainFall]) -> float:
     """When the model's last rod lands."""
     ends = [float(one.model.time[-1]) for one in found if one.model is not None]
     return max(ends, default=0.0)

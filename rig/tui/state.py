@@ -20,7 +20,7 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class DaemonState:
     """Everything the daemon says.
 
     Attributes
@@ -84,7 +84,7 @@ class State:
         return next((line for line in self.runs if line.run == run), None)
 
 
-def typed(n: int, state: Mapping[str, Any]) -> State:
+def typed(n: int, state: Mapping[str, Any]) -> DaemonState:
     """Take the daemon's sections as they are now; what they become later changes nothing here.
 
     Parameters
@@ -95,7 +95,7 @@ def typed(n: int, state: Mapping[str, Any]) -> State:
         Sections by name. Entries of its lists are replaced by the replica, never changed.
     """
     sections = {name: value for name, value in state.items() if name not in {"runs", "edges"}}
-    return State(
+    return DaemonState(
         n, sections, tuple(map(_line, state.get("runs") or ())), tuple(state.get("edges") or ())
     )
 
@@ -112,7 +112,7 @@ def _line(run: Mapping[str, Any]) -> RunLine:
     )
 
 
-def state_of(view: SessionView) -> State:
+def state_of(view: SessionView) -> DaemonState:
     """Say what a daemon would of a file that nobody is writing."""
     last = {entry.run: entry for entry in view.states}
     runs = []
@@ -125,4 +125,4 @@ def state_of(view: SessionView) -> State:
             )
         runs.append(line)
     session = {"path": str(view.path), "title": view.protocol.title, "simulated": view.simulated}
-    return State(0, {"session": session}, tuple(runs))
+    return DaemonState(0, {"session": session}, tuple(runs))

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from rig.campaign.events import (
     Again,
     Answered,
-    Arm,
+    ArmRelease,
     Closed,
     Collect,
-    Fire,
+    EffectFailed,
+    FireRelease,
     Found,
     GiveUp,
     GoOn,
@@ -24,7 +25,6 @@ from rig.campaign.events import (
     Lost,
     Note,
     Opened,
-    Refused,
     Reject,
     Stage,
     Stop,
@@ -42,7 +42,7 @@ NEXT = Job(2, 1)
 
 def ticketed(flow, event):
     """Give an answer that has no ticket the current one."""
-    if isinstance(event, (Answered, Judged, Refused)) and event.ticket < 0:
+    if isinstance(event, (Answered, Judged, EffectFailed)) and event.ticket < 0:
         return event._replace(ticket=flow.ticket)
     return event
 
@@ -67,7 +67,8 @@ def test_a_run_goes_from_the_protocol_to_its_verdict():
     flow, effects = through(Flow(), *TO_RESULT)
     assert flow.stage is Stage.RESULT
     assert effects == [
-        Wait(5.0), Arm(JOB), Fire(99), Collect(JOB), Judge(JOB), Log(JOB, "accepted", ())
+        Wait(5.0), ArmRelease(JOB), FireRelease(99), Collect(JOB), Judge(JOB),
+        Log(JOB, "accepted", ()),
     ]  # fmt: skip
 
 
@@ -123,7 +124,7 @@ def test_stop_is_carried_out_at_every_stage(stage):
 
 @pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
 def test_what_fails_says_why_and_can_be_tried_again(stage):
-    flow, _ = through(Flow(stage=stage, job=JOB), Refused(-1, "a gate is blocked\nclear it"))
+    flow, _ = through(Flow(stage=stage, job=JOB), EffectFailed(-1, "a gate is blocked\nclear it"))
     assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
     flow, _ = through(flow, GoOn(JOB))
     assert flow.trouble == ""
@@ -141,7 +142,7 @@ events = st.one_of(
     st.just(Opened()), st.just(Closed()), st.just(Stopped()), st.builds(GoOn, st.none() | jobs),
     st.builds(Answered, tickets, st.none() | st.integers(0, 5)),
     st.builds(Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
-    st.builds(Refused, tickets, st.just("no"), st.sampled_from(Reason)),
+    st.builds(EffectFailed, tickets, st.just("no"), st.sampled_from(Reason)),
     st.builds(Tick, st.floats(0.0, 2.0)),
     st.just(Lost("gone")), st.builds(Found, jobs), st.builds(Reject, st.just("x")),
     st.builds(Note, st.just("y")), st.builds(Again, jobs),
@@ -162,9 +163,9 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
         if before.stage is Stage.COUNTDOWN and isinstance(event, Tick):
             waited += event.seconds
         for effect in effects:
-            if isinstance(effect, Arm) and attended:
+            if isinstance(effect, ArmRelease) and attended:
                 assert isinstance(event, Answered), "nothing is armed by itself"
-            if isinstance(effect, Fire):
+            if isinstance(effect, FireRelease):
                 assert effect.token == armed
                 assert waited >= flow.countdown_s - 1e-9
                 armed = None
@@ -188,7 +189,7 @@ def test_the_countdown_is_as_long_as_it_was_set():
     flow = replace(Flow(stage=Stage.ARMING, job=JOB), countdown_s=0.5)
     flow, effects = through(flow, Answered(0, 7), Tick(0.4))
     assert effects == []
-    assert step(flow, Tick(0.11))[1] == (Fire(7),)
+    assert step(flow, Tick(0.11))[1] == (FireRelease(7),)
 
 
 PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
@@ -200,7 +201,7 @@ def arming(**more):
 
 @pytest.mark.parametrize("reason", [None, *Reason])
 def test_whoever_is_there_begins_every_arming(reason):
-    flow, effects = through(arming(), Refused(-1, "no\ndo this", reason, 100))
+    flow, effects = through(arming(), EffectFailed(-1, "no\ndo this", reason, 100))
     assert (flow.stage, flow.trouble, flow.job) == (Stage.PREPARE, "no\ndo this", JOB)
     assert effects == ([] if reason in PASSING else [GiveUp()])
     assert through(flow, DONE, Tick(9.0), Opened()) == (flow, [])
@@ -211,9 +212,9 @@ def test_alone_what_passes_is_waited_for_a_few_times(reason):
     flow = arming(attended=False)
     pause = 0.7 if reason is Reason.COOLING else LOOK_S
     for _ in range(LOOKS - 1):
-        flow, effects = through(flow, Refused(-1, "no", reason, 700), DONE)
-        assert effects == [Wait(pause), Arm(JOB)]
-    flow, effects = through(flow, Refused(-1, "no", reason, 700))
+        flow, effects = through(flow, EffectFailed(-1, "no", reason, 700), DONE)
+        assert effects == [Wait(pause), ArmRelease(JOB)]
+    flow, effects = through(flow, EffectFailed(-1, "no", reason, 700))
     assert (flow.stage, effects) == (Stage.PREPARE, [GiveUp()])
 
 
@@ -228,7 +229,7 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
             DONE,
             Answered(-1, 7),
             Tick(9.0),
-            Refused(-1, "a gate moved\nhint", reason),
+            EffectFailed(-1, "a gate moved\nhint", reason),
         )
         assert (flow.stage, effects[3]) == (Stage.PREPARE, Stop("a gate moved"))
         again = {Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED}
@@ -240,7 +241,7 @@ SKEW = "release skew {} ms is beyond 5 ms"
 
 
 def void(number, reason=SKEW):
-    """Arm and judge one drop, which is void."""
+    """ArmRelease and judge one drop, which is void."""
     job = Job(1, number)
     return (
         *(GoOn(job), GoOn(job), DONE, Answered(-1, 7), Tick(9.0), DONE, DONE),

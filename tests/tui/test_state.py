@@ -11,7 +11,7 @@ from rig.campaign.machine import Flow, Stage
 from rig.daemon.client_protocol import Replica
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model, alarm
-from rig.tui.state import State, typed
+from rig.tui.state import DaemonState, typed
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
        "reasons": []}  # fmt: skip
@@ -52,7 +52,7 @@ def test_what_the_daemon_does_not_know_is_not_known():
     state = typed(0, STATE | {"gates": None, "runs": None, "edges": None})
     assert state.blocked is None
     assert (state.runs, state.edges, state.holder) == ((), (), None)
-    assert (State().known, state.known) == (False, True)
+    assert (DaemonState().known, state.known) == (False, True)
 
 
 def test_indicators_count_name_and_judge_steadiness():
@@ -80,7 +80,7 @@ def _model(state=None, **more):
 
 def test_what_is_wrong_is_said_with_what_to_do():
     assert alarm(_model()) is None
-    gone = alarm(Model(State(), Flow(), Indicators(), silence="it is gone"))
+    gone = alarm(Model(DaemonState(), Flow(), Indicators(), silence="it is gone"))
     assert "it is gone" in gone.message
     assert "supply" in gone.hint
     lost = alarm(

@@ -28,16 +28,16 @@ _NAMES = {
 }  # fmt: skip
 
 
-class Status(Vertical):
+class StatusBar(Vertical):
     """One line, and below it what is wrong with what to do."""
 
     SCOPED_CSS = False  # how much is shown depends on the screen
     DEFAULT_CSS = """
-    Status { dock: top; height: auto; }
-    Status #tabs { height: 1; padding: 0 1; background: $panel; display: none; }
-    .-high Status #tabs { display: block; }
-    Status #headline { height: 1; padding: 0 1; background: $panel; }
-    Status #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
+    StatusBar { dock: top; height: auto; }
+    StatusBar #tabs { height: 1; padding: 0 1; background: $panel; display: none; }
+    .-high StatusBar #tabs { display: block; }
+    StatusBar #headline { height: 1; padding: 0 1; background: $panel; }
+    StatusBar #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
                     background: $error 20%; color: $foreground; }
     """
 
