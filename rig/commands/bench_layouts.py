@@ -14,6 +14,7 @@ from rig.bench.layouts import DISTURBANCES, DROPS, as_json, study
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
+from rig.measurands import MEASURANDS
 from rig.report.columns import Column, filled
 from rig.text_table import text_table
 
@@ -78,7 +79,7 @@ def _lines(whole: Record) -> list[str]:
     return lines
 
 
-def _table(columns: Sequence[Column], records: Sequence[Record]) -> list[str]:
+def _table(columns: Sequence[Column[Record]], records: Sequence[Record]) -> list[str]:
     """Write records as aligned text; what a line is of begins it."""
     kept, rows = filled(columns, records)
     words = {n for n, column in enumerate(kept) if not column.numeric}
@@ -119,24 +120,28 @@ def _size(cell: Record) -> str:
     return "–" if cell["error_rms"] is None else f"{1e3 * cell['error_rms']:.3g}"
 
 
+def _symbol(name: str) -> str:
+    row = MEASURANDS[name]
+    return f"{row.symbol} ({row.fine})"
+
+
 def _ratio(cell: Record) -> str:
     return "–" if cell["z_rms"] is None else f"{cell['z_rms']:.2g}"
 
 
-_SYMBOLS = {"separation_m": "Δz (mm)", "speed_m_s": "V (mm/s)", "gravity_m_s2": "g (mm/s²)"}
-_COLUMNS = (
+_COLUMNS: tuple[Column[Record], ...] = (
     Column("chain", lambda row: row["of"]["chain"], numeric=False),
     Column("gates (mm)", lambda row: row["of"]["heights_mm"], numeric=False),
     Column("void", _each(_share("void_share"))),
     Column("marginal", _each(_share("marginal_share"))),
     Column("wrong", _each(lambda cell: str(cell["wrong"]))),
     Column("of", lambda row: next(
-        (_SYMBOLS[cell["measured"]] for cell in row["cells"] if cell["measured"]), ""
+        (_symbol(cell["measured"]) for cell in row["cells"] if cell["measured"]), ""
     ), numeric=False),
     Column("rms error", _each(_size)),
     Column("rms error/u", _each(_ratio)),
 )  # fmt: skip
-_TOTALS = (
+_TOTALS: tuple[Column[Record], ...] = (
     Column("disturbances", lambda one: one["disturbance"], numeric=False),
     Column("drops", lambda one: str(one["drops"])),
     Column("beyond limits", lambda one: str(one["beyond"])),
