@@ -1,0 +1,186 @@
+"""Resolved falls by their own physics: nothing here comes from the model but what it predicts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
+from sim.resolved.contact_law import damping, push
+from sim.resolved.fall import fall, stable_step
+from sim.resolved.scene import Board, Bounce, Chain, Fall, Rods, Strings
+
+GRAVITY, DROP = 9.81, 1.0
+MASS, LENGTH, DIAMETER = 5.8e-3, 0.102, 12.7e-3
+PITCH = 1.165 / 24
+TILT = math.radians(12)
+
+
+def rods(count: int, *, tilt: float = TILT, spread: float = 0.0, seed: int = 0, **changes) -> Rods:
+    rng = np.random.default_rng(seed)
+    signs = (-1.0) ** np.arange(count)
+    return replace(
+        Rods(
+            masses=np.full(count, MASS),
+            heights=PITCH * np.arange(count),
+            diameters=np.full(count, DIAMETER),
+            tilts=signs * (tilt + math.radians(spread) * rng.normal(size=count)),
+            yaws=math.radians(spread) * rng.normal(size=count),
+            aside=1e-3 * spread * rng.normal(size=count),
+            length=LENGTH,
+        ),
+        **changes,
+    )
+
+
+def board(incline: float, restitution: float = 0.5, friction: float = 0.2, time_s: float = 2e-4):
+    return Board(math.radians(incline), Bounce(restitution, time_s, friction))
+
+
+WOOD = Bounce(0.5, 2e-4, 0.3)
+
+
+def struck(incline: float, seed: int = 1) -> Chain:
+    return Chain(rods(4, spread=1.0, seed=seed), Strings(), DROP, GRAVITY, board(incline), WOOD)
+
+
+SCENES = [struck(0.0), struck(40.0, seed=9), struck(60.0, seed=8)]
+
+
+@pytest.fixture(scope="module")
+def falls() -> dict[float, list[Fall]]:
+    """The same three falls with two steps."""
+    return {step: fall(SCENES, step=step, after=3e-3) for step in (1e-5, 5e-6)}
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9, 1.0])
+@pytest.mark.parametrize(("mass", "speed"), [(1e-3, 3.0), (0.1, 0.5)])
+def test_a_bounce_by_itself_has_the_restitution_asked_for(restitution, mass, speed):
+    stiffness, d = np.array([4e5]), damping(restitution)
+    step = 1e-3 * math.pi * math.sqrt(mass / stiffness[0])
+    overlap, rate, fastest = np.array([1e-12]), np.array([speed]), np.zeros(1)
+    while overlap[0] > 0.0:
+        force, fastest = push(overlap, rate, fastest, stiffness, d)
+        rate = rate - step * force / mass
+        overlap = overlap + step * rate
+    assert -rate[0] / speed == pytest.approx(restitution, abs=6e-3)  # Euler's error at this step
+
+
+def test_restitution_outside_of_the_law_is_refused():
+    for wrong in (0.0, 0.05, 1.01, -0.37):
+        with pytest.raises(ValueError, match="restitution"):
+            damping(wrong)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.02])
+def test_free_fall_is_exact(aside):
+    chain = Chain(rods(3), Strings(), 0.18, GRAVITY, swing=np.full(3, aside))
+    (found,) = fall([chain], until=0.03)
+    exact = 0.18 + PITCH * np.arange(3) - 0.5 * GRAVITY * found.times[:, None] ** 2
+    assert np.abs(found.heights - exact).max() < 1e-9
+    assert found.lost["strings"] < 1e-30  # rounding moves rods by 1e-17 m against each other
+
+
+def test_air_slows_a_rod_as_the_closed_form_says():
+    kappa = np.full(2, 2.0)
+    slow = Chain(rods(2), Strings(), 1.0, GRAVITY, drag=kappa)
+    stepped = replace(slow, swing=np.full(2, 1e-12))  # moves: so no formula is used
+    by_formula, by_steps = fall([slow], until=0.05)[0], fall([stepped], until=0.05)[0]
+    count = min(by_formula.times.size, by_steps.times.size)
+    assert np.abs(by_formula.heights[:count] - by_steps.heights[:count]).max() < 1e-8
+    t = by_formula.times[-1]
+    fallen = math.log(math.cosh(t * math.sqrt(GRAVITY * 2.0))) / 2.0
+    assert by_formula.heights[-1, 0] == pytest.approx(1.0 - fallen, abs=1e-8)
+
+
+def test_energy_is_constant_before_the_first_hit():
+    swinging = 0.2 * np.arange(4)[::-1]  # the strings must turn the chain, as no straight line does
+    chain = Chain(rods(4), Strings(1.0), 0.3, GRAVITY, swing=swinging, spin=0.5)
+    (found,) = fall([chain], until=0.03)
+    assert not np.isfinite(found.touched_s).any()
+    fallen = 4 * MASS * GRAVITY * (found.heights[0, 0] - found.heights[-1, 0])
+    assert np.abs(found.energy - found.energy[0]).max() < 1e-6 * fallen
+
+
+def test_energy_never_grows_and_what_goes_is_accounted_for(falls):
+    for step, share in ((1e-5, 1e-3), (5e-6, 2.5e-4)):
+        for found in falls[step]:
+            assert np.diff(found.energy).max() < share * found.energy[0]
+            assert min(found.lost.values()) >= 0.0
+    for found in falls[5e-6]:
+        # The last frame is some steps before the end, while energy is still being lost.
+        spent = found.energy[0] - found.energy[-1]
+        assert sum(found.lost.values()) == pytest.approx(spent, rel=0.03)
+        assert found.lost["board"] > 0.0
+        assert found.lost["strings"] > 0.0
+
+
+def test_momentum_is_what_gravity_and_board_give(falls):
+    for found in falls[1e-5]:
+        fallen = -4 * MASS * GRAVITY * found.frames_s
+        assert np.abs(found.momentum[:, 2] - fallen).max() < 1e-12
+        assert np.abs(found.momentum[:, :2]).max() < 1e-12
+        assert found.board_impulse[2] > 0.0
+
+
+def test_a_fall_does_not_see_what_falls_beside_it(falls):
+    beside = falls[1e-5][1]
+    (alone,) = fall([SCENES[1]], step=1e-5, after=0.0)
+    assert np.array_equal(alone.heights, beside.heights[: alone.times.size])
+    assert alone.strike_s == beside.strike_s
+
+
+LIMIT = [
+    (0.0, beta, 0.2, above) for beta in (0.2, 0.5, 0.8) for above in (1.0, 3.0, 1e3)
+] + [
+    (theta, beta, mu, 1e3)
+    for theta in (30.0, 40.0, 60.0, 80.0)
+    for beta in (0.2, 0.5, 0.8)
+    for mu in (0.0, 0.1, 0.2)
+]  # fmt: skip
+
+
+def test_one_rods_impact_in_the_papers_limit():
+    """Eqs. 8, 9 and 12: thin rods of little tilt, no rolling, a string stiff beside the touch."""
+    drop = 0.2
+
+    def chain(incline: float, restitution: float, friction: float, above: float) -> Chain:
+        two = rods(
+            2, tilt=math.radians(1.0), masses=MASS * np.array([1.0, above]),
+            diameters=np.full(2, 1e-4), rolling=False,
+        )  # fmt: skip
+        surface = board(incline, restitution, friction, 2e-4)
+        return Chain(two, Strings(0.1, 0.0005), drop, GRAVITY, surface)
+
+    ends = math.sqrt(2 * drop / GRAVITY) + 1e-3
+    found = fall([chain(*case) for case in LIMIT], until=ends, step=7.5e-7)
+    speed = math.sqrt(2 * GRAVITY * drop)
+    for (theta, beta, mu, above), one in zip(LIMIT, found, strict=True):
+        alpha = alpha_inclined(beta, mu, theta) if theta else alpha_level(beta)
+        wanted = alpha / (1.0 + gamma_finite(1 / 3) / above)
+        assert one.pulled[0] / (MASS * speed) == pytest.approx(wanted, rel=0.03), (theta, beta, mu)
+
+
+def test_the_step_converges_before_rods_strike_rods():
+    """Errors of the top rod's height after the first impact fall with the square of the step."""
+    chain = replace(SCENES[1], touching=None)
+    ends = math.sqrt(2 * DROP / GRAVITY) + 4e-3
+
+    def height(step: float) -> float:
+        (found,) = fall([chain], until=ends, step=step)
+        gained = found.heights[:, -1] + 0.5 * GRAVITY * found.times**2
+        return float(np.interp(ends - 1e-4, found.times, gained))
+
+    exact = height(1e-6)
+    errors = [abs(height(step) - exact) for step in (1e-5, 5e-6)]
+    assert errors[0] < 0.1e-3 / 4  # of Δz, shared by the impacts before chaos
+    assert math.log2(errors[0] / errors[1]) > 1.5
+
+
+def test_a_stiffer_string_needs_a_shorter_step():
+    soft, stiff = (replace(SCENES[0], strings=Strings(0.3, strain)) for strain in (0.2, 0.002))
+    assert stable_step([stiff]) == pytest.approx(stable_step([soft]) / 10)
+    assert stable_step([soft, stiff]) == stable_step([stiff])
