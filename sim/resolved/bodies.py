@@ -20,7 +20,7 @@ _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
 
 def cross(a: Numbers, b: Numbers) -> Numbers:
     """Vector product along the first axis."""
-    return a[_NEXT] * b[_AFTER] - a[_AFTER] * b[_NEXT]
+    return np.asarray(a[_NEXT] * b[_AFTER] - a[_AFTER] * b[_NEXT])
 
 
 def dot(a: Numbers, b: Numbers) -> Numbers:

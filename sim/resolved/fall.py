@@ -29,6 +29,7 @@ LONGEST = 5.0
 """A chain whose top rod touches nothing falls at most so long, s."""
 _LOOK = 20  # steps between two lists of what is near
 _SOUND = 0.5  # of 2, where the leapfrog of the stiffest string would break
+_SLIGHT = 2e-6  # m
 _EARLY = 1e-3  # m before the first touch at which steps begin
 
 
@@ -97,7 +98,8 @@ class _Falling:
         self.drag = np.array(
             [np.zeros(rods) if chain.drag is None else chain.drag for chain in chains]
         )
-        self.begin = np.zeros(batch)  # each chain's time at the first step
+        self.begin: Numbers = np.zeros(batch)  # each chain's time at the first step
+        self.skipped: Numbers = np.zeros(batch, np.intp)  # samples before that
         self.steps = 0
         self.touched = np.full((batch, rods), math.inf)
         self.height = np.full((batch, rods), math.nan)
@@ -150,17 +152,13 @@ class _Falling:
     def _skip(self) -> Numbers:
         """Fall by formula as far as nothing can touch or pull; distances for samples on the way.
 
-        That holds where all rods of each chain fall alike: the same air, and neither swing nor
-        spin.
+        That holds where all rods of a chain fall alike: the same air, no spin, and so little swing
+        that it stretches no string more than the weight does that it just held.
         """
-        bodies = self.bodies
-        alike = np.all(self.drag == self.drag[:, :1]) and not (
-            bodies.velocity.any() or bodies.spin.any()
-        )
-        self.skipped = np.zeros(len(self.chains), np.intp)
-        if not alike:
-            return np.zeros((0, len(self.chains)))
-        way = np.zeros(len(self.chains))
+        bodies, batch = self.bodies, len(self.chains)
+        if np.any(self.drag != self.drag[:, :1]) or bodies.spin.any():
+            return np.zeros((0, batch))
+        way = np.zeros(batch)
         gaps = self.board.gaps(bodies).min(axis=1)
         for b, chain in enumerate(self.chains):
             if chain.board is None:
@@ -173,16 +171,18 @@ class _Falling:
         # Samples are SAMPLE steps apart, from half a step after the release.
         grid = SAMPLE * self.step
         longest = 1.5 * math.sqrt(2.0 * float((way / bodies.gravity[:, 0]).max()))
-        moments = np.arange(2 + int(longest / grid))[:, None] * grid + np.zeros(way.size)
-        self.skipped = (bodies.fallen(moments, kappa)[0] < way).sum(axis=0)
-        self.begin = self.skipped * grid
-        fallen, speed = bodies.fallen(self.begin[None], kappa)
-        bodies.place[2] -= fallen[0][:, None]
-        bodies.velocity[2] -= speed[0][:, None]
-        lost = bodies.mass * (bodies.gravity * fallen[0][:, None] - 0.5 * speed[0][:, None] ** 2)
-        self.air += lost.sum(axis=1)
-        middles, _ = bodies.fallen(moments[: self.skipped.max()] + self.step / 2.0, kappa)
-        return middles
+        moments = np.arange(2 + int(longest / grid))[:, None] * grid + np.zeros(batch)
+        skipped = (bodies.fallen(moments, kappa)[0] < way).sum(axis=0)
+        begin = skipped * grid
+        moved = bodies.place + begin[:, None] * bodies.velocity
+        if self.strings.stretched(moved, bodies).max() > _SLIGHT:
+            return np.zeros((0, batch))
+        self.skipped, self.begin, bodies.place = skipped, begin, moved
+        fallen, speed = (one[0][:, None] for one in bodies.fallen(begin[None], kappa))
+        bodies.place[2] -= fallen
+        bodies.velocity[2] -= speed
+        self.air += (bodies.mass * (bodies.gravity * fallen - 0.5 * speed**2)).sum(axis=1)
+        return bodies.fallen(moments[: skipped.max()] + self.step / 2.0, kappa)[0]
 
     def _act(self) -> None:
         """Forces and torques now, at a half step, with velocities as the last ones foretell."""

@@ -27,9 +27,7 @@ class StringForces:
     """
 
     def __init__(self, chains: Sequence[Chain], bodies: Bodies) -> None:
-        ends = bodies.place + np.array([-1.0, 1.0])[:, None, None, None] * bodies.half * bodies.axis
-        gaps = np.diff(ends, axis=-1)
-        self._rest = np.sqrt((gaps**2).sum(axis=1))
+        self._rest = _lengths(bodies.place, bodies)
         along = np.array([[chain.strings.stiffness] for chain in chains])
         self.stiffness = along / self._rest
         self._damping = np.array([[damping(chain.strings.restitution)] for chain in chains])
@@ -37,6 +35,10 @@ class StringForces:
         self.stretch = np.zeros_like(self._rest)
         self.tight = self.stretch > 0.0
         self.lost = np.zeros(len(chains))
+
+    def stretched(self, place: Numbers, bodies: Bodies) -> Numbers:
+        """How much longer than at rest strings are with the rods' middles elsewhere, m."""
+        return np.asarray(_lengths(place, bodies) - self._rest)
 
     def forces(self, ends: Numbers, moving: Numbers, step: float) -> Numbers | None:
         """Force on each end, N; shape (2, 3, B, N), as `ends` in m and `moving` in m/s are."""
@@ -65,3 +67,10 @@ class StringForces:
         """Elastic energy of each chain's strings, J."""
         held = 0.5 * self.stiffness * np.maximum(self.stretch, 0.0) ** 2
         return np.asarray(held.sum(axis=(0, 2)))
+
+
+def _lengths(place: Numbers, bodies: Bodies) -> Numbers:
+    """From end to end of neighbours, m; shape (2, B, N − 1)."""
+    sides = np.array([-1.0, 1.0])[:, None, None, None]
+    gaps = np.diff(place + sides * bodies.half * bodies.axis, axis=-1)
+    return np.asarray(np.sqrt((gaps**2).sum(axis=1)))
