@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     import numpy as np
 
@@ -46,6 +47,16 @@ def union(shadows: Iterable[Shadow]) -> list[tuple[Shadow, int]]:
         else:
             merged.append((shadow, shadow.rod))
     return merged
+
+
+def string_shadows(rods: Sequence[Shadow], chance: float, rng: np.random.Generator) -> list[Shadow]:
+    """Flickers of the string in some of the gaps between rods, which come in order of time."""
+    found: list[Shadow] = []
+    for before, after in itertools.pairwise(rods):
+        if rng.random() < chance and before.end < after.start:
+            at = float(rng.uniform(before.end, after.start))
+            found.append(Shadow(at, at + float(rng.uniform(30e-6, 200e-6)), NOT_A_ROD))
+    return found
 
 
 def receive(

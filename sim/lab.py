@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -18,7 +17,7 @@ from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
-from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive
+from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
 from sim.path import Path
 from sim.truth import Truth
@@ -113,7 +112,7 @@ class ChainLab:
 
     def rest(self, label: int) -> int:
         """Mask of the beams that the hanging chains block."""
-        if _is_test(label):
+        if is_test(label):
             return 0
         run, _ = self._run(label)
         mask = 0
@@ -129,7 +128,7 @@ class ChainLab:
 
     def drop(self, label: int) -> list[tuple[float, int, bool]]:
         """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
-        if _is_test(label):
+        if is_test(label):
             return []
         run, attempt = self._run(label)
         rng = self._rng("drop", run.number, attempt)
@@ -208,11 +207,7 @@ class ChainLab:
                     rod,
                 )
             )
-        gaps = [(a.end, b.start) for a, b in itertools.pairwise(shadows)]
-        for start, end in gaps:
-            if rng.random() < self.dials.string and start < end:
-                at = float(rng.uniform(start, end))
-                shadows.append(Shadow(at, at + float(rng.uniform(30e-6, 200e-6)), NOT_A_ROD))
+        shadows += string_shadows(shadows, self.dials.string, rng)
         if path.hits and gate.height == min(g.height for g in self.gates if g.side == gate.side):
             for hit in path.hits:
                 if rng.random() < self.dials.bounce:
@@ -260,6 +255,6 @@ class ChainLab:
         return truth
 
 
-def _is_test(label: int) -> bool:
+def is_test(label: int) -> bool:
     """Whether the board is only tried out, and nothing hangs."""
     return unpack_label(label)[0] == TEST_RUN

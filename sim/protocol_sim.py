@@ -2,7 +2,9 @@
 
 ``sim://?protocol=FILE&seed=N&truth=FILE&pace=1&<dial>=<value>…``, for example
 ``sim://?protocol=protocols/inclined-uniform.yaml&seed=3&missed=2%25&skew_sd=4ms``. ``quiet=1``
-switches all disturbances off. The truth file gets one line of JSON a drop.
+switches all disturbances off. The truth file gets one line of JSON a drop. With
+``dynamics=resolved`` chains fall in the resolved world; its drops are made a dozen at a time, for
+which the first of them waits some seconds.
 """
 
 from __future__ import annotations

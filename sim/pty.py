@@ -240,6 +240,7 @@ def main(
     options = parser.parse_args(arguments)
     dials = dict(text.split("=", 1) for text in options.dial)
     scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
+    scene.get_ready()
     line = scene.line()
     faults = [LineFaults(line["corrupt"], line["lose"], seed=2 * scene.seed + n) for n in (0, 1)]
     bench = Bench(make(scene), options.link, options.log, (faults[0], faults[1]))

@@ -1,0 +1,397 @@
+"""The simulated lab of the resolved world: the same beams and faults, other falls behind them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.errors import InputError
+from rig.link.messages import pack_label
+from sim import fall_cache
+from sim.beam import SeenEdge, Shadow, receive, string_shadows
+from sim.camera import camera_reading
+from sim.lab import ChainLab, is_test
+from sim.resolved.contact_law import DEADEST
+from sim.resolved.fall import STEP, fall, stable_step
+from sim.resolved.scene import Board, Bounce, Chain, Rods, Strings
+from sim.resolved_beam import shadows
+from sim.truth import Truth
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from rig.model.surface import Surface
+    from rig.protocol.protocol import Protocol, RodChain, Run, Side
+    from sim.dials import Dials
+    from sim.resolved.scene import Fall
+    from sim.resolved_dials import ResolvedDials
+
+BLOCK = 12
+"""Runs whose falls are made together: by themselves they would take ten times as long each."""
+ROD_LENGTH = 0.102
+"""Of the paper's chains, m, where a protocol does not say it."""
+
+
+@dataclass(slots=True)
+class ResolvedTruth(Truth):
+    """The truth of a resolved drop. Without ``strike`` it is at level.
+
+    At level the middle of the top rod passes the contact level; where it strikes before, on the
+    rods that lie there, that is when it would have passed had it fallen on. At strike it touches
+    the board or a rod. Lists are by rod, bottom up: impulses in N s, times in s; energy lost in J.
+    """
+
+    separation_strike_m: float | None = None
+    separation_strike_raw_m: float | None = None
+    speed_strike_m_s: float | None = None
+    strike_time_s: float | None = None
+    contact_height_m: float | None = None
+    impulses: list[float] | None = None
+    touched_s: list[float] | None = None
+    lost: dict[str, float] | None = None
+    slack: float | None = None
+    turning_rad_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Hung:
+    """What differs from drop to drop, drawn from the drop's own label."""
+
+    release_s: float
+    skew_s: float
+    hang: tuple[float, float]
+    rng: np.random.Generator
+
+
+class ResolvedLab(ChainLab):
+    """Everything behind the gates, with rods, strings and board resolved in time.
+
+    Parameters are those of `ChainLab`, and
+
+    Parameters
+    ----------
+    world
+        Its materials, and how chains hang.
+
+    Raises
+    ------
+    InputError
+        Chains of beads, or rods whose diameter is unknown.
+    """
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        dials: Dials,
+        seed: int,
+        tell: Callable[[Truth], None] = lambda _: None,
+        *,
+        world: ResolvedDials,
+    ) -> None:
+        super().__init__(protocol, dials, seed, tell)
+        self.world = world
+        for spec in protocol.chains.values():
+            _check(spec)
+        if protocol.surface is not None:
+            _bounce(protocol.surface, dials, world)
+        self._key = fall_cache.key(
+            protocol.chains, protocol.surface, protocol.drop, protocol.gravity, self.gates,
+            protocol.plan, asdict(dials), world, seed,
+        )  # fmt: skip
+        self.step = min(
+            [STEP]
+            + [
+                0.95 * stable_step([self._chain(self._nominal(body.spec), body.spec)])
+                for body in self.bodies.values()
+                if body.spec.chain.rods > 1
+            ]
+        )
+        self._made: dict[int, dict[str, Any]] = {}
+
+    def drop(self, label: int) -> list[tuple[float, int, bool]]:
+        """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
+        if is_test(label):
+            return []
+        made = self._find(label)
+        run, attempt = self._run(label)
+        hung = self._hung(run, attempt)
+        rng = hung.rng
+        edges: list[SeenEdge] = []
+        for gate in self.gates:
+            if str(gate.channel) not in made["shadows"]:
+                continue
+            let_go = hung.release_s + (hung.skew_s if gate.side == "free" else 0.0)
+            seen = [
+                Shadow(let_go + start, let_go + end, rod)
+                for start, end, rod in made["shadows"][str(gate.channel)]
+            ]
+            seen += string_shadows(seen, self.dials.string, rng)
+            edges += receive(seen, gate.channel, self.dials, rng)
+        edges.sort(key=lambda edge: edge.time_s)
+        truth = ResolvedTruth(
+            run=run.number,
+            attempt=attempt,
+            incline_deg=run.incline_deg,
+            impact_chain=run.impact,
+            gravity_m_s2=self.protocol.gravity.value,
+            edges=[(e.time_s, e.channel, e.blocked, e.rod) for e in edges],
+            **made["truth"],
+        )
+        self.tell(truth)
+        return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
+
+    def _find(self, label: int) -> dict[str, Any]:
+        """Look for a drop: made already, kept on the disk, or to be made with its block."""
+        if label not in self._made:
+            found = fall_cache.load(fall_cache.key(self._key, label))
+            if found is not None:
+                self._made[label] = found
+            else:
+                make_ahead([(self, self._block(label))])
+        return self._made[label]
+
+    def _block(self, label: int) -> list[int]:
+        """Labels of the drops that are made together with this one."""
+        run, attempt = self._run(label)
+        if attempt > 1:
+            return [label]
+        for block in self.blocks():
+            if label in block:
+                return block
+        raise AssertionError(run)
+
+    def blocks(self) -> list[list[int]]:
+        """Labels of all first attempts, in blocks."""
+        labels = [pack_label(number, 1) for number in sorted(self.runs)]
+        return [labels[first : first + BLOCK] for first in range(0, len(labels), BLOCK)]
+
+    def keep(self, label: int, made: dict[str, Any]) -> None:
+        """Take a drop that was made, and keep it on the disk."""
+        self._made[label] = made
+        fall_cache.save(fall_cache.key(self._key, label), made)
+
+    def lacks(self, label: int) -> bool:
+        """Whether a drop still has to be made."""
+        return label not in self._made and (
+            fall_cache.load(fall_cache.key(self._key, label)) is None
+        )
+
+    def _hung(self, run: Run, attempt: int) -> Hung:
+        rng = self._rng("drop", run.number, attempt)
+        dials = self.dials
+        release = dials.delay + dials.delay_sd * float(rng.normal())
+        skew = dials.skew_sd * float(rng.normal())
+        # A chain that falls alone has nothing to be late against.
+        late = skew if run.impact is not None else 0.0
+        hang = dials.hang_sd * rng.normal(size=2)
+        return Hung(release, late, (float(hang[0]), float(hang[1])), rng)
+
+    def chains(self, label: int) -> dict[Side, Chain]:
+        """Hang the chains of a drop as they really are."""
+        run, attempt = self._run(label)
+        hang = self._hung(run, attempt).hang
+        found: dict[Side, Chain] = {}
+        if run.impact is not None:
+            rods, swing, spin = self._hang("impact", run.impact, run, attempt)
+            found["impact"] = self._chain(
+                rods, self.protocol.chains[run.impact], hang[0], swing, spin, run.incline_deg
+            )
+        if run.free is not None:
+            rods, swing, spin = self._hang("free", run.free, run, attempt)
+            found["free"] = self._chain(rods, self.protocol.chains[run.free], hang[1], swing, spin)
+        return found
+
+    def _nominal(self, spec: RodChain) -> Rods:
+        diameters = np.array(spec.diameters)
+        length = ROD_LENGTH if math.isnan(spec.rod_length) else spec.rod_length
+        masses = np.array(spec.chain.masses)
+        if not spec.weighed:
+            masses = self.world.density * math.pi / 4.0 * diameters**2 * length
+        zero = np.zeros(diameters.size)
+        signs = (-1.0) ** np.arange(diameters.size)
+        return Rods(
+            masses, np.array(spec.chain.heights), diameters,
+            signs * math.radians(spec.tilt_deg), zero, zero, length, self.world.roll > 0.0,
+        )  # fmt: skip
+
+    def _hang(
+        self, side: Side, name: str, run: Run, attempt: int
+    ) -> tuple[Rods, np.ndarray, float]:
+        """Rods as they are and as they hang this time; speed and turning of the chain."""
+        world, body = self.world, self.bodies[name]
+        nominal = self._nominal(body.spec)
+        own = self._rng("tilts", name)
+        now = self._rng("hung", side, run.number, attempt)
+        count = nominal.masses.size
+        tilts = nominal.tilts + math.radians(world.tilt_sd) * own.normal(size=count)
+        yaws = math.radians(world.yaw_sd) * now.normal(size=count)
+        aside = world.aside_sd * now.normal(size=count)
+        above = nominal.heights[-1] - nominal.heights
+        swing = world.swing_sd * float(now.normal()) * above / max(float(above[0]), 1e-9)
+        spin = world.spin_sd * float(now.normal())
+        hung = Rods(
+            nominal.masses, body.offsets, nominal.diameters, tilts, yaws, aside,
+            nominal.length, nominal.rolling,
+        )  # fmt: skip
+        return hung, swing, spin
+
+    def _chain(
+        self,
+        rods: Rods,
+        spec: RodChain,
+        hang: float = 0.0,
+        swing: np.ndarray | None = None,
+        spin: float = 0.0,
+        incline_deg: float | None = None,
+    ) -> Chain:
+        world, dials, surface = self.world, self.dials, self.protocol.surface
+        board = touching = None
+        if incline_deg is not None and surface is not None:
+            board = Board(math.radians(incline_deg), _bounce(surface, dials, world))
+            if world.rods_touch > 0.0:
+                touching = Bounce(world.rod_restitution, world.rod_time, world.rod_friction)
+        thin = np.array([1.0 / d for d in spec.diameters])
+        masses = rods.masses
+        # What air takes from a rod goes with its width over its mass; `drag` is the chain's own.
+        drag = dials.drag * thin * masses.sum() / float((masses * thin).sum())
+        return Chain(
+            rods, Strings(world.string_restitution, world.string_strain), self.hang_height + hang,
+            self.protocol.gravity.value, board, touching, drag, swing, spin,
+        )  # fmt: skip
+
+    def made(self, label: int, falls: dict[Side, Fall]) -> dict[str, Any]:
+        """Keep of a drop's falls what beams and truth need."""
+        run, attempt = self._run(label)
+        aside = self._rng("centre", run.number, attempt).normal(size=2) * self.world.off_centre_sd
+        seen: dict[str, list[tuple[float, float, int]]] = {}
+        for gate in self.gates:
+            if gate.side not in falls:
+                continue
+            name = run.impact if gate.side == "impact" else run.free
+            assert name is not None
+            body = self.bodies[name]
+            nominal = np.array(body.spec.widths)
+            found = shadows(
+                falls[gate.side],
+                self.heights[gate.channel],
+                self.beams[gate.channel] + float(aside[int(gate.side == "free")]),
+                np.array(body.spec.diameters) * body.widths / nominal,
+                0.5 * self._nominal(body.spec).length,
+            )
+            seen[str(gate.channel)] = [(one.start, one.end, one.rod) for one in found]
+        return {"shadows": seen, "truth": self._resolved_truth(run, attempt, falls)}
+
+    def _resolved_truth(self, run: Run, attempt: int, falls: dict[Side, Fall]) -> dict[str, Any]:
+        if "impact" not in falls:
+            return {}
+        struck = falls["impact"]
+        hung = self._hung(run, attempt)
+        skew = hung.skew_s
+        level_s, level_speed = at_level(struck, self.protocol.gravity.value)
+        contact = float(struck.touched_height[-1])
+        truth: dict[str, Any] = {
+            "speed_m_s": level_speed,
+            "fall_time_s": level_s,
+            "speed_strike_m_s": struck.top_speed,
+            "strike_time_s": struck.strike_s,
+            "contact_height_m": contact,
+            "impulses": struck.pulled.tolist(),
+            "touched_s": struck.touched_s.tolist(),
+            "lost": struck.lost,
+            "slack": struck.slack,
+            "turning_rad_s": struck.turning,
+        }
+        if "free" not in falls:
+            return truth
+        free = falls["free"]
+
+        def free_top(time_s: float) -> float:
+            return float(np.interp(time_s, free.times, free.heights[:, -1]))
+
+        truth |= {
+            "release_skew_s": skew,
+            "separation_m": free_top(level_s),
+            "separation_raw_m": free_top(level_s - skew),
+            "separation_strike_m": free_top(struck.strike_s) - contact,
+            "separation_strike_raw_m": free_top(struck.strike_s - skew) - contact,
+        }
+        truth["camera_separation_m"], truth["camera_speed_m_s"] = camera_reading(
+            lambda t: float(np.interp(t, struck.times, struck.heights[:, -1])),
+            lambda t: free_top(t - skew),
+            struck.strike_s,
+            self._rng("camera", run.number, attempt),
+        )
+        return truth
+
+
+def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
+    """When the top rod's middle passes the contact level, s after release, and how fast, m/s.
+
+    Where the rod strikes before, it falls on as if nothing had been there.
+    """
+    contact, speed = float(struck.touched_height[-1]), struck.top_speed
+    if contact >= 0.0:
+        there = math.sqrt(speed**2 + 2.0 * gravity * contact)
+        return struck.strike_s + 2.0 * contact / (speed + there), there
+    after = int(np.argmax(struck.heights[:, -1] < 0.0))
+    (t0, t1), (z0, z1) = (
+        struck.times[after - 1 : after + 1],
+        struck.heights[after - 1 : after + 1, -1],
+    )
+    return float(t0 + (t1 - t0) * z0 / (z0 - z1)), float((z0 - z1) / (t1 - t0))
+
+
+def make_ahead(wanted: Iterable[tuple[ChainLab, Sequence[int]]]) -> None:
+    """Let the chains of many drops fall together, also those of several rigs.
+
+    Falls do not see each other, so what is made with what changes nothing but the time it takes.
+    """
+    groups: dict[tuple[Side, int, float], list[tuple[ResolvedLab, int, Chain]]] = {}
+    for lab, labels in wanted:
+        assert isinstance(lab, ResolvedLab)
+        for label in labels:
+            if lab.lacks(label):
+                for side, chain in lab.chains(label).items():
+                    group = side, chain.rods.masses.size, lab.step
+                    groups.setdefault(group, []).append((lab, label, chain))
+    falls: dict[tuple[int, int], tuple[ResolvedLab, dict[Side, Fall]]] = {}
+    for (side, _, step), members in groups.items():
+        found = fall([chain for _, _, chain in members], step=step)
+        for (lab, label, _), one in zip(members, found, strict=True):
+            falls.setdefault((id(lab), label), (lab, {}))[1][side] = one
+    for (_, label), (lab, sides) in falls.items():
+        lab.keep(label, lab.made(label, sides))
+
+
+def _bounce(surface: Surface, dials: Dials, world: ResolvedDials) -> Bounce:
+    """How the board throws rods back: as the protocol says, or the dials.
+
+    Raises
+    ------
+    InputError
+        A restitution that no contact here has.
+    """
+    beta = surface.restitution.value if math.isnan(dials.restitution) else dials.restitution
+    mu = surface.friction.value if math.isnan(dials.friction) else dials.friction
+    if not DEADEST <= beta <= 1.0:
+        raise InputError(
+            f"dynamics=resolved: the board's restitution {beta:g} is not between {DEADEST} and 1",
+            "a pile needs none of its own here: rods land on rods",
+        )
+    return Bounce(beta, world.board_time, mu)
+
+
+def _check(spec: RodChain) -> None:
+    if spec.chain.alpha is not None:
+        raise InputError(
+            f"dynamics=resolved: chain {spec.name} has a given α, so it is no chain of rods",
+            "describe its rods: diameter, rod_length, tilt",
+        )
+    if not spec.diameters or min(spec.diameters) <= 0.0:
+        raise InputError(
+            f"dynamics=resolved: the diameter of chain {spec.name}'s rods is unknown",
+            "add diameter",
+        )

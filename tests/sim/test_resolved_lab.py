@@ -1,0 +1,210 @@
+"""The resolved world as a lab: the same beams, edges and truth in front of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.errors import InputError
+from rig.link.messages import pack_label
+from rig.ports import truth_file
+from rig.protocol import reader
+from rig.results import detailed
+from rig.runner import Operator, run_protocol
+from rig.session.store import Session
+from sim import fall_cache
+from sim.dials import Dials, read_dials
+from sim.edges import falls
+from sim.resolved_dials import NAMES, ResolvedDials, read_resolved_dials
+from sim.resolved_lab import ResolvedLab, at_level
+from sim.scene import choose_world, set_scene
+
+GRAVITY = 9.81
+SCENE = """
+protocol: 1
+title: Four rods
+chains:
+  A: {rods: 4, length: 145 mm, diameter: 12.7 mm, rod_length: 102 mm, tilt: 12 deg}
+  B: {like: A}
+surface: {restitution: 0.5, friction: 0.2}
+drop: 600 mm
+gravity: 9.81 m/s^2
+gates:
+  impact: [{channel: 0, height: 25 mm}, {channel: 1, height: 60 mm}, {channel: 2, height: 400 mm}]
+  free: [{channel: 8, height: 25 mm}, {channel: 9, height: 60 mm}, {channel: 10, height: 400 mm}]
+plan: {incline: 40 deg, repeats: 2, order: ABBA, settle: 0 s}
+accept: {release_skew: 20 ms}
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    """Falls made here are kept here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("scene") / "four.yaml"
+    path.write_text(SCENE)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def dropped(scene) -> tuple[ResolvedLab, list, list]:
+    """Both drops of a session on a perfect rig: lab, truths, edges."""
+    truths: list = []
+    lab = ResolvedLab(
+        reader.read(scene), replace(Dials.quiet(), skew_sd=2e-3), 3, truths.append,
+        world=read_resolved_dials({"quiet": "1", "yaw_sd": "1 deg"}),
+    )  # fmt: skip
+    edges = [lab.drop(pack_label(run, 1)) for run in (1, 2)]
+    return lab, truths, edges
+
+
+def test_free_chain_darkens_beams_as_free_fall_does(dropped):
+    lab, truths, _ = dropped
+    half = 12.7e-3 / 2 / math.cos(math.radians(12))
+    for truth in truths:
+        let_go = Dials().delay + truth.release_skew_s
+        seen = {(ch, dark, rod): t for t, ch, dark, rod in truth.edges if ch >= 8}
+        for gate in lab.protocol.gates.on("free"):
+            for rod in range(4):
+                middle = 0.6 + rod * 0.145 / 3 - gate.height
+                for dark, way in ((True, middle - half), (False, middle + half)):
+                    wanted = let_go + math.sqrt(2 * way / GRAVITY)
+                    assert seen[gate.channel, dark, rod] == pytest.approx(wanted, abs=0.2e-6)
+
+
+def test_truth_at_level_and_at_strike(dropped):
+    _, truths, _ = dropped
+    for truth in truths:
+        top = 0.6 + 0.145
+
+        def free(time_s, top=top):
+            return top - 0.5 * GRAVITY * time_s**2
+
+        assert truth.separation_m == pytest.approx(free(truth.fall_time_s), abs=1e-7)
+        raw = free(truth.fall_time_s - truth.release_skew_s)
+        assert truth.separation_raw_m == pytest.approx(raw, abs=1e-7)
+        strike = free(truth.strike_time_s) - truth.contact_height_m
+        assert truth.separation_strike_m == pytest.approx(strike, abs=1e-7)
+        assert truth.speed_m_s > math.sqrt(2 * GRAVITY * 0.74) > 0
+        assert truth.separation_m > 1e-3  # struck rods pulled it down
+        assert all(impulse > 0.0 for impulse in truth.impulses[:-1])
+        assert truth.lost["board"] > 0.0
+        assert 0.0 <= truth.slack <= 1.0
+
+
+def test_a_rod_that_strikes_early_is_followed_to_the_level(dropped):
+    lab, _, _ = dropped
+    from sim.resolved.fall import fall
+
+    (struck,) = fall([lab.chains(pack_label(1, 1))["impact"]], step=lab.step)
+    struck.touched_height[-1], struck.top_speed = 0.02, 4.0
+    time_s, speed = at_level(struck, GRAVITY)
+    assert speed == pytest.approx(math.sqrt(16.0 + 2 * GRAVITY * 0.02))
+    assert time_s - struck.strike_s == pytest.approx((speed - 4.0) / GRAVITY)
+
+
+def test_a_drop_comes_out_the_same_alone_again_and_from_the_disk(dropped, monkeypatch, tmp_path):
+    lab, truths, edges = dropped
+    assert lab.drop(pack_label(2, 1)) == edges[1]
+    truths.pop()
+
+    def again() -> list:
+        twin = ResolvedLab(lab.protocol, lab.dials, 3, world=lab.world)
+        return twin.drop(pack_label(2, 1))
+
+    assert again() == edges[1]  # from the disk
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(ResolvedLab, "_block", lambda self, label: [label])
+    assert again() == edges[1]
+
+
+def test_what_was_kept_for_other_parameters_is_not_taken(dropped):
+    lab, _, _ = dropped
+    other = ResolvedLab(
+        lab.protocol, lab.dials, 3, world=replace(lab.world, string_restitution=0.7)
+    )
+    assert not lab.lacks(pack_label(1, 1))
+    assert other.lacks(pack_label(1, 1))
+
+
+def test_a_disk_that_takes_nothing_only_costs_time(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    fall_cache.save("x", {"a": 1})
+    assert fall_cache.load("x") is None
+
+
+def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
+    path = tmp_path / "four.session"
+    url = "sim://?dynamics=resolved&quiet=1&yaw_sd=1 deg"
+    run_protocol(scene, url, str(path), Operator(lambda _: None), 3)
+    told = [json.loads(line) for line in truth_file(path).read_text().splitlines()]
+    assert [one["run"] for one in told] == [1, 2]
+    with Session.open(path, readonly=True) as session:
+        found = detailed(session)[0]
+    assert len(found.runs) == 2
+    for result, one in zip(found.runs, told, strict=True):
+        skew = result.quantities.get("release_skew_s")
+        assert skew is None or abs(skew.value - one["release_skew_s"]) < 1e-3
+
+
+def test_falls_for_benchmarks_come_in_one_batch(scene):
+    url = f"sim://?protocol={scene}&dynamics=resolved&quiet=1&yaw_sd=1 deg"
+    lines = [json.loads(line) for line in falls(url, [3, 4], [[1], [2]])]
+    assert [line["seed"] for line in lines] == [3, 4]
+    assert {line["truth"]["run"] for line in lines} == {1, 2}
+
+
+@pytest.mark.parametrize(
+    ("setting", "text", "says"),
+    [
+        ("dynamics", "real", "model or resolved"),
+        ("string_restitution", "0.05", "0.1 to 1"),
+        ("board_time", "2 mm", "a time"),
+        ("rods_touch", "2", "0 to 1"),
+        ("restitution", "-0.37", "restitution"),
+    ],
+)
+def test_bad_settings_are_refused(scene, setting, text, says):
+    with pytest.raises(InputError) as caught:
+        set_scene("sim", {"protocol": scene, "dynamics": "resolved"} | {setting: text})
+    assert says in f"{caught.value} {caught.value.hint}"
+
+
+def test_dials_of_the_resolved_world_are_unknown_to_the_model():
+    with pytest.raises(InputError, match="string_restitution"):
+        read_dials(choose_world({"string_restitution": "0.5"})[1])
+
+
+def test_quiet_hangs_chains_still_and_keeps_the_materials():
+    quiet = read_resolved_dials({"quiet": "1"})
+    for name in NAMES:
+        wanted = 0.0 if name.endswith("_sd") else getattr(ResolvedDials(), name)
+        assert getattr(quiet, name) == wanted
+
+
+def test_beads_are_no_rods(tmp_path):
+    path = tmp_path / "beads.yaml"
+    text = SCENE.replace("tilt: 12 deg", "tilt: 12 deg, alpha: 0.12, gamma: 0")
+    path.write_text(text)
+    with pytest.raises(InputError, match="no chain of rods"):
+        set_scene("sim", {"protocol": str(path), "dynamics": "resolved"})
+
+
+def test_air_takes_from_a_chain_what_the_dial_says(scene):
+    lab = ResolvedLab(
+        reader.read(scene), replace(Dials.quiet(), drag=0.05), 3, world=ResolvedDials()
+    )
+    chain = lab.chains(pack_label(1, 1))["impact"]
+    mean = (chain.drag * chain.rods.masses).sum() / chain.rods.masses.sum()
+    assert np.isclose(mean, 0.05, rtol=1e-12)
