@@ -126,6 +126,11 @@ _LONGEST = 100
 _LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction
 
 
+def significant(value: float, digits: int = 2) -> str:
+    """Write a number with so many significant digits and never an exponent."""
+    return f"{Decimal(f'{value:.{digits}g}'):f}"
+
+
 def quoted(text: str, limit: int = 40) -> str:
     """Return `text` for a one-line message: in quotes, control characters escaped, cut short."""
     return repr(text if len(text) <= limit else text[:limit] + "…")

@@ -110,6 +110,7 @@ _LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
 _SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled"}
 _SIGNED = {"clock", "drift", "reference", "restitution"}
 _RATES = {"clock", "reference"}
+_OF_THE_URL = ("pace",)  # no disturbance, and read by the scene
 
 
 def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
@@ -130,10 +131,11 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
     changes: dict[str, float] = {}
     for name, text in rest.items():
         if name not in _NAMES:
-            close = get_close_matches(name, _NAMES, 1)
+            known = ("quiet", *_OF_THE_URL, *_NAMES)
+            close = get_close_matches(name, known, 1)
             raise InputError(
                 f"{scheme}://: unknown dial {name!r}",
-                f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(_NAMES)}",
+                f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(known)}",
             )
         dimension = (
             Dimension.TIME

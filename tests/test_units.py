@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.units import UNITS, Dimension, Quantity, UnitError, format_quantity, parse
+from rig.units import UNITS, Dimension, Quantity, UnitError, format_quantity, parse, significant
 
 PINT_NAMES = {"1": "", "%": "percent", "deg": "degree"}
 BASES = {
@@ -20,6 +20,14 @@ BASES = {
     Dimension.NUMBER: "",
 }
 FINITE = st.floats(min_value=-1e12, max_value=1e12, allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(123.4, "120"), (0.0000123, "0.000012"), (-1.25, "-1.2"), (99.6, "100"), (0.0, "0")],
+)
+def test_significant_digits_need_no_exponent(value, text):
+    assert significant(value) == text
 
 
 @pytest.fixture(scope="module")

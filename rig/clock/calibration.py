@@ -12,6 +12,7 @@ from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.clock.samples import HostTime, one_axis, samples
 from rig.threads import one_thread
+from rig.units import significant
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -284,8 +285,8 @@ def _notes(sources: list[Source], breaks: int) -> list[str]:
         )
     if sources and (track := sources[0].rate.track) is not None and track.seen:
         notes.append(
-            f"the board's clock wanders, by {track.wander * 60e6:.2g} ppm in an hour: each drop "
-            "has the rate of its own time"
+            f"the board's clock wanders, by {significant(track.wander * 60e6)} ppm in an hour: "
+            "each drop has the rate of its own time"
         )
     if len(sources) > 1:
         one, other = (source.mean() for source in sources)

@@ -46,34 +46,33 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
     caption = _caption(facts)
     foot = _LINE_HEIGHT * (caption.count("\n") + 2)
     flat = len(layout.grid.axes) == 2
+    shown = [(SEPARATION, swept.separation_m)] if layout.two_chains else []
+    shown += [(SPEED, swept.speed_m_s)]
     with canvas(
-        (3.4, foot) if flat else (2.9, 2.9, foot),
-        9.0 if flat else 7.0,
+        (3.4, foot) if flat else (*(2.9,) * len(shown), foot),
+        9.0 if flat and len(shown) > 1 else 7.0,
         simulated=False,
-        columns=2 if flat else 1,
+        columns=len(shown) if flat else 1,
         description=json.dumps(facts, ensure_ascii=False),
     ) as drawing:
-        for panel, values, label in (
-            (drawing.axes[0], SEPARATION.scale * swept.separation_m, SEPARATION.axis),
-            (drawing.axes[1], SPEED.scale * swept.speed_m_s, SPEED.axis),
-        ):
+        panels, (below, *empty) = drawing.axes[: len(shown)], drawing.axes[len(shown) :]
+        for panel, (row, found) in zip(panels, shown, strict=True):
             if flat:
-                image = _map(panel, layout.grid.axes, values, swept.in_domain)
-                drawing.figure.colorbar(image, ax=panel, label=label)
+                image = _map(panel, layout.grid.axes, row.scale * found, swept.in_domain)
+                drawing.figure.colorbar(image, ax=panel, label=row.axis)
             else:
-                _curve(panel, layout.grid.axes[0], values, swept)
-                panel.set_ylabel(label)
-        drawing.axes[1].set_xlabel(VARIABLES[layout.grid.axes[0].name].label)
-        for below in drawing.axes[2:]:
-            below.axis("off")
-        below = drawing.axes[2]
+                _curve(panel, layout.grid.axes[0], row.scale * found, swept)
+                panel.set_ylabel(row.axis)
+        panels[-1].set_xlabel(VARIABLES[layout.grid.axes[0].name].label)
+        for panel in (below, *empty):
+            panel.axis("off")
         said = below.text(
             0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes,
             parse_math=False,  # a title may have a $
         )  # fmt: skip
         said.set_in_layout(False)  # it may pass under the other map
         # The caption's panel must not take the labels of the axis all panels share.
-        for panel in drawing.axes[:2] if flat else drawing.axes[1:2]:
+        for panel in panels if flat else panels[-1:]:
             panel.tick_params(labelbottom=True)
     return drawing.svg
 

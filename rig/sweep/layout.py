@@ -80,6 +80,8 @@ class Layout:
         How much longer the free chain is; it adds to every separation.
     pile
         The surface's rule for rods that gather, if it has one and it matters.
+    two_chains
+        Whether a chain falls freely beside it; without, Δz is from a twin that nobody hung.
     """
 
     grid: Grid
@@ -88,6 +90,7 @@ class Layout:
     chain: Chain
     longer_m: float
     pile: Pile | None
+    two_chains: bool
 
 
 def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
@@ -124,6 +127,7 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
         chain=first,
         longer_m=others[0].length - first.length if others else 0.0,
         pile=protocol.surface.pile if protocol.surface and "incline" in scene else None,
+        two_chains=protocol.two_chains,
     )
 
 

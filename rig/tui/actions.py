@@ -34,6 +34,8 @@ class Action(NamedTuple):
         Where it makes sense.
     driving
         Whether it needs control of the rig.
+    two_chains
+        Whether it is about what only a scene of two chains has.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Action(NamedTuple):
     command: str = ""
     stages: frozenset[Stage] = ANY
     driving: bool = False
+    two_chains: bool = False
 
 
 ACTIONS: tuple[Action, ...] = (
@@ -81,7 +84,8 @@ ACTIONS: tuple[Action, ...] = (
     Action("turn_round", "i", "turn", "History: play in the other direction"),
     Action("sessions", "o", "sessions", "History: another session"),
     Action("drops", "g", "drops", "History: another drop"),
-    Action("control_chart", "y", "skew/g", "Session: skew or g in the control chart"),
+    Action("control_chart", "y", "skew/g", "Session: skew or g in the control chart",
+           two_chains=True),
     Action("previous", "up", "previous", "Previous drop, protocol or line"),
     Action("next", "down", "next", "Next drop, protocol or line"),
     Action("theme", "t", "theme", "Next theme: dark, light, high contrast"),
@@ -100,9 +104,15 @@ OFFLINE = tuple(
 """What can be done with a file and no rig."""
 
 
-def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
-    """Whether an action makes sense now."""
-    return stage in action.stages and (driving or not action.driving)
+def possible(
+    action: Action, stage: Stage, *, driving: bool, two_chains: bool | None = None
+) -> bool:
+    """Whether an action makes sense now; which scene it is may not be known yet."""
+    return (
+        stage in action.stages
+        and (driving or not action.driving)
+        and (two_chains is not False or not action.two_chains)
+    )
 
 
 def shown_key(keys: str) -> str:

@@ -16,7 +16,7 @@ from textual.widgets import ContentSwitcher, Input
 from rig.campaign.events import EffectFailed, Stage, Stopped, Tick
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands, selectors
-from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, possible, shown_key
+from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, Action, possible, shown_key
 from rig.tui.client import ReconnectingClient
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
@@ -356,12 +356,16 @@ class RigApp(App[None]):
         action = BY_NAME[name]
         if self.client is None and name not in OFFLINE:
             return
-        if not possible(action, self.flow.stage, driving=self.driving):
+        if not self._possible(action):
             if action.driving and not self.driving:
                 self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
                                    "c takes control when it is free"))  # fmt: skip
             return
         self.begin(commands.do(self, name))
+
+    def _possible(self, action: Action) -> bool:
+        two = self.model.two_chains
+        return possible(action, self.flow.stage, driving=self.driving, two_chains=two)
 
     def action_choose(self, page: str, at: int) -> None:
         """Choose a line of a page's list by mouse."""
@@ -374,7 +378,7 @@ class RigApp(App[None]):
         for action in ACTIONS:
             if self.client is None and action.name not in OFFLINE:
                 continue
-            if action.name != "palette" and possible(action, self.flow.stage, driving=self.driving):
+            if action.name != "palette" and self._possible(action):
                 told = f"{shown_key(self.keys[action.name])}  {action.command}".rstrip()
                 yield SystemCommand(
                     action.text, told, lambda name=action.name: self.action_do(name)

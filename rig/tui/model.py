@@ -79,6 +79,11 @@ class Model:
         return self.flow.stage if seen is None else seen
 
     @property
+    def two_chains(self) -> bool | None:
+        """Whether a free chain falls beside the one that strikes; `None` before that is known."""
+        return None if self.protocol is None else self.protocol.two_chains
+
+    @property
     def run(self) -> Run | None:
         """The planned run in hand."""
         if self.view is None or self.job is None:

@@ -105,13 +105,21 @@ def test_quiet_is_0_or_1(text):
 
 
 @pytest.mark.parametrize(
-    ("typo", "meant"), [("skew", "skew_sd"), ("mised", "missed"), ("corupt", "corrupt")]
+    ("typo", "meant"),
+    [("skew", "skew_sd"), ("mised", "missed"), ("corupt", "corrupt"), ("quite", "quiet")],
 )
 def test_an_unknown_dial_is_named_and_a_near_one_proposed(typo, meant):
     with pytest.raises(InputError, match=repr(typo)) as caught:
         read_dials({typo: "1"})
     assert caught.value.hint == f"did you mean '{meant}'?"
     assert caught.value.exit_code == 2
+
+
+def test_what_resembles_nothing_is_answered_with_all_there_is():
+    with pytest.raises(InputError) as caught:
+        read_dials({"xyzzy": "1"})
+    named = caught.value.hint.removeprefix("dials are ").split(", ")
+    assert set(named) == {"quiet", "pace", *asdict(Dials())}
 
 
 def test_an_unknown_dial_like_no_other_lists_them_all():

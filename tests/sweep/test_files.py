@@ -14,6 +14,7 @@ import pytest
 
 from rig import __version__
 from rig.sweep.progress import Progress
+from tests.cli.lab import PROTOCOLS
 from tests.sweep.conftest import SCENE, VARY
 from tests.test_imports import packages_loaded_by
 
@@ -73,6 +74,16 @@ def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, 
     svg = (tmp_path / "s.svg").read_text("utf-8")
     assert len(re.findall("<image", svg)) == images
     assert hashlib.sha256(SCENE.encode()).hexdigest() in svg
+
+
+def test_a_chain_alone_is_apart_from_nothing(sweep, tmp_path):
+    protocol = tmp_path / "one.yaml"
+    protocol.write_text((PROTOCOLS / "single-chain.yaml").read_text("utf-8"), "utf-8")
+    for vary in (("friction=0..1:3",), ("friction=0..1:3", "restitution=0..1:3")):
+        assert sweep("s.svg", *vary, protocol=protocol).code == 0
+        svg = (tmp_path / "s.svg").read_text("utf-8")
+        assert "speed V" in svg
+        assert "Δz" not in svg
 
 
 def test_a_title_is_no_formula(sweep, tmp_path):

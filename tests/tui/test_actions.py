@@ -25,6 +25,14 @@ def test_stop_is_possible_always():
             assert possible(BY_NAME["stop"], stage, driving=driving)
 
 
+def test_of_one_chart_there_is_no_other():
+    for two_chains in (True, False, None):
+        offered = possible(
+            BY_NAME["control_chart"], Stage.DONE, driving=True, two_chains=two_chains
+        )
+        assert offered == (two_chains is not False)
+
+
 def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
     file = tmp_path / "keys.toml"
     file.write_text('reject = "r,f5"\nnote = "x"\n', "utf-8")

@@ -81,7 +81,9 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
         action = by_name[name]
         if model.offline and name not in OFFLINE:
             continue
-        if not possible(action, model.flow.stage, driving=model.driving):
+        if not possible(
+            action, model.flow.stage, driving=model.driving, two_chains=model.two_chains
+        ):
             continue
         label = _label(name, action.label, model)
         text = f"{shown_key(keys[name])} {label}"
