@@ -30,7 +30,7 @@ def main(arguments: Namespace) -> int:
         found = results(session, progress("analysing run"))
     more: dict[str, Any] = {}
     if arguments.session_trials is not None:
-        from rig.commands.trials import session_trials  # noqa: PLC0415 - likewise
+        from rig.commands.budget import session_trials  # noqa: PLC0415 - likewise
 
         more["monte_carlo"] = session_trials(found.analysis, arguments.session_trials)
     # A session that is being written, or on a read-only disk, is analysed all the same.
@@ -43,7 +43,7 @@ def main(arguments: Namespace) -> int:
         for part in (*scatter, *effects_parts(found.analysis.effects)):
             print("\n".join(["", part.heading, *aligned(part.columns, part.records)]))
         if more:
-            from rig.commands.trials import trials_lines  # noqa: PLC0415 - likewise
+            from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise
 
             print("\n".join(["", *trials_lines(more["monte_carlo"])]))
     return code

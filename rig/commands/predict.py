@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import csv
+import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.commands.output import print_json
+from rig.commands.output import print_json, say
 from rig.errors import InputError
+from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import label, predictions
 from rig.protocol import reader
@@ -21,9 +25,7 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
-        from rig.commands.paper_figure import write_figure  # noqa: PLC0415 - it needs matplotlib
-
-        write_figure(arguments.figure, arguments.output)
+        _write_figure(arguments.figure, arguments.output)
         return 0
     if arguments.protocol is None:
         raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
@@ -77,3 +79,22 @@ def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[st
         rows.append([*cells, line["model"]])
     notes = [f"{label(line)}: {note}" for line in found for note in line["notes"]]
     return "\n".join([*text_table(rows), *notes])
+
+
+def _write_figure(number: int, output: str | None) -> None:
+    """Write a figure of the paper as SVG and its numbers as CSV beside it."""
+    from rig.report.paper import paper_figure  # noqa: PLC0415 - it needs matplotlib
+
+    if output is None or Path(output).suffix not in {".svg", ".csv"}:
+        raise InputError(
+            "a figure needs a file to go to", f"rig predict --figure {number} -o FILE.svg"
+        )
+    svg, columns = paper_figure(number)
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    path = Path(output)
+    write_atomic(path.with_suffix(".svg"), svg)
+    write_atomic(path.with_suffix(".csv"), table.getvalue())
+    say(f"{path.with_suffix('.svg')} and {path.with_suffix('.csv')}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.usb.known import KNOWN, Known
+from rig.usb.listing import KNOWN, Known
 
 _HEAD = """\
 # Boards of a chain rig. Put this into /etc/udev/rules.d/, then

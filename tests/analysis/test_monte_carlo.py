@@ -9,7 +9,7 @@ import pytest
 
 from rig.analysis.monte_carlo import Propagated, agreement, monte_carlo, session_monte_carlo
 from rig.analysis.refine import Budgets
-from rig.commands.trials import session_trials, trials_lines
+from rig.commands.budget import session_trials, trials_lines
 from rig.errors import InputError
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 

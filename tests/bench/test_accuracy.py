@@ -7,7 +7,6 @@ from dataclasses import asdict
 
 import pytest
 
-from rig.bench.acceptance import acceptance_table, failures
 from rig.bench.accuracy import Errors
 from rig.bench.baselines import plain_fit, two_gate_timer
 from rig.bench.falls import Asked, falls
@@ -19,6 +18,7 @@ from rig.bench.fast_accuracy import (
     fast_accuracy,
     with_setting,
 )
+from rig.commands.bench_accuracy import acceptance_table, failures
 from rig.errors import RigError
 from rig.ports import read_settings
 from rig.protocol.plan import runs

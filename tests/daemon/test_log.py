@@ -18,7 +18,7 @@ from tests.waiting import PATIENCE_S
 
 ENDLESS = """
 import logging
-from rig.daemon.log import logged_to_stderr
+from rig.commands.daemon import logged_to_stderr
 with logged_to_stderr():
     for number in range(5000):
         logging.getLogger("rig.daemon").info("%d %s", number, 90 * "x")

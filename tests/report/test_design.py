@@ -1,6 +1,6 @@
 """What a layout of gates is said to tell."""
 
-from rig.report.design import design_text
+from rig.commands.design import design_text
 
 
 def test_uncertainties_are_plain_numbers():

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rig import __version__
-from rig.sweep.progress import Progress
+from rig.commands.sweep import Progress
 from tests.cli.lab import PROTOCOLS
 from tests.sweep.conftest import SCENE, VARY
 from tests.test_imports import packages_loaded_by

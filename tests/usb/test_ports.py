@@ -11,8 +11,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from rig.cli import main
 from rig.errors import DeviceError
 from rig.usb import udev
-from rig.usb.known import KNOWN
-from rig.usb.listing import path_of, serial_number_at, serial_ports
+from rig.usb.listing import KNOWN, path_of, serial_number_at, serial_ports
 from tests.flash.pty_board import PtyBoard
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
