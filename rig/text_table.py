@@ -1,11 +1,13 @@
-"""Text in columns, for a terminal."""
+"""Text in columns: for a terminal, and as CSV for other programs."""
 
 from __future__ import annotations
 
+import csv
+import io
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Sequence
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
 
 def text_table(
@@ -34,6 +36,23 @@ def text_table(
     if rule:
         lines.insert(1, "  ".join("─" * width for width in widths))
     return lines
+
+
+def csv_text(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
+    """Write rows as CSV below their columns' names.
+
+    Parameters
+    ----------
+    columns
+        What a row has beyond them is left out, what it lacks is empty.
+    rows
+        Values by column; floats get the digits that give the same float back.
+    """
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [*columns], extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
 
 
 def _signs_aligned(column: Sequence[str]) -> list[str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -13,6 +11,7 @@ from rig.bench.figures import estimators_figure
 from rig.commands.output import print_json, say
 from rig.files import make_folder, write_atomic
 from rig.report.columns import Column, aligned
+from rig.text_table import csv_text
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -41,16 +40,13 @@ def main(arguments: Namespace) -> int:
         say,
     )
     whole = as_json(found, left_out)
-    table = io.StringIO()
-    writer = csv.DictWriter(table, list(asdict(found[0])), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(whole["estimators"])
-    write_atomic(folder / "estimators.csv", table.getvalue())
+    lines = whole["estimators"]
+    write_atomic(folder / "estimators.csv", csv_text(asdict(found[0]), lines))
     write_atomic(folder / "estimators.json", json.dumps(whole, indent=2, ensure_ascii=False))
-    write_atomic(folder / "estimators.svg", estimators_figure(whole["estimators"]))
+    write_atomic(folder / "estimators.svg", estimators_figure(lines))
     if arguments.json:
         print_json(whole)
     else:
-        lines = ["SIMULATED DATA", *aligned(_COLUMNS, whole["estimators"])]
-        print("\n".join([*lines, *(f"left out: {one}" for one in left_out)]))
+        said = ["SIMULATED DATA", *aligned(_COLUMNS, lines)]
+        print("\n".join([*said, *(f"left out: {one}" for one in left_out)]))
     return 0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
 from typing import TYPE_CHECKING, Any
@@ -16,7 +14,7 @@ from rig.errors import InputError
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.report.columns import Column, filled
-from rig.text_table import text_table
+from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -52,12 +50,8 @@ def main(arguments: Namespace) -> int:
 
 def _csv(cells: Sequence[Record]) -> str:
     """One line a layout and disturbance; what lies deeper is in the JSON."""
-    table = io.StringIO()
     flat = [name for name, value in cells[0].items() if not isinstance(value, dict)]
-    writer = csv.DictWriter(table, flat, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(cells)
-    return table.getvalue()
+    return csv_text(flat, cells)
 
 
 def _lines(whole: Record) -> list[str]:

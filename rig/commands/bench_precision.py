@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import asdict, fields
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.bench.figures import precision_figure
 from rig.bench.precision import as_json, precision
 from rig.commands.output import print_json, say
-from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import make_folder, write_atomic
+from rig.text_table import csv_text
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from pathlib import Path
 
     from rig.bench.precision import Cheapest, Gap, Precision
 
@@ -27,11 +25,7 @@ _PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
 
 def main(arguments: Namespace) -> int:
     """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
-    folder = Path(arguments.output)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    folder = make_folder(arguments.output)
     found = precision(quick=arguments.quick, progress=say)
     whole = as_json(found)
     _write(folder, found, json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False))
@@ -86,11 +80,9 @@ def _write(folder: Path, found: Precision, text: str) -> None:
     """Write ``precision.csv``, ``precision.json`` and a picture for each scene."""
     from rig.bench.precision import Point  # noqa: PLC0415 - see main
 
-    table = io.StringIO()
-    writer = csv.DictWriter(table, [field.name for field in fields(Point)], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(point) for point in found.points)
-    write_atomic(folder / "precision.csv", table.getvalue())
+    columns = [field.name for field in fields(Point)]
+    table = csv_text(columns, (asdict(point) for point in found.points))
+    write_atomic(folder / "precision.csv", table)
     write_atomic(folder / "precision.json", text + "\n")
     for name, title in found.scenes:
         points = [point for point in found.points if point.scene == name]

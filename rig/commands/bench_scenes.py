@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import astuple
 from pathlib import Path
@@ -11,9 +9,8 @@ from typing import TYPE_CHECKING
 
 from rig.bench.scenes import as_json, scenes
 from rig.commands.output import print_json, say
-from rig.errors import InputError
-from rig.files import write_atomic
-from rig.text_table import text_table
+from rig.files import make_folder, write_atomic
+from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -24,13 +21,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Measure every scene, keep the table, print it."""
-    folder = None if arguments.output is None else Path(arguments.output)
-    if folder is not None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            reason = error.strerror or error
-            raise InputError(f"cannot make the folder {folder}: {reason}") from error
+    folder = None if arguments.output is None else make_folder(arguments.output)
     ready = sorted(Path(arguments.protocols).glob("*.yaml"))
     if not ready:
         say(f"no protocols in {arguments.protocols}: left out the ready ones")
@@ -90,27 +81,26 @@ def _write(folder: Path, costs: Sequence[Cost], text: str) -> None:
     """Write ``scenes.csv``, ``scenes.json`` and the picture."""
     from rig.bench.figures import scenes_figure  # noqa: PLC0415 - it needs matplotlib
 
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    account = costs[0].account
-    kinds = list(costs[0].seconds)
-    writer.writerow(
-        ["scene", "modules", "rig_modules", "packages", "peak_bytes",
-         *(f"{name}_bytecodes" for name in account.operations), *account.evaluations,
-         *(f"{kind}_{part}" for kind in kinds for part in ("s", "s_low", "s_high", "ratio"))]
-    )  # fmt: skip
-    for cost in costs:
-        account = cost.account
-        times = [
-            value
-            for kind in kinds
-            for value in (*astuple(cost.seconds[kind]), cost.ratios[kind].median)
-        ]
-        writer.writerow(
-            [cost.scene, len(account.modules), len(account.rooms), " ".join(account.packages),
-             int(account.peak_bytes), *account.operations.values(),
-             *account.evaluations.values(), *times]
-        )  # fmt: skip
-    write_atomic(folder / "scenes.csv", lines.getvalue())
+    lines = [_flat(cost) for cost in costs]
+    write_atomic(folder / "scenes.csv", csv_text(lines[0], lines))
     write_atomic(folder / "scenes.json", text + "\n")
     write_atomic(folder / "scenes.svg", scenes_figure(costs))
+
+
+def _flat(cost: Cost) -> dict[str, object]:
+    """One line of the CSV file."""
+    account = cost.account
+    line: dict[str, object] = {
+        "scene": cost.scene,
+        "modules": len(account.modules),
+        "rig_modules": len(account.rooms),
+        "packages": " ".join(account.packages),
+        "peak_bytes": int(account.peak_bytes),
+    }
+    line |= {f"{name}_bytecodes": count for name, count in account.operations.items()}
+    line |= account.evaluations
+    for kind, seconds in cost.seconds.items():
+        values = (*astuple(seconds), cost.ratios[kind].median)
+        names = (f"{kind}_{part}" for part in ("s", "s_low", "s_high", "ratio"))
+        line |= zip(names, values, strict=True)
+    return line

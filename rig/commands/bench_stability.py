@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -11,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from rig.bench.stability import StabilityRow, sonic_lengths, stability
 from rig.commands.output import print_json
-from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import make_folder, write_atomic
+from rig.text_table import csv_text
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -60,15 +58,8 @@ def _print_row(row: StabilityRow) -> None:
 
 def _write(folder: Path, rows: Sequence[StabilityRow], text: str) -> None:
     """Write ``stability.csv`` and ``stability.json``."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
-    table = io.StringIO()
-    writer = csv.DictWriter(
-        table, [field.name for field in fields(StabilityRow)], lineterminator="\n"
-    )
-    writer.writeheader()
-    writer.writerows(asdict(row) for row in rows)
-    write_atomic(folder / "stability.csv", table.getvalue())
+    make_folder(folder)
+    columns = [field.name for field in fields(StabilityRow)]
+    table = csv_text(columns, (asdict(row) for row in rows))
+    write_atomic(folder / "stability.csv", table)
     write_atomic(folder / "stability.json", text + "\n")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +11,7 @@ from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import label, predictions
 from rig.protocol import reader
-from rig.text_table import text_table
+from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -90,11 +88,8 @@ def _write_figure(number: int, output: str | None) -> None:
             "a figure needs a file to go to", f"rig predict --figure {number} -o FILE.svg"
         )
     svg, columns = paper_figure(number)
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
+    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
     path = Path(output)
     write_atomic(path.with_suffix(".svg"), svg)
-    write_atomic(path.with_suffix(".csv"), table.getvalue())
+    write_atomic(path.with_suffix(".csv"), csv_text(columns, rows))
     say(f"{path.with_suffix('.svg')} and {path.with_suffix('.csv')}")

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from rig.errors import InputError
 from rig.ports import check_name
 from rig.tui.app import RigApp
+from rig.tui.context import Options
 from rig.tui.keys import read_keys
-from rig.tui.options import Options
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.session.edges_csv import write_edges
+from rig.text_table import csv_text
 
 if TYPE_CHECKING:
     import os
@@ -83,11 +80,7 @@ def export_csv(
     InputError
         If a file cannot be written.
     """
-    place = Path(directory)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {place}: {error.strerror or error}") from error
+    place = make_folder(directory)
     latest, superseded = analysis.get("runs", []), analysis.get("superseded", [])
     # Where nothing is struck, nothing is inclined either.
     struck = any(run.get("impact_chain", "") is not None for run in (*latest, *superseded))
@@ -110,7 +103,7 @@ def export_csv(
         "pings.csv": [ping._asdict() for ping in session.pings()],
     }
     for name, rows in tables.items():
-        write_atomic(place / name, _csv(rows))
+        write_atomic(place / name, csv_text(_columns(rows), rows))
     write_edges(place / "edges.csv", session.latest_drops(), tick_hz)
     write_atomic(place / "README.txt", _readme(session, tables))
 
@@ -141,15 +134,6 @@ def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
     """All columns in order of appearance; a void run may lack some that later runs have."""
     fullest = sorted(rows, key=len, reverse=True)
     return list(dict.fromkeys(key for row in fullest for key in row))
-
-
-def _csv(rows: Sequence[Mapping[str, object]]) -> str:
-    text = io.StringIO()
-    # Python writes floats with the digits that give the same float back.
-    writer = csv.DictWriter(text, _columns(rows), restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]]) -> str:

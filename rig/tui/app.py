@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from textual.screen import ModalScreen, Screen
 
     from rig.results.live import SessionView
+    from rig.tui.context import Options
     from rig.tui.indicators import Indicators
     from rig.tui.model import Model
-    from rig.tui.options import Options
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.state import DaemonState

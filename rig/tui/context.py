@@ -1,11 +1,15 @@
-"""What commands may use of the app: it knows them, and they know only this."""
+"""What the command line says, and what commands may use of the app that they do not know."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
+
+from rig.campaign.machine import COUNTDOWN_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Mapping
+    from pathlib import Path
 
     from textual.screen import ModalScreen
 
@@ -13,10 +17,34 @@ if TYPE_CHECKING:
     from rig.tui.driver import Driver
     from rig.tui.follow import Follower
     from rig.tui.model import Model
-    from rig.tui.options import Options
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.screens.protocol import ProtocolPage
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line says.
+
+    Attributes
+    ----------
+    files
+        Protocols to choose from.
+    port
+        Empty to watch a daemon that runs already.
+    session
+        The file to be made or continued.
+    offline
+        Only look at `session`: no daemon is asked for.
+    """
+
+    files: tuple[Path, ...] = ()
+    port: str = ""
+    session: Path | None = None
+    seed: int | None = None
+    socket: Path | None = None
+    offline: bool = False
+    countdown_s: float = COUNTDOWN_S
 
 
 class CommandContext(Protocol):

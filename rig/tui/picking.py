@@ -16,7 +16,7 @@ from rig.tui.actions import shown_key
 from rig.tui.replay import Player
 from rig.tui.screens.ask import Pick
 from rig.tui.widgets.banner import LOOKS
-from rig.tui.words import plain
+from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
     from rig.tui.context import CommandContext

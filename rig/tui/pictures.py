@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
+from rig.files import make_folder
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
 from rig.tui.client import ReconnectingClient
-from rig.tui.options import Options
+from rig.tui.context import Options
 from rig.tui.replay import Player, end_of
 from rig.tui.state import DaemonState, state_of
 from rig.tui.widgets.figure import PAUSE_S
@@ -119,7 +120,7 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
         The files.
     """
     view = LiveAnalysis(session).read()
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     written = []
     for shot in screenshots(view):
         path = folder / f"{shot.name}.svg"

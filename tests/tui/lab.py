@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from rig.campaign.machine import Stage
 from rig.tui.actions import ACTIONS
 from rig.tui.app import RigApp
-from rig.tui.options import Options
+from rig.tui.context import Options
 from tests.cli.lab import ROOT
 from tests.tui.screen import text_of
 from tests.waiting import PATIENCE_S

@@ -10,7 +10,7 @@ from rig.campaign.machine import Stage
 from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME, possible, shown_key
 from rig.tui.keys import combined, read_keys
-from rig.tui.words import LONGEST, duration, plain
+from rig.tui.widgets.text import LONGEST, duration, plain
 
 
 def test_every_key_has_one_meaning():

@@ -11,7 +11,7 @@ from rig.results import detailed
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
-from rig.tui.options import Options
+from rig.tui.context import Options
 from rig.tui.picking import session_list
 from rig.tui.plots import control_pictures
 from tests.cli.lab import rig, short

@@ -16,7 +16,7 @@ from rig.records import Job
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import THEMES, RigApp
-from rig.tui.options import Options
+from rig.tui.context import Options
 from rig.tui.pictures import QUIET, FakeClient, at_rest
 from rig.tui.state import state_of
 from tests.cli.lab import short

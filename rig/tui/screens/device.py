@@ -10,8 +10,7 @@ from rig.campaign.events import Stage
 from rig.report.numbers import fixed
 from rig.tui.screens.page import Page
 from rig.tui.widgets.gates import GateBoard, named
-from rig.tui.widgets.text import Words
-from rig.tui.words import plain
+from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult

@@ -14,8 +14,7 @@ from rig.tui.screens.result import number_table
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.gates import GateBoard
-from rig.tui.widgets.text import Words
-from rig.tui.words import plain
+from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult

@@ -15,8 +15,7 @@ from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.measurable import check_recordable
 from rig.tui.screens.page import Page
-from rig.tui.widgets.text import Words
-from rig.tui.words import plain
+from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
     from pathlib import Path

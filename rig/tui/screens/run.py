@@ -15,8 +15,7 @@ from rig.tui.plots import chain_pictures
 from rig.tui.screens.page import Page
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.gates import GateBoard, named
-from rig.tui.widgets.text import Words
-from rig.tui.words import duration, plain
+from rig.tui.widgets.text import Words, duration, plain
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult

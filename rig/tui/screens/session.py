@@ -19,8 +19,7 @@ from rig.tui.plots import control_pictures, incline_pictures
 from rig.tui.screens.page import Page
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.figure import Figure
-from rig.tui.widgets.text import Words
-from rig.tui.words import duration, plain
+from rig.tui.widgets.text import Words, duration, plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

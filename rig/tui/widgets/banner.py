@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from rig.analysis.remedies import remedies
-from rig.tui.widgets.text import Words
-from rig.tui.words import plain
+from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
     from rig.tui.model import Model

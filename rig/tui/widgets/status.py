@@ -10,8 +10,7 @@ from textual.style import Style
 
 from rig.tui.actions import shown_key
 from rig.tui.model import alarm
-from rig.tui.widgets.text import Words
-from rig.tui.words import plain
+from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
