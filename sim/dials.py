@@ -110,7 +110,7 @@ _LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
 _SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled"}
 _SIGNED = {"clock", "drift", "reference", "restitution"}
 _RATES = {"clock", "reference"}
-_OF_THE_URL = ("pace",)  # no disturbance, and read by the scene
+_OF_THE_URL = ("dynamics", "pace", "seed", "truth")  # no disturbances, and read by the scene
 
 
 def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
