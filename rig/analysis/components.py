@@ -44,5 +44,3 @@ STATED = Components()
 LEAST_SHARE = 0.01
 """Of what is stated, below which nothing is believed: no rod is round to less than a micrometre, no
 stamp better than 20 ns, and a perfect simulation must not make the edges infinitely sure."""
-FEWEST_DEGREES = 4.0
-"""Degrees of freedom below which scatter is not estimated and what is stated stands."""

@@ -3,9 +3,9 @@
 A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has determined
 γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
 largest (MacKay 1992). What was stated counts as one more member, so that where nothing is
-determined, s stays as stated. Where several components make up one variance, each is multiplied
-by the share of Σx² that it explains (an EM step), which keeps all of them positive. What too few
-degrees of freedom tell of stays as stated, and nothing becomes less than a share of it.
+determined, s stays as stated, and the less is, the nearer it stays. Where several components make
+up one variance, each is multiplied by the share of Σx² that it explains (an EM step), which keeps
+all of them positive. Nothing becomes less than a share of what was stated.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import FEWEST_DEGREES, LEAST_SHARE, STATED
+from rig.analysis.components import LEAST_SHARE, STATED
 from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
@@ -132,14 +132,14 @@ class Evidence:
     ) -> None:
         """Estimate two components that make up one variance, see `_two`."""
         squares, counts, sizes = sums
-        degrees = float(counts.sum())
-        if degrees < FEWEST_DEGREES:
-            new[name], new[floor] = getattr(STATED, name), getattr(STATED, floor)
-            return
+        # The stated member is spread over all sizes, so that it pulls neither component alone.
+        stated = sizes * getattr(STATED, name) ** 2 + getattr(STATED, floor) ** 2
+        share = STATED_WEIGHT / sizes.size
+        squares, counts = squares + share * stated, counts + share
         begin = getattr(self.components, name), getattr(self.components, floor)
         least = LEAST_SHARE * getattr(STATED, name), LEAST_SHARE * getattr(STATED, floor)
         new[name], new[floor] = _two(squares, counts, sizes, begin, least)
-        self.degrees[name] = self.degrees[floor] = degrees
+        self.degrees[name] = self.degrees[floor] = float(counts.sum())
 
 
 def _two(
