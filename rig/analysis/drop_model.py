@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import STATED, Components
-from rig.analysis.equations import Equations, Expected, Residuals, Seen
+from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.pattern import air_is_told
 from rig.analysis.trajectory import (
     COMMON,
@@ -282,25 +282,39 @@ class DropModel:
         """What the unknowns leave over of one side's matched edges."""
         seen = self._matched(role, matches)
         times = seen.times * (1.0 + x[self.unknowns["clock"]])
-        return self._left(role, x, seen, *self.trajectory(role, x).heights(times))
-
-    def _left(self, role: str, x: Array, seen: Seen, height: Array, speed: Array) -> Residuals:
-        known = self.components
-        sigma = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2))
+        height, speed = self.trajectory(role, x).heights(times)
         values = height - self._levels(role, x, seen)
-        return Residuals(values, sigma, speed, seen.burst == 0.0)
+        return Residuals(values, self._sigma(seen, speed), speed, seen.burst == 0.0)
+
+    def _sigma(self, seen: Seen, speed: Array) -> Array:
+        """Standard deviation of where each edge was seen, m."""
+        known = self.components
+        found: Array = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2))
+        return found
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
-        """Observation equations of one side for its matched edges."""
+        """Observation equations of one side for its matched edges.
+
+        They are set up where an edge should have been stamped, not where it was: derivatives that
+        knew of a stamp's own error would make a slow clock, with which all errors are smaller,
+        look likelier.
+        """
         at, local, seen = self.unknowns, self._local[role], self._matched(role, matches)
-        times = seen.times * (1.0 + x[at["clock"]])
-        height, speed, moved = self.trajectory(role, x).sights(times, local.path)
-        left = self._left(role, x, seen, height, speed)
+        rate, path = 1.0 + float(x[at["clock"]][0]), self.trajectory(role, x)
+        levels, stamps = self._levels(role, x, seen), seen.times * rate
+        height, speed = path.heights(stamps)
+        off = height - levels
+        near = np.abs(off) <= STRAY * self._sigma(seen, speed)
+        late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
+        times = stamps + late
+        height, speed, moved = path.sights(times, local.path)
+        values = height - levels + speed * late
+        left = Residuals(values, self._sigma(seen, speed), speed, seen.burst == 0.0)
         slopes = np.zeros((times.size, local.columns.size))
         slopes[:, : local.moving] = moved
         row = np.arange(times.size)
         # Of a slow clock the true time is later, and the chain lower by then.
-        slopes[:, local.at[at["clock"].start]] -= speed * seen.times
+        slopes[:, local.at[at["clock"].start]] -= speed * times / rate
         slopes[row, local.at[at[f"{role} rods"].start + seen.rods]] += 1.0
         slopes[:, local.at[at[f"{role} width"].start]] += seen.sign
         slopes[row, local.at[at["beams"].start + seen.gate]] -= 1.0

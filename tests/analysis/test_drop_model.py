@@ -11,7 +11,7 @@ from rig.analysis.adjust import adjust
 from rig.analysis.components import STATED
 from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands, quantities
-from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, UNIFORM, case
+from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, UNIFORM, case, with_dials
 
 TWO_CHAINS = {"uniform", "graded"}
 STEPS = {"alpha": 1e-5, "impulses": 1e-5}  # of the rest: 1e-6 in m, s, m/s² and relative
@@ -46,11 +46,26 @@ def differences(function, x: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, 
     return np.stack(columns, axis=-1), np.stack(kinks, axis=-1)
 
 
+def stamped_as_expected(model: DropModel, matches: dict, x: np.ndarray) -> DropModel:
+    """The same drop with every matched edge where these unknowns put it."""
+    for _ in range(4):  # Newton's steps, from less than a millimetre
+        shifts = {}
+        for role, match in matches.items():
+            left = model.residuals(role, x, match)
+            _, edges = model.expected[role].chosen(match)
+            shifts[role] = np.zeros(model.expected[role].times.size)
+            shifts[role][edges] = left.values / left.speed
+        model = model.shaken(shifts)
+    return model
+
+
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
-    model, matches = case(SCENES[scene], seed=seed).model()
-    x = somewhere(model, seed)
+    """Where edges are stamped when they are expected; an error of a stamp must not change it."""
+    noisy, matches = case(SCENES[scene], seed=seed).model()
+    x = somewhere(noisy, seed)
+    model = stamped_as_expected(noisy, matches, x)
     assert model.unknowns.sd.size == len(model.unknowns) == x.size
     moving = np.zeros(x.size, dtype=np.bool_)
     for role, match in matches.items():
@@ -71,6 +86,35 @@ def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
         moving |= (found.jacobian != 0.0).any(axis=0)
     idle = {name for name in model.unknowns._blocks if not moving[model.unknowns[name]].any()}
     assert not idle
+
+
+@pytest.mark.parametrize("scene", ["uniform", "fence"])
+def test_a_stamp_s_own_error_tells_nothing_of_the_clock(scene):
+    """All lengths by λ² and all times by λ are the same stamps: g ties the two together.
+
+    With derivatives taken where an edge was stamped, each residual r changes by 2r on that way,
+    and the errors of all edges together pull at the clock.
+    """
+    model, matches = case(SCENES[scene], with_dials(jitter_sd=2e-5), seed=4).model()
+    x = adjust(model, matches, model.first()).x
+    at, protocol = model.unknowns, model.protocol
+    for role, record in model.records.items():
+        scaled = np.zeros(x.size)
+        scaled[at["clock"]] = 1.0 + x[at["clock"]]
+        scaled[at[f"{role} release"]] = model.trajectory(role, x).time[0]
+        scaled[at["drop"]] = 2.0 * model.trajectory(role, x).height[0]
+        scaled[at["beams"]] = [2.0 * gate.height for gate in protocol.gates.gates]
+        scaled[at["beams"]] += 2.0 * x[at["beams"]]
+        scaled[at[f"{role} rods"]] = 2.0 * np.array(record.chain.chain.heights)
+        scaled[at[f"{role} rods"]] += 2.0 * x[at[f"{role} rods"]]
+        scaled[at[f"{role} width"]] = 2.0 * (record.chain.widths[0] + x[at[f"{role} width"]])
+        for name, power in (("ripple", 2.0), ("drag", -2.0)):
+            if name in at:
+                scaled[at[name]] = power * x[at[name]]
+        found = model.equations(role, x, matches[role])
+        off = np.abs(found.residuals.values).max()
+        assert off > 2e-5  # of 20 µs at a metre a second and more
+        assert np.abs(found.jacobian @ scaled).max() < 1e-3 * off
 
 
 @pytest.mark.parametrize("scene", SCENES)
