@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 from rig.analysis.result import GOOD
 from rig.errors import InputError
 from rig.measurands import MEASURANDS, SEPARATION
-from rig.predictions import predictions
+from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
 from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
@@ -86,44 +86,7 @@ def predict(protocol: Protocol) -> list[PredictedIncline]:
     list of PredictedIncline
         One an incline; of unlike chains one for each that strikes.
     """
-    lines: list[dict[str, Any]] = [
-        {name: line.get(name) for name in PredictedIncline.__slots__}
-        for line in predictions(protocol)
-    ]
-    return [PredictedIncline(**line) for line in lines]
-
-
-@dataclass(frozen=True, slots=True)
-class PredictedIncline:
-    """What the model says of one incline; `None` is what the scene does not have or tell.
-
-    Attributes
-    ----------
-    incline_deg, impact_chain
-        What it is of; a chain is named where two are unlike.
-    model, alpha, gamma
-        What was computed, and the coefficients of Eq. 9.
-    separation_m, separation_u_m, speed_m_s, speed_u_m_s
-        Δz and V with their standard uncertainties.
-    fall_time_s, free_fall_speed_m_s
-        Until the top rod strikes; and how fast it would be without any impact.
-    in_domain, notes
-        Whether the model describes the case, and what there is to say.
-    """
-
-    incline_deg: float
-    impact_chain: str | None
-    model: str
-    alpha: float | None
-    gamma: float | None
-    separation_m: float | None
-    separation_u_m: float | None
-    speed_m_s: float | None
-    speed_u_m_s: float | None
-    fall_time_s: float | None
-    free_fall_speed_m_s: float
-    in_domain: bool
-    notes: list[str]
+    return predictions(protocol)
 
 
 class Edges(NamedTuple):

@@ -5,27 +5,71 @@ Mechanics that a scene does not have are not loaded.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import FALL_TIME, GRAVITY, SEPARATION, SPEED
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from rig.model.predict import Prediction
     from rig.protocol.protocol import Protocol, Run
 
 
-def predictions(protocol: Protocol) -> list[dict[str, Any]]:
+@dataclass(frozen=True, slots=True)
+class PredictedIncline:
+    """What the model says of one incline; `None` is what the scene does not have or tell.
+
+    Attributes
+    ----------
+    incline_deg, impact_chain
+        What it is of; a chain is named where two are unlike.
+    model, alpha, gamma
+        What was computed, and the coefficients of Eq. 9.
+    separation_m, separation_u_m, speed_m_s, speed_u_m_s
+        Δz and V with their standard uncertainties.
+    fall_time_s, free_fall_speed_m_s
+        Until the top rod strikes; and how fast it would be without any impact.
+    in_domain, notes
+        Whether the model describes the case, and what there is to say.
+    struck
+        Whether the scene has a surface; without one nothing has an uncertainty.
+    """
+
+    incline_deg: float
+    impact_chain: str | None
+    model: str
+    alpha: float | None
+    gamma: float | None
+    separation_m: float | None
+    separation_u_m: float | None
+    speed_m_s: float | None
+    speed_u_m_s: float | None
+    fall_time_s: float | None
+    free_fall_speed_m_s: float
+    in_domain: bool
+    notes: list[str]
+    struck: bool = True
+
+    @property
+    def label(self) -> str:
+        """Its incline and, where chains are unlike, the one that strikes."""
+        return f"{self.incline_deg:g}°{f' {self.impact_chain}' if self.impact_chain else ''}"
+
+    def json(self) -> dict[str, Any]:
+        """As ``rig predict --json`` prints it, without what the scene does not have."""
+        found = asdict(self)
+        absent = [] if self.struck else ["separation_u_m", "speed_u_m_s"]
+        absent += [] if self.impact_chain else ["impact_chain"]
+        return {name: value for name, value in found.items() if name not in {*absent, "struck"}}
+
+
+def predictions(protocol: Protocol) -> list[PredictedIncline]:
     """Predict each incline of the plan and, where chains are unlike, each that strikes.
 
-    Returns
-    -------
-    list of dict
-        As ``rig predict --json`` prints them, one an incline, with ``impact_chain`` where chains
-        are unlike; one alone where nothing is struck.
+    One alone where nothing is struck.
     """
     if protocol.surface is None:
         return [_free_fall(protocol)]
@@ -34,21 +78,21 @@ def predictions(protocol: Protocol) -> list[dict[str, Any]]:
         for struck in protocol.strikers:
             one = predict_incline(protocol, incline, struck, beside(protocol, struck))
             found.append(
-                {
-                    "incline_deg": incline,
-                    **({"impact_chain": struck} if protocol.unlike_chains else {}),
-                    "model": one.model,
-                    "alpha": one.alpha,
-                    "gamma": one.gamma,
-                    "separation_m": one.separation,
-                    "separation_u_m": one.separation_u,
-                    "speed_m_s": one.speed,
-                    "speed_u_m_s": one.speed_u,
-                    "fall_time_s": one.time,
-                    "free_fall_speed_m_s": one.free_fall_speed,
-                    "in_domain": one.in_domain,
-                    "notes": list(one.notes),
-                }
+                PredictedIncline(
+                    incline_deg=incline,
+                    impact_chain=struck if protocol.unlike_chains else None,
+                    model=one.model,
+                    alpha=one.alpha,
+                    gamma=one.gamma,
+                    separation_m=one.separation,
+                    separation_u_m=one.separation_u,
+                    speed_m_s=one.speed,
+                    speed_u_m_s=one.speed_u,
+                    fall_time_s=one.time,
+                    free_fall_speed_m_s=one.free_fall_speed,
+                    in_domain=one.in_domain,
+                    notes=list(one.notes),
+                )
             )
     return found
 
@@ -111,18 +155,12 @@ def notes(protocol: Protocol) -> list[str]:
     """Every note on a planned incline, the same ones of several inclines together."""
     at: dict[str, list[str]] = {}
     for one in predictions(protocol):
-        for note in one["notes"]:
-            at.setdefault(note, []).append(label(one))
+        for note in one.notes:
+            at.setdefault(note, []).append(one.label)
     return [f"{', '.join(labels)}: {note}" for note, labels in at.items()]
 
 
-def label(one: Mapping[str, Any]) -> str:
-    """Name a prediction by its incline and, where chains are unlike, by the one that strikes."""
-    chain = one.get("impact_chain")
-    return f"{one['incline_deg']:g}°{' ' + chain if chain else ''}"
-
-
-def _free_fall(protocol: Protocol) -> dict[str, Any]:
+def _free_fall(protocol: Protocol) -> PredictedIncline:
     """Predict the fall of a chain that strikes nothing."""
     ((name, rods),) = protocol.chains.items()
     drop, gravity, start = (
@@ -137,18 +175,22 @@ def _free_fall(protocol: Protocol) -> dict[str, Any]:
 
         kappa = air_of(protocol, name)[0]
         speed, time = drag_leg(drop + rods.chain.length, start, gravity, kappa)
-    return {
-        "incline_deg": 0.0,
-        "model": "free fall" if protocol.drag is None else "free fall, drag",
-        "alpha": None,
-        "gamma": None,
-        "separation_m": None,
-        "speed_m_s": speed,
-        "fall_time_s": time,
-        "free_fall_speed_m_s": speed,
-        "in_domain": True,
-        "notes": [],
-    }
+    return PredictedIncline(
+        incline_deg=0.0,
+        impact_chain=None,
+        model="free fall" if protocol.drag is None else "free fall, drag",
+        alpha=None,
+        gamma=None,
+        separation_m=None,
+        separation_u_m=None,
+        speed_m_s=speed,
+        speed_u_m_s=None,
+        fall_time_s=time,
+        free_fall_speed_m_s=speed,
+        in_domain=True,
+        notes=[],
+        struck=False,
+    )
 
 
 def air_of(protocol: Protocol, name: str) -> list[float]:

@@ -31,7 +31,7 @@ class Asked(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Fall:
+class SimulatedDrop:
     """One drop on the rig of a seed, and what is true of it."""
 
     seed: int
@@ -55,7 +55,7 @@ STRAY = -1
 """The truth's rod number of what was no rod."""
 
 
-def falls(asked: Sequence[Asked]) -> Iterator[Fall]:
+def falls(asked: Sequence[Asked]) -> Iterator[SimulatedDrop]:
     """Let the simulation make the drops of one rig after another.
 
     Raises
@@ -76,7 +76,7 @@ def falls(asked: Sequence[Asked]) -> Iterator[Fall]:
             truth = told["truth"]
             edges = tuple(Edge(round(when * HZ), *rest) for when, *rest in told["edges"])
             drop = Drop(truth["run"], truth["attempt"], HZ, edges)
-            yield Fall(int(told["seed"]), drop, truth)
+            yield SimulatedDrop(int(told["seed"]), drop, truth)
     if simulation.returncode:
         urls = ", ".join(one.url for one in asked)
         raise RigError(f"the simulation {urls} ended with exit code {simulation.returncode}")

@@ -22,7 +22,7 @@ from rig.protocol.plan import runs
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.bench.falls import Fall
+    from rig.bench.falls import SimulatedDrop
     from rig.protocol.protocol import Protocol
 
 BLOCK = 4
@@ -98,7 +98,9 @@ def _sessions(protocol: Protocol, rigs: int) -> list[list[int]]:
     return [blocks[rig % len(blocks)] for rig in range(rigs)]
 
 
-def _session(protocol: Protocol, seed: int, told: Iterable[Fall], tally: AccuracyTally) -> None:
+def _session(
+    protocol: Protocol, seed: int, told: Iterable[SimulatedDrop], tally: AccuracyTally
+) -> None:
     """Analyse one rig's drops and judge the results."""
     scale = time_scale(seed)
     by_key = {(fall.drop.run, fall.drop.attempt): fall for fall in told}

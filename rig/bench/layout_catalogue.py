@@ -41,7 +41,7 @@ class Kind:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class GateLayout:
     """Gates of one scene: heights above the contact point, mm."""
 
     kind: Kind
@@ -163,10 +163,10 @@ SHARES: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...] = (
 """For the other chains: heights as shares of the drop, so that all rods pass all gates."""
 
 
-def under(kind: Kind, impact: Sequence[float], free: Sequence[float]) -> Layout:
+def under(kind: Kind, impact: Sequence[float], free: Sequence[float]) -> GateLayout:
     """Put gates below the hanging chain, at shares of its drop."""
     sides = [tuple(round(share * kind.drop_mm, 2) for share in shares) for shares in (impact, free)]
-    return Layout(
+    return GateLayout(
         kind,
         () if kind.scene == "fence" else sides[0],
         () if kind.scene == "single" else sides[1],
@@ -174,7 +174,7 @@ def under(kind: Kind, impact: Sequence[float], free: Sequence[float]) -> Layout:
 
 
 LAYOUTS = (
-    *(Layout(STANDARD, impact, free) for impact, free in _GATES),
+    *(GateLayout(STANDARD, impact, free) for impact, free in _GATES),
     *(under(kind, *shares) for kind in (*KINDS, SINGLE, FENCE) for shares in SHARES),
 )
 """All that the bench tries."""

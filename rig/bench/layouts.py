@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.result import DropResult
-    from rig.bench.falls import Fall
-    from rig.bench.layout_catalogue import Layout
+    from rig.bench.falls import SimulatedDrop
+    from rig.bench.layout_catalogue import GateLayout
     from rig.protocol.protocol import Protocol, Run
 
 DROPS = 24
@@ -87,7 +87,9 @@ class Cell:
     reasons: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
 
-    def add(self, protocol: Protocol, fall: Fall, result: DropResult, seconds: float) -> None:
+    def add(
+        self, protocol: Protocol, fall: SimulatedDrop, result: DropResult, seconds: float
+    ) -> None:
         """Compare one drop with its truth."""
         self.drops += 1
         self.seconds += seconds
@@ -135,7 +137,7 @@ def _rms(values: Sequence[float]) -> float | None:
     return math.sqrt(fmean(one**2 for one in values)) if values else None
 
 
-def _beyond(protocol: Protocol, fall: Fall, result: DropResult) -> bool:
+def _beyond(protocol: Protocol, fall: SimulatedDrop, result: DropResult) -> bool:
     """Whether a drop is truly beyond the protocol's limits, so that it has to be void."""
     skew = fall.truth.get("release_skew_s")
     if skew is not None and abs(skew) > protocol.accept.release_skew:
@@ -146,7 +148,7 @@ def _beyond(protocol: Protocol, fall: Fall, result: DropResult) -> bool:
 
 
 def study(
-    layouts: Sequence[Layout], drops: int, jobs: int | None, say: Callable[[str], None]
+    layouts: Sequence[GateLayout], drops: int, jobs: int | None, say: Callable[[str], None]
 ) -> list[Cell]:
     """Let chains fall on every layout with every disturbance.
 
@@ -175,7 +177,7 @@ def study(
 
 
 @one_thread
-def cells(layout: Layout, drops: int) -> list[Cell]:
+def cells(layout: GateLayout, drops: int) -> list[Cell]:
     """Let chains fall on one layout with every disturbance."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "layout.yaml"
@@ -203,11 +205,11 @@ def _url(path: Path, settings: Mapping[str, str]) -> str:
 
 
 def _cell(
-    layout: Layout,
+    layout: GateLayout,
     disturbance: str,
     protocol: Protocol,
     planned: Mapping[int, Run],
-    made: Iterable[Fall],
+    made: Iterable[SimulatedDrop],
 ) -> Cell:
     cell = Cell(layout.kind.name, layout.gates, layout.heights, disturbance)
     for fall in made:

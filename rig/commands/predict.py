@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED
-from rig.predictions import label, predictions
+from rig.predictions import predictions
 from rig.protocol import reader
 from rig.text_table import csv_text, text_table
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Mapping
 
+    from rig.predictions import PredictedIncline
     from rig.protocol.protocol import Protocol
 
 
@@ -30,13 +31,13 @@ def main(arguments: Namespace) -> int:
     protocol = reader.read(arguments.protocol)
     found = predictions(protocol)
     if arguments.json:
-        print_json({"predictions": found})
+        print_json({"predictions": [one.json() for one in found]})
     else:
         print(table(protocol, found))
     return 0
 
 
-def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
+def table(protocol: Protocol, found: list[PredictedIncline]) -> str:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     if protocol.surface is None:
         columns = {"speed (m/s)": ("speed_m_s", 1.0, ".4f"), "t (s)": ("fall_time_s", 1.0, ".5f")}
@@ -58,24 +59,23 @@ def table(protocol: Protocol, found: list[dict[str, Any]]) -> str:
     return _laid_out(columns, found)
 
 
-def _cell(value: float | str, scale: float, style: str) -> str:
+def _cell(value: float | str | None, scale: float, style: str) -> str:
+    if value is None:
+        return "–"
     return value if isinstance(value, str) else format(value * scale, style)
 
 
-def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[dict[str, Any]]) -> str:
+def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[PredictedIncline]) -> str:
     shown = {
         heading: what
         for heading, what in columns.items()
-        if any(line.get(what[0]) is not None for line in found)
+        if any(getattr(line, what[0]) is not None for line in found)
     }
     rows = [[*shown, "model"]]
     for line in found:
-        cells = [
-            "–" if line.get(key) is None else _cell(line[key], scale, style)
-            for key, scale, style in shown.values()
-        ]
-        rows.append([*cells, line["model"]])
-    notes = [f"{label(line)}: {note}" for line in found for note in line["notes"]]
+        cells = [_cell(getattr(line, key), scale, style) for key, scale, style in shown.values()]
+        rows.append([*cells, line.model])
+    notes = [f"{line.label}: {note}" for line in found for note in line.notes]
     return "\n".join([*text_table(rows), *notes])
 
 

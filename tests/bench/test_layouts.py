@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from rig.bench.falls import Fall
+from rig.bench.falls import SimulatedDrop
 from rig.bench.layout_catalogue import LAYOUTS, STANDARD
 from rig.bench.layouts import DISTURBANCES, Cell, as_json
 from rig.cli import main
@@ -47,7 +47,7 @@ def judged(change=lambda result: result, dials=None, drop=lambda one: one):
     """One drop of the standard rig in a cell of its own."""
     one = drop(case(UNIFORM, dials or Dials.quiet(), incline=40.0))
     cell = Cell("25 rods", "8 + 8", "", "quiet")
-    cell.add(UNIFORM, Fall(1, one.drop, asdict(one.truth)), change(one.analyze()), 0.01)
+    cell.add(UNIFORM, SimulatedDrop(1, one.drop, asdict(one.truth)), change(one.analyze()), 0.01)
     return cell
 
 

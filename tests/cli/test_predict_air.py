@@ -69,7 +69,8 @@ def test_the_ready_protocol_is_the_reference():
     protocol = PROTOCOLS / "weighed-chain.yaml"
     with mp.workdps(50):
         drags = [rod_drag(1.1, 1.2, 0.0127, 0.102, 12)] * 8
-    for line, incline in zip(predictions(read(protocol)), (40, 60), strict=True):
+    for one, incline in zip(predictions(read(protocol)), (40, 60), strict=True):
+        line = one.json()
         alpha = printed_alpha(0.5, 0.2, incline, mp.mpf(1) / 3)
         wanted = reference_air_fall(MASSES, HEIGHTS, alpha, mp.mpf(4) / 3, drags, 0.18, 9.81, 1.5)
         close(line, wanted)

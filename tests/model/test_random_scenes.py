@@ -90,7 +90,7 @@ def scenes(draw: st.DrawFn) -> Scene:
 def check(text: str, wanted: tuple[mp.mpf, ...], relative: float) -> None:
     (line,) = predictions(parse(text))
     for key, value in zip(("separation_m", "speed_m_s", "fall_time_s"), wanted, strict=True):
-        assert close(line[key], value, relative), key
+        assert close(getattr(line, key), value, relative), key
 
 
 @examples(100)

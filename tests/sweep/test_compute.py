@@ -87,11 +87,11 @@ def test_the_scene_itself_is_what_predict_says():
     text = SCENE.replace("drop: 180 mm", "drop: 180 mm\ninitial_speed: 0.3 m/s")
     protocol = reader.parse(text)
     found = list(points(protocol, ["initial_speed=0.3m/s..0.6m/s:2"]))[::2]
-    lines = [line for line in predictions(protocol) if line["impact_chain"] == "A"]
+    lines = [line for line in predictions(protocol) if line.impact_chain == "A"]
     for line, (at, separation, speed, _, _) in zip(lines, found, strict=True):
-        assert at["incline"] == line["incline_deg"]
-        assert separation == pytest.approx(line["separation_m"], rel=1e-14)
-        assert speed == pytest.approx(line["speed_m_s"], rel=1e-14)
+        assert at["incline"] == line.incline_deg
+        assert separation == pytest.approx(line.separation_m, rel=1e-14)
+        assert speed == pytest.approx(line.speed_m_s, rel=1e-14)
 
 
 def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
