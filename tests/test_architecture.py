@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
+from collections import defaultdict
 from itertools import pairwise
 from pathlib import Path
 
@@ -134,6 +136,15 @@ def test_files_and_links_of_a_paper_lead_somewhere(paper):
         assert (ROOT / name).is_file(), name
     for name in re.findall(r"`(\w+\.py)`", text):
         assert any(path for top in ("rig", "tests") for path in (ROOT / top).rglob(name)), name
+
+
+def test_a_public_class_name_means_one_thing():
+    places = defaultdict(list)
+    for path in sorted((ROOT / "rig").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert {name: where for name, where in places.items() if len(where) > 1} == {}
 
 
 def test_a_commit_is_checked_as_the_tests_begin():
