@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig import __version__
 from rig.campaign.events import (
     Answered,
     ArmRelease,
@@ -38,7 +37,7 @@ from rig.protocol.plan import runs
 from rig.recorder.interrupts import Interrupts
 from rig.records import Job
 from rig.report.numbers import plus_minus
-from rig.results import results
+from rig.results import keep, results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -128,7 +127,7 @@ def run_protocol(
         operator.say("analysing the session …")
         found = results(session)
         with interrupts.held():
-            session.put_results(found.records(), __version__)
+            keep(session, found)
             session.commit()
         return found
 

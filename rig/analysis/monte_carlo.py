@@ -10,15 +10,17 @@ import numpy as np
 
 from rig.analysis.adjust import adjust
 from rig.analysis.distributions import coverage_factor
+from rig.analysis.equations import robust_weights, scaled
 from rig.analysis.joint_step import DropState, joint_step
 from rig.analysis.quantities import measurands
 from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
-    from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointDrop, JointFit
 
@@ -84,9 +86,13 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     for role in shifts:
         shifts[role] *= fit.estimate.scatter
     found: dict[str, list[float]] = {}
+    expected = _Expected(fit)
     for _ in range(trials):
-        shaken = _shaken(model, shifts, rng)
-        estimate = adjust(shaken, fit.matches, at, _stated(sd) * rng.normal(size=sd.size))
+        moved = _draw(shifts, rng)
+        centre = _stated(sd) * rng.normal(size=sd.size)
+        shaken = model.shaken(moved)
+        # What is linear need not be found step by step; adjusting from there finds the rest.
+        estimate = adjust(shaken, fit.matches, at + expected.shift(moved, centre), centre)
         for name, (value, _gradient) in measurands(shaken, estimate.x).items():
             found.setdefault(name, []).append(value)
     return {name: Propagated.of(np.array(values)) for name, values in found.items()}
@@ -113,7 +119,7 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
         for drop, shift in zip(joint.drops, shifts, strict=True):
             sd = drop.model.unknowns.sd[drop.own]
             own = _stated(sd) * rng.normal(size=sd.size)
-            model = _shaken(drop.model, shift, rng)
+            model = drop.model.shaken(_draw(shift, rng))
             places = drop.own, drop.common, drop.here
             states.append(DropState(model, drop.matches, drop.x.copy(), *places, own))
         for _step in range(_SESSION_STEPS):
@@ -171,8 +177,41 @@ def _stated(sd: Array) -> Array:
     return np.where(sd < ANYTHING, sd, 0.0)
 
 
-def _shaken(model: DropModel, shifts: dict[str, Array], rng: np.random.Generator) -> DropModel:
-    return model.shaken({role: one * rng.normal(size=one.size) for role, one in shifts.items()})
+def _draw(shifts: dict[str, Array], rng: np.random.Generator) -> dict[str, Array]:
+    return {role: one * rng.normal(size=one.size) for role, one in shifts.items()}
+
+
+class _Expected:
+    """Where the unknowns of a drop go, to first order, when its edges and priors move."""
+
+    def __init__(self, fit: Fit) -> None:
+        self._estimate = estimate = fit.estimate
+        self._seen: dict[str, tuple[NDArray[np.intp], Array]] = {}
+        for role, matches in fit.matches.items():
+            found = fit.model.equations(role, estimate.x, matches)
+            values, sigma, speed, _ = found.residuals
+            sigma = sigma * estimate.scatter
+            weight = robust_weights(values / sigma) / sigma**2
+            # A later stamp sees the chain lower.
+            pull = found.jacobian * (weight * speed)[:, None]
+            self._seen[role] = fit.model.expected[role].chosen(matches)[1], pull * estimate.sd
+
+    def shift(self, moved: Mapping[str, Array], centre: Array) -> Array:
+        """Return the change of the unknowns, shape ``(unknowns,)``.
+
+        Parameters
+        ----------
+        moved
+            Of each side's edges, s.
+        centre
+            Prior means of the unknowns.
+        """
+        sd = self._estimate.sd
+        vector = scaled(centre, sd)
+        for role, (edges, pull) in self._seen.items():
+            vector = vector + moved[role][edges] @ pull
+        found: Array = sd * (self._estimate.covariance @ vector)
+        return found
 
 
 def _scatter(drop: Fit | JointDrop) -> dict[str, Array]:

@@ -139,6 +139,10 @@ class DropResult:
         found["learned"] = self.learned
         found["verdict"] = self.verdict
         found["reasons"] = list(self.reasons)
+        found["degrees"] = {
+            name: value.degrees if math.isfinite(value.degrees) else None
+            for name, value in self.quantities.items()
+        }
         found["budget"] = [
             {"name": source, "quantity": name, "u": u}
             for name, value in self.quantities.items()

@@ -5,18 +5,15 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rig import __version__
 from rig.commands.output import print_results, progress
 from rig.errors import SessionError
 from rig.report.columns import aligned
 from rig.report.parts import effects_parts, scatter_part
-from rig.results import results
+from rig.results import keep, results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
-
-    from rig.session.reading import Reader
 
 
 def main(arguments: Namespace) -> int:
@@ -26,7 +23,7 @@ def main(arguments: Namespace) -> int:
 
         return budget.main(arguments)
     with Session.open(arguments.session, readonly=True) as session:
-        extent = _extent(session)
+        extent = session.extent()
         found = results(session, progress("analysing run"))
     more: dict[str, Any] = {}
     if arguments.session_trials is not None:
@@ -35,8 +32,8 @@ def main(arguments: Namespace) -> int:
         more["monte_carlo"] = session_trials(found.analysis, arguments.session_trials)
     # A session that is being written, or on a read-only disk, is analysed all the same.
     with suppress(SessionError), Session.open(arguments.session) as session:
-        if _extent(session) == extent:  # else it went on meanwhile, and these are out of date
-            session.put_results(found.records(), __version__)
+        if session.extent() == extent:  # else it went on meanwhile, and these are out of date
+            keep(session, found)
     code = print_results(found, as_json=arguments.json, more=more)
     if not arguments.json:
         scatter = [scatter_part(found.analysis.summary)] if arguments.scatter else []
@@ -47,8 +44,3 @@ def main(arguments: Namespace) -> int:
 
             print("\n".join(["", *trials_lines(more["monte_carlo"])]))
     return code
-
-
-def _extent(session: Reader) -> tuple[int, int]:
-    """How far a session has come: its records are only ever added to."""
-    return len(session.states()), len(session.pings())

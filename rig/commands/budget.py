@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
 from rig.analysis.monte_carlo import agreement, monte_carlo, session_monte_carlo
+from rig.analysis.result import Measured
 from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.protocol.plan import runs
-from rig.results import calibration, detailed, protocol_of
+from rig.results import calibration, kept, protocol_of, results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Mapping
 
-    from rig.analysis.result import Measured
     from rig.analysis.session import Analysis
     from rig.session.reading import Reader
 
@@ -51,7 +52,7 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
     InputError
         A run that was not recorded, or is void.
     """
-    drop = next((one for one in session.latest_drops() if one.run == number), None)
+    drop = next(iter(session.latest_drops(number)), None)
     if drop is None:
         raise InputError(f"run {number} has no drop in this session")
     protocol = protocol_of(session)
@@ -59,13 +60,14 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
     alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
         raise InputError(f"run {number} is void: {'; '.join(alone.reasons)}")
-    analysis, _ = detailed(session)
-    result = next(one for one in analysis.runs if one.run.number == number)
+    # What was worked out and kept is not worked out again: the other runs are most of the work.
+    records = kept(session) or results(session).records()
+    record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
     trial = monte_carlo(fit, trials, seed)
     return {
         "run": number,
-        "learned": result.learned,
-        "budget": {name: _lines(measured) for name, measured in result.quantities.items()},
+        "learned": record["learned"],
+        "budget": {name: _lines(_measured(record, name)) for name in record["degrees"]},
         "by_itself": {name: _lines(measured) for name, measured in alone.quantities.items()},
         "monte_carlo": {
             "trials": trials,
@@ -79,6 +81,13 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
             },
         },
     }
+
+
+def _measured(record: Mapping[str, Any], name: str) -> Measured:
+    """Return a measured value as a drop's record has it."""
+    found, degrees = record[name], record["degrees"][name]
+    lines = {one["name"]: one["u"] for one in record["budget"] if one["quantity"] == name}
+    return Measured(found["value"], found["u"], math.inf if degrees is None else degrees, lines)
 
 
 def _lines(measured: Measured) -> dict[str, Any]:

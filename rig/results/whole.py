@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from rig import __version__
 from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
 from rig.clock.calibration import Calibrator
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.session.reading import Reader
+    from rig.session.store import Session
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,20 @@ class SessionResults:
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
         return head | {"calibration": self.calibration} | said
+
+
+def keep(session: Session, found: SessionResults) -> None:
+    """Keep results in the session that they are of, as it stands."""
+    session.put_results(found.records(), _version(session))
+
+
+def kept(session: Reader) -> list[dict[str, Any]]:
+    """Return kept records of the drops; none where the session went on, or the program did."""
+    return session.results_of(_version(session))
+
+
+def _version(session: Reader) -> str:
+    return f"{__version__} of {session.extent()}"
 
 
 def protocol_of(session: Reader) -> Protocol:

@@ -20,6 +20,10 @@ Direction = Literal["rx", "tx"]
 """``rx``: from the device to the host; ``tx``: from the host to the device."""
 
 
+# Names that are put into SQL are these only.
+_GROWING = ("identity", "drop", "run_state", "ping", "reference", "host_break")
+
+
 class StateEntry(NamedTuple):
     """One line of the log of run states."""
 
@@ -113,11 +117,12 @@ class Reader:
         rows = self._rows('SELECT * FROM "drop" WHERE run = ? AND attempt = ?', run, attempt)
         return next(map(self._drop, list(rows)), None)
 
-    def latest_drops(self) -> list[Drop]:
-        """Return the last attempt at each run, by run."""
+    def latest_drops(self, run: int | None = None) -> list[Drop]:
+        """Return the last attempt at each run, by run, or at one run."""
         rows = self._rows(
-            'SELECT * FROM "drop" AS d WHERE attempt = '
-            '(SELECT max(attempt) FROM "drop" WHERE run = d.run) ORDER BY run'
+            'SELECT * FROM "drop" AS d WHERE run = ifnull(?, run) AND attempt = '
+            '(SELECT max(attempt) FROM "drop" WHERE run = d.run) ORDER BY run',
+            run,
         )
         return [self._drop(row) for row in list(rows)]
 
@@ -146,6 +151,22 @@ class Reader:
             run,
         )
         return next(map(_state, rows), None)
+
+    def extent(self) -> str:
+        """Say how far the records go from which results follow: they are only ever added to."""
+        there = {name for (name,) in self._rows("SELECT name FROM sqlite_master")}
+        ends = [
+            f"{table} {last}"
+            for table in _GROWING
+            if table in there  # older files have fewer
+            for (last,) in self._rows(f'SELECT ifnull(max(id), 0) FROM "{table}"')  # noqa: S608
+        ]
+        return ", ".join(ends)
+
+    def results_of(self, analysis_version: str) -> list[dict[str, Any]]:
+        """Return the results if they were put by this version; none if by another."""
+        sql = "SELECT json FROM result WHERE analysis_version = ? ORDER BY run, attempt"
+        return [json.loads(text) for (text,) in self._rows(sql, analysis_version)]
 
     def results(self) -> list[dict[str, Any]]:
         """Return derived results as last put, by run and attempt."""

@@ -6,6 +6,9 @@ import json
 
 import pytest
 
+from rig.records import ClockSample
+from rig.results import keep, kept, results
+from rig.session.store import Session
 from tests.cli.lab import rig
 
 
@@ -22,6 +25,27 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
         assert 0.6 < trial["u"] / found["by_itself"][name]["u"] < 1.45
     table = rig("analyze", finished.session, "--budget", 1, "--trials", 2)
     assert "beam heights" in table.stdout
+
+
+def test_kept_results_are_the_budget_s_as_long_as_the_session_does_not_go_on(finished, tmp_path):
+    """To work them out again is most of the work, and says the same to the last digit."""
+    session = finished.copy(tmp_path)
+    asked = ("analyze", session, "--budget", 2, "--trials", 2, "--json")
+    with Session.open(session, readonly=True) as opened:
+        records = kept(opened)
+    assert [one["run"] for one in records] == [1, 2, 3, 4]
+    quick = rig(*asked)
+    with Session.open(session) as opened:
+        opened.put_results([one | {"learned": None} for one in records], "another program's")
+        assert kept(opened) == []
+    whole = rig(*asked)
+    assert quick.stdout == whole.stdout
+    assert json.loads(whole.stdout)["learned"] is True
+    with Session.open(session) as opened:
+        keep(opened, results(opened))
+        assert kept(opened) == records
+        opened.add_ping(ClockSample(1, 2, 3))
+        assert kept(opened) == []
 
 
 def test_a_run_that_is_not_there_is_bad_input(finished):
