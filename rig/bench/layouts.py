@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import GOOD
-from rig.bench.falls import STRAY, Asked, falls, time_scale
+from rig.bench.baselines import plain_fit
+from rig.bench.falls import HZ, STRAY, Asked, falls, time_scale
 from rig.bench.fast_accuracy import DOUBLED, STACK, with_setting
 from rig.protocol import reader
 from rig.protocol.plan import runs
@@ -66,8 +67,9 @@ class Cell:
         Which measurand, its errors, and these over u.
     reasons
         Kinds of reasons for voids, numbers left out, by their number.
-    seconds
-        Processor time of identification and adjustment.
+    seconds, good_seconds, plain_seconds
+        Processor time of identification and adjustment, of all drops and of good ones, and of one
+        ``numpy.linalg.lstsq`` with the edges and unknowns of the good ones.
     """
 
     chain: str
@@ -86,6 +88,8 @@ class Cell:
     ratios: list[float] = field(default_factory=list)
     reasons: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
+    good_seconds: float = 0.0
+    plain_seconds: float = 0.0
 
     def add(
         self, protocol: Protocol, fall: SimulatedDrop, result: DropResult, seconds: float
@@ -100,6 +104,10 @@ class Cell:
         if result.verdict not in GOOD:
             self.reasons.update(_NUMBER.sub("…", reason) for reason in result.reasons)
             return
+        begin = time.process_time()
+        plain_fit(protocol, fall.drop, result, HZ)
+        self.plain_seconds += time.process_time() - begin
+        self.good_seconds += seconds
         wrong, strays = fall.rods(result.matches)
         self.wrong += wrong > 0
         self.edges += len(result.matches)
@@ -129,8 +137,13 @@ class Cell:
             "z_rms": _rms(ratios),
             "z_worst": max(map(abs, ratios), default=None),
             "ms_per_drop": 1e3 * self.seconds / max(1, self.drops),
+            "times_lstsq": _ratio(self.good_seconds, self.plain_seconds),
             "reasons": dict(self.reasons.most_common()),
         }
+
+
+def _ratio(one: float, other: float) -> float | None:
+    return one / other if other > 0.0 else None
 
 
 def _rms(values: Sequence[float]) -> float | None:
@@ -240,6 +253,9 @@ def _total(name: str, of: Sequence[Cell]) -> dict[str, Any]:
         "wrong_edges": sum(one.wrong_edges for one in of),
         "z_rms": _rms([ratio for one in of for ratio in one.ratios]),
         "ms_per_drop": 1e3 * sum(one.seconds for one in of) / max(1, sum(one.drops for one in of)),
+        "times_lstsq": _ratio(
+            sum(one.good_seconds for one in of), sum(one.plain_seconds for one in of)
+        ),
     }
 
 

@@ -123,6 +123,11 @@ def _ratio(cell: Record) -> str:
     return "–" if cell["z_rms"] is None else f"{cell['z_rms']:.2g}"
 
 
+def _times(cell: Record) -> str:
+    """Time of a drop over that of one least-squares solution of as many equations."""
+    return "–" if cell["times_lstsq"] is None else f"{cell['times_lstsq']:.0f}"
+
+
 _COLUMNS: tuple[Column[Record], ...] = (
     Column("chain", lambda row: row["of"]["chain"], numeric=False),
     Column("gates (mm)", lambda row: row["of"]["heights_mm"], numeric=False),
@@ -134,6 +139,7 @@ _COLUMNS: tuple[Column[Record], ...] = (
     ), numeric=False),
     Column("rms error", _each(_size)),
     Column("rms error/u", _each(_ratio)),
+    Column("times lstsq", _each(_times)),
 )  # fmt: skip
 _TOTALS: tuple[Column[Record], ...] = (
     Column("disturbances", lambda one: one["disturbance"], numeric=False),
@@ -146,4 +152,5 @@ _TOTALS: tuple[Column[Record], ...] = (
     Column("wrong edges", lambda one: str(one["wrong_edges"])),
     Column("rms error/u", _ratio),
     Column("ms a drop", lambda one: f"{one['ms_per_drop']:.1f}"),
+    Column("times lstsq", _times),
 )
