@@ -156,6 +156,11 @@ def _parser() -> argparse.ArgumentParser:
     predict.add_argument(
         "-o", "--output", metavar="FILE.svg", help="the figure; its numbers go to FILE.csv"
     )
+    predict.add_argument(
+        "--resolved",
+        action="store_true",
+        help="with it, what rods that fall resolved in time give (figures 3 and 4)",
+    )
     _json(predict)
 
     _sweep(command("sweep", "map the model's Δz and V over a grid of parameters"))
@@ -326,6 +331,21 @@ def _parser() -> argparse.ArgumentParser:
         help="seconds that one Monte Carlo setting may take (default 120)",
     )
     _json(every)
+    other = benches.add_parser("resolved", help="sessions whose chains fall by no model")
+    other.set_defaults(module="bench_resolved")
+    other.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="DIR",
+        help="folder for page, CSV, JSON and picture",
+    )
+    other.add_argument(
+        "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
+    )
+    other.add_argument("--drops", type=_count, metavar="N", help="at each incline (default 4)")
+    other.add_argument("--only", metavar="TEXT", help="cases with this in their names")
+    _json(other)
     layouts = benches.add_parser("layouts", help="which layouts of gates let drops be read")
     layouts.set_defaults(module="bench_layouts")
     layouts.add_argument(

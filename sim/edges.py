@@ -7,11 +7,10 @@ do to edges is left out.
 
 from __future__ import annotations
 
-import itertools
 import json
 import sys
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.link.messages import pack_label
 from rig.ports import read_settings
@@ -20,51 +19,73 @@ from sim.dials import read_dials
 from sim.scene import choose_world
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
+    from sim.lab import ChainLab
+    from sim.scene import World
     from sim.truth import Truth
 
-RIGS = 16
+TOGETHER = 80
+"""Drops that are made at once, at most; more would take little less time each, but much memory."""
 
 
-def falls(url: str, seeds: list[int], runs: list[list[int]]) -> Iterator[str]:
-    """Let chains fall.
+class Request(NamedTuple):
+    """A simulation's URL, the seeds of its rigs, and the runs that are made on each."""
 
-    Parameters
-    ----------
-    url
-        ``sim://?protocol=FILE``, with dials if wanted.
-    seeds
-        Of the rigs.
-    runs
-        Numbers of the planned runs that are made on each.
+    url: str
+    seeds: list[int]
+    runs: list[list[int]]
+
+
+def falls(asked: Iterable[Request]) -> Iterator[str]:
+    """Let chains fall, of one simulation after the other.
 
     Yields
     ------
     str
         ``{"seed", "edges": [[seconds, channel, blocked], …], "truth": {…}}``.
     """
-    settings = read_settings(url)
+    together: list[_Rig] = []
+    for rig in (rig for one in asked for rig in _rigs(one)):
+        drops = sum(len(one.labels) for one in together)
+        other = bool(together) and rig.world.make_ahead is not together[0].world.make_ahead
+        if together and (other or drops + len(rig.labels) > TOGETHER):
+            yield from _drops(together)
+            together = []
+        together.append(rig)
+    yield from _drops(together)
+
+
+class _Rig(NamedTuple):
+    seed: int
+    world: World
+    lab: ChainLab
+    labels: list[int]
+    told: list[Truth]
+
+
+def _rigs(asked: Request) -> Iterator[_Rig]:
+    settings = read_settings(asked.url)
     protocol = reader.read(settings.pop("protocol"))
     world, settings = choose_world(settings)
     dials = read_dials(settings)
-    told: list[Truth] = []
-    rigs = zip(seeds, runs, strict=True)
-    # So many rigs at a time that their falls together are made at little cost each.
-    while some := list(itertools.islice(rigs, RIGS)):
-        labs = [
-            (world.hang(protocol, dials, seed, told.append), [pack_label(n, 1) for n in numbers])
-            for seed, numbers in some
-        ]
-        world.make_ahead(labs)
-        for (seed, _), (lab, labels) in zip(some, labs, strict=True):
-            for label in labels:
-                edges = lab.drop(label)
-                yield json.dumps({"seed": seed, "edges": edges, "truth": asdict(told.pop())})
+    for seed, numbers in zip(asked.seeds, asked.runs, strict=True):
+        told: list[Truth] = []
+        lab = world.hang(protocol, dials, seed, told.append)
+        yield _Rig(seed, world, lab, [pack_label(number, 1) for number in numbers], told)
+
+
+def _drops(rigs: Sequence[_Rig]) -> Iterator[str]:
+    if rigs:
+        rigs[0].world.make_ahead([(rig.lab, rig.labels) for rig in rigs])
+    for rig in rigs:
+        for label in rig.labels:
+            edges = rig.lab.drop(label)
+            yield json.dumps({"seed": rig.seed, "edges": edges, "truth": asdict(rig.told.pop())})
 
 
 if __name__ == "__main__":
-    asked = iter(sys.argv[1:])
-    for url, seeds, runs in zip(asked, asked, asked, strict=True):
-        for line in falls(url, json.loads(seeds), json.loads(runs)):
-            print(line)
+    words = iter(sys.argv[1:])
+    triples = zip(words, words, words, strict=True)
+    for line in falls(Request(u, json.loads(s), json.loads(r)) for u, s, r in triples):
+        print(line)

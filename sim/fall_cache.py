@@ -24,7 +24,8 @@ def key(*what: object) -> str:
 @cache
 def _code() -> str:
     digest = hashlib.sha256()
-    for source in sorted(Path(resolved.__file__).parent.glob("*.py")):
+    world = Path(resolved.__file__).parent
+    for source in sorted([*world.glob("*.py"), *world.parent.glob("resolved_*.py")]):
         digest.update(source.read_bytes())
     return digest.hexdigest()
 

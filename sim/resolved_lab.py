@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 BLOCK = 12
 """Runs whose falls are made together: by themselves they would take ten times as long each."""
+TRACK_S = 1 / 960
+"""Between two moments of the track: half a frame of the paper's camera."""
 ROD_LENGTH = 0.102
 """Of the paper's chains, m, where a protocol does not say it."""
 
@@ -42,6 +44,7 @@ class ResolvedTruth(Truth):
     At level the middle of the top rod passes the contact level; where it strikes before, on the
     rods that lie there, that is when it would have passed had it fallen on. At strike it touches
     the board or a rod. Lists are by rod, bottom up: impulses in N s, times in s; energy lost in J.
+    ``track`` are heights of both top rods until the strike, each counted from its own release.
     """
 
     separation_strike_m: float | None = None
@@ -54,6 +57,7 @@ class ResolvedTruth(Truth):
     lost: dict[str, float] | None = None
     slack: float | None = None
     turning_rad_s: float | None = None
+    track: dict[str, list[float]] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,9 +308,15 @@ class ResolvedLab(ChainLab):
             "slack": struck.slack,
             "turning_rad_s": struck.turning,
         }
+        moments = np.arange(struck.strike_s, 0.0, -TRACK_S)[::-1]
+        truth["track"] = {
+            "times_s": moments.tolist(),
+            "impact_top_m": np.interp(moments, struck.times, struck.heights[:, -1]).tolist(),
+        }
         if "free" not in falls:
             return truth
         free = falls["free"]
+        truth["track"]["free_top_m"] = np.interp(moments, free.times, free.heights[:, -1]).tolist()
 
         def free_top(time_s: float) -> float:
             return float(np.interp(time_s, free.times, free.heights[:, -1]))

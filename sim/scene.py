@@ -137,7 +137,7 @@ def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Worl
     rest = dict(settings)
     dynamics = rest.pop("dynamics", "model")
     if dynamics == "model":
-        return World(ChainLab, lambda _: None), rest
+        return World(ChainLab, _at_once), rest
     if dynamics != "resolved":
         raise InputError(
             f"{scheme}://: dynamics: {dynamics!r} is not known", "model or resolved is accepted"
@@ -148,6 +148,10 @@ def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Worl
     world = read_resolved_dials(rest, scheme)
     left = {name: text for name, text in rest.items() if name not in NAMES}
     return World(partial(ResolvedLab, world=world), make_ahead), left
+
+
+def _at_once(_: Iterable[tuple[ChainLab, Sequence[int]]]) -> None:
+    """Nothing: the model needs no time worth saving."""
 
 
 def _check_writable(scheme: str, path: Path) -> None:

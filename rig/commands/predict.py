@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
-        _write_figure(arguments.figure, arguments.output)
+        _write_figure(arguments.figure, arguments.output, resolved=arguments.resolved)
         return 0
     if arguments.protocol is None:
         raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
@@ -79,7 +79,7 @@ def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[Predict
     return "\n".join([*text_table(rows), *notes])
 
 
-def _write_figure(number: int, output: str | None) -> None:
+def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     """Write a figure of the paper as SVG and its numbers as CSV beside it."""
     from rig.report.paper import paper_figure  # noqa: PLC0415 - it needs matplotlib
 
@@ -87,9 +87,30 @@ def _write_figure(number: int, output: str | None) -> None:
         raise InputError(
             "a figure needs a file to go to", f"rig predict --figure {number} -o FILE.svg"
         )
-    svg, columns = paper_figure(number)
-    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
     path = Path(output)
-    write_atomic(path.with_suffix(".svg"), svg)
-    write_atomic(path.with_suffix(".csv"), csv_text(columns, rows))
-    say(f"{path.with_suffix('.svg')} and {path.with_suffix('.csv')}")
+    falls = _resolved(number) if resolved else None
+    svg, columns = paper_figure(number, falls)
+    written = {path.with_suffix(".svg"): svg, path.with_suffix(".csv"): _table(columns)}
+    if falls is not None:
+        written[path.with_name(f"{path.stem}-resolved.csv")] = _table(falls)
+    for file, text in written.items():
+        write_atomic(file, text)
+    say(" and ".join(map(str, written)))
+
+
+def _table(columns: Mapping[str, list[float]]) -> str:
+    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    return csv_text(columns, rows)
+
+
+def _resolved(number: int) -> dict[str, list[float]]:
+    """Let the figure's chains fall in the resolved world."""
+    from rig.bench import resolved_paper  # noqa: PLC0415 - only where chains really fall
+
+    if number not in {3, 4}:
+        raise InputError(f"figure {number} has no resolved falls", "figures 3 and 4 have")
+    say("letting chains fall in the resolved world; this takes some minutes")
+    if number == 3:
+        return resolved_paper.figure_3(resolved_paper.uniform())
+    (found,) = resolved_paper.graded(variants=resolved_paper.AS_MEASURED)
+    return resolved_paper.figure_4(found)

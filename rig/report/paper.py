@@ -20,13 +20,18 @@ if TYPE_CHECKING:
 _LINE_HEIGHT = 0.17  # inches
 
 
-def paper_figure(number: int) -> tuple[str, dict[str, list[float]]]:
+def paper_figure(
+    number: int, resolved: Columns | None = None
+) -> tuple[str, dict[str, list[float]]]:
     """Draw one of the paper's figures.
 
     Parameters
     ----------
     number
         3 (Δz and V against inclination), 4 (height against V²) or 6 (against rod inertia).
+    resolved
+        What falls in the resolved world give for it, to be drawn too; see
+        `rig.bench.resolved_paper`. Of figures 3 and 4 only.
 
     Returns
     -------
@@ -40,6 +45,8 @@ def paper_figure(number: int) -> tuple[str, dict[str, list[float]]]:
     with canvas((*((2.9,) * panels), foot), simulated=False) as drawing:
         *axes, below = drawing.axes
         draw(axes, columns)
+        if resolved is not None:
+            _RESOLVED[number](axes, resolved)
         below.axis("off")
         below.text(0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes)
         # The caption's panel must not take the labels of the axis all panels share.
@@ -112,6 +119,30 @@ def _figure_6(axes: list[Axes], columns: Columns) -> None:
         panel.legend(loc="upper right")
     axes[1].set_xlabel("rotational inertia of the rods, ξ (dotted: uniform rods, 1/3)")
 
+
+def _resolved_3(axes: list[Axes], found: Columns) -> None:
+    """Means of resolved falls with their standard deviations."""
+    for panel, row in ((axes[0], SEPARATION), (axes[1], SPEED)):
+        means, spreads = ([row.scale * v for v in found[key]] for key in (row.name, row.key("sd")))
+        panel.errorbar(
+            found["incline_deg"], means, spreads, fmt="s", color=INK, markersize=4.0,
+            label=f"resolved rods at strike, mean ± SD of {found['falls'][0]:g} falls",
+        )  # fmt: skip
+        panel.legend(loc="upper right")
+
+
+def _resolved_4(axes: list[Axes], found: Columns) -> None:
+    """One resolved fall, striking and free."""
+    for height, speed2, words in (
+        ("height_m", "speed2", "resolved rods, one fall"),
+        ("free_height_m", "free_speed2", None),
+    ):
+        heights = [100.0 * z for z in found[height]]
+        axes[0].plot(found[speed2], heights, ":", color=SECOND, linewidth=1.2, label=words)
+    axes[0].legend(loc="upper right")
+
+
+_RESOLVED: dict[int, Callable[[list[Axes], Columns], None]] = {3: _resolved_3, 4: _resolved_4}
 
 _KINDS: dict[int, _Kind] = {
     3: (paper.figure_3, _figure_3, 2),

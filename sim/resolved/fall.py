@@ -74,7 +74,15 @@ def fall(
         One a chain; each the same to the last bit whatever falls beside it at the same step.
     """
     step = min(STEP, stable_step(chains)) if step is None else step
-    return _Falling(chains, step).run(until, after)
+    # By itself, so that no fall takes another way because of what falls beside it.
+    formula = [_Falling([chain], step).skippable() for chain in chains]
+    found: dict[int, Fall] = {}
+    for way in (True, False):
+        mine = [b for b, skips in enumerate(formula) if skips is way]
+        if mine:
+            some = _Falling([chains[b] for b in mine], step).run(until, after, skip=way)
+            found |= zip(mine, some, strict=True)
+    return [found[b] for b in range(len(chains))]
 
 
 class _Frame(NamedTuple):
@@ -115,8 +123,8 @@ class _Falling:
         self.samples: list[tuple[Numbers, Numbers, Numbers]] = []
         self.frames: list[_Frame] = []
 
-    def run(self, until: float | None, after: float) -> list[Fall]:
-        skipped = self._skip()
+    def run(self, until: float | None, after: float, *, skip: bool) -> list[Fall]:
+        skipped = self._skip() if skip else np.zeros((0, len(self.chains)))
         bodies, half = self.bodies, self.step / 2.0
         bodies.drift(half)
         last = math.inf if until is None else until
@@ -131,10 +139,9 @@ class _Falling:
                     break
             self._act()
             if self.steps % SAMPLE == 0:
-                axis = bodies.axis
-                self.samples.append(
-                    (bodies.place[2].copy(), bodies.place[0].copy(), axis[2] / axis[0])
-                )
+                slopes = bodies.axis[2] / bodies.axis[0]
+                few = bodies.place[0].astype(np.float32), slopes.astype(np.float32)
+                self.samples.append((bodies.place[2].copy(), *few))
             if self.steps % FRAME == 0:
                 self._frame()
             bodies.velocity += self.step * self.force / bodies.mass
@@ -149,16 +156,22 @@ class _Falling:
         top = self.bodies.place[2, :, -1] < -2.0 * self.bodies.half[:, -1]
         return np.where(free, np.where(top, 0.0, math.inf), self.touched[:, -1] + after)
 
-    def _skip(self) -> Numbers:
-        """Fall by formula as far as nothing can touch or pull; distances for samples on the way.
+    def skippable(self) -> bool:
+        """Whether all rods of a chain fall alike, by a formula, until something touches.
 
-        That holds where all rods of a chain fall alike: the same air, no spin, and so little swing
-        that it stretches no string more than the weight does that it just held.
+        That is so in the same air, without spin, and with so little swing that it stretches no
+        string more than the weight does that it just held.
         """
-        bodies, batch = self.bodies, len(self.chains)
-        if np.any(self.drag != self.drag[:, :1]) or bodies.spin.any():
-            return np.zeros((0, batch))
-        way = np.zeros(batch)
+        if np.any(self.drag != self.drag[:, :1]) or self.bodies.spin.any():
+            return False
+        _, begin = self._way()
+        moved = self.bodies.place + begin[:, None] * self.bodies.velocity
+        return bool(self.strings.stretched(moved, self.bodies).max(initial=0.0) <= _SLIGHT)
+
+    def _way(self) -> tuple[Numbers, Numbers]:
+        """Moments of samples, shape (T, B), and when each chain is just above what it touches."""
+        bodies = self.bodies
+        way = np.zeros(len(self.chains))
         gaps = self.board.gaps(bodies).min(axis=1)
         for b, chain in enumerate(self.chains):
             if chain.board is None:
@@ -167,22 +180,24 @@ class _Falling:
             else:
                 down = math.sin(math.pi / 2 - chain.board.incline)
                 way[b] = max(0.0, gaps[b] / down - _EARLY) if down > 0.0 else 0.0
-        kappa = self.drag[:, :1]
         # Samples are SAMPLE steps apart, from half a step after the release.
         grid = SAMPLE * self.step
         longest = 1.5 * math.sqrt(2.0 * float((way / bodies.gravity[:, 0]).max()))
-        moments = np.arange(2 + int(longest / grid))[:, None] * grid + np.zeros(batch)
-        skipped = (bodies.fallen(moments, kappa)[0] < way).sum(axis=0)
-        begin = skipped * grid
-        moved = bodies.place + begin[:, None] * bodies.velocity
-        if self.strings.stretched(moved, bodies).max() > _SLIGHT:
-            return np.zeros((0, batch))
-        self.skipped, self.begin, bodies.place = skipped, begin, moved
-        fallen, speed = (one[0][:, None] for one in bodies.fallen(begin[None], kappa))
+        moments = np.arange(2 + int(longest / grid))[:, None] * grid + np.zeros(way.size)
+        skipped = (bodies.fallen(moments, self.drag[:, :1])[0] < way).sum(axis=0)
+        return moments, skipped * grid
+
+    def _skip(self) -> Numbers:
+        """Fall by formula as far as nothing touches; distances for samples on the way."""
+        bodies, kappa = self.bodies, self.drag[:, :1]
+        moments, self.begin = self._way()
+        self.skipped = np.rint(self.begin / (SAMPLE * self.step)).astype(np.intp)
+        bodies.place = bodies.place + self.begin[:, None] * bodies.velocity
+        fallen, speed = (one[0][:, None] for one in bodies.fallen(self.begin[None], kappa))
         bodies.place[2] -= fallen
         bodies.velocity[2] -= speed
         self.air += (bodies.mass * (bodies.gravity * fallen - 0.5 * speed**2)).sum(axis=1)
-        return bodies.fallen(moments[: skipped.max()] + self.step / 2.0, kappa)[0]
+        return bodies.fallen(moments[: self.skipped.max()] + self.step / 2.0, kappa)[0]
 
     def _act(self) -> None:
         """Forces and torques now, at a half step, with velocities as the last ones foretell."""

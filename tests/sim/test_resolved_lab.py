@@ -18,7 +18,7 @@ from rig.runner import Operator, run_protocol
 from rig.session.store import Session
 from sim import fall_cache
 from sim.dials import Dials, read_dials
-from sim.edges import falls
+from sim.edges import Request, falls
 from sim.resolved_dials import NAMES, ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
 from sim.scene import choose_world, set_scene
@@ -160,7 +160,7 @@ def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
 
 def test_falls_for_benchmarks_come_in_one_batch(scene):
     url = f"sim://?protocol={scene}&dynamics=resolved&quiet=1&yaw_sd=1 deg"
-    lines = [json.loads(line) for line in falls(url, [3, 4], [[1], [2]])]
+    lines = [json.loads(line) for line in falls([Request(url, [3, 4], [[1], [2]])])]
     assert [line["seed"] for line in lines] == [3, 4]
     assert {line["truth"]["run"] for line in lines} == {1, 2}
 

@@ -1,0 +1,128 @@
+"""Sessions of the resolved world judged by the truth, and its falls in the paper's figures."""
+
+from __future__ import annotations
+
+import csv
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import pytest
+
+from rig.bench import resolved_paper
+from rig.bench.resolved import CASES, JudgedDrop, as_json, summary
+from rig.bench.resolved_paper import Ensemble
+from rig.cli import main
+from rig.commands import bench_resolved
+
+TWO = """
+protocol: 1
+title: Two rods
+chains:
+  A: {rods: 2, length: 48 mm, diameter: 12.7 mm, rod_length: 102 mm, tilt: 12 deg}
+  B: {like: A}
+surface: {restitution: 0.5, friction: 0.2}
+drop: 1200 mm
+gravity: 9.81 m/s^2
+gates:
+  impact: [{channel: 0, height: 25 mm}, {channel: 1, height: 60 mm}, {channel: 2, height: 400 mm}]
+  free: [{channel: 8, height: 25 mm}, {channel: 9, height: 60 mm}, {channel: 10, height: 400 mm}]
+plan: {incline: [40 deg, 60 deg], repeats: 1, order: ABBA, settle: 0 s}
+"""
+
+GOOD = JudgedDrop(
+    "damped strings", 40.0, 1, "accepted", (), beyond=False,
+    errors={"separation_m": (1e-3, 2e-3), "speed_m_s": (0.03, 0.02)}, wrong=0,
+    truth={"separation_m": 0.12, "separation_strike_m": 0.11, "speed_m_s": 7.0,
+           "contact_height_m": 0.01},
+)  # fmt: skip
+REASON = "the chains left 7.3 ms apart, more than 5 ms"
+VOID = replace(GOOD, run=2, verdict="void", reasons=(REASON,), errors={})
+
+
+def test_shares_are_of_drops_that_could_have_been_good():
+    found = summary([GOOD, VOID, replace(VOID, run=3, beyond=True)])
+    assert (found["drops"], found["beyond"], found["void_share"]) == (3, 1, 0.5)
+    assert found["reasons"] == {"the chains left … ms apart, more than … ms": 1}
+    assert found["quantities"]["separation_m"]["coverage"] == 1.0
+    assert found["quantities"]["speed_m_s"]["coverage"] == 0.0
+    assert found["quantities"]["speed_m_s"]["bias"] == pytest.approx(0.03)
+
+
+def test_inclines_stand_for_themselves():
+    whole = as_json([GOOD, replace(GOOD, incline_deg=60.0, case="air"), VOID])
+    assert [(one["case"], one["incline_deg"]) for one in whole["inclines"]] == [
+        ("damped strings", 40.0), ("air", 60.0),
+    ]  # fmt: skip
+    assert whole["inclines"][0]["true"]["contact_height_m"] == pytest.approx(0.01)
+
+
+def test_the_command_leaves_page_table_and_picture(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "inclined-uniform.yaml").write_text(TWO)
+    # Two rods that swing turn about each other, which no formula follows on the long way down.
+    still = replace(CASES[0], settings={"swing_sd": "0 m/s"})
+    monkeypatch.setattr(bench_resolved, "CASES", (still,))
+    out = tmp_path / "out"
+    words = ["bench", "resolved", "-o", out, "--protocols", tmp_path, "--only", "damped"]
+    assert main([str(word) for word in words]) == 0
+    assert "SIMULATED DATA" in capsys.readouterr().out
+    whole = json.loads((out / "resolved.json").read_text())
+    assert whole["cases"][0]["drops"] == 2
+    with (out / "resolved.csv").open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert {float(row["incline_deg"]) for row in rows} == {40.0, 60.0}
+    assert all(float(row["true separation_strike_m"]) > 0 for row in rows)
+    ET.fromstring((out / "resolved.svg").read_text())
+    assert "resolved.svg" in (out / "resolved.md").read_text()
+
+
+def test_a_case_that_is_none_is_named(tmp_path, capsys):
+    assert main(["bench", "resolved", "-o", str(tmp_path), "--only", "steel"]) == 2
+    assert "lively strings" in capsys.readouterr().err
+    assert len({one.name for one in CASES}) == len(CASES)
+
+
+def ensemble(incline: float) -> Ensemble:
+    times = [n / 960 for n in range(20)]
+    track = {
+        "times_s": times,
+        "impact_top_m": [0.1 - 5.0 * t for t in times],
+        "free_top_m": [0.2 - 4.0 * t for t in times],
+    }
+    return Ensemble("uniform", incline, (0.1, 0.12), (6.9, 7.1), (0.01, 0.02), (0.1, 0.1),
+                    (track, track))  # fmt: skip
+
+
+def test_two_frames_before_the_strike():
+    track = ensemble(40.0).tracks[0]
+    last = 0.1 + track["times_s"][-1]  # they part at 1 m/s
+    assert resolved_paper._early(track) == pytest.approx(last - 2 / 480)
+
+
+def test_speeds_of_the_track_are_its_slopes():
+    columns = resolved_paper.figure_4(ensemble(40.0))
+    assert columns["speed2"] == pytest.approx([25.0] * 18)
+    assert columns["free_speed2"] == pytest.approx([16.0] * 18)
+
+
+@pytest.mark.parametrize("number", [3, 4])
+def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
+    some = [ensemble(10.0 * n) for n in range(9)]
+    monkeypatch.setattr(resolved_paper, "uniform", lambda: some)
+    monkeypatch.setattr(resolved_paper, "graded", lambda variants: some[4:5])
+    target = tmp_path / "figure.svg"
+    assert main(["predict", "--figure", str(number), "--resolved", "-o", str(target)]) == 0
+    assert "resolved" not in target.with_suffix(".csv").read_text()
+    with (tmp_path / "figure-resolved.csv").open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert len(rows) == (9 if number == 3 else 18)
+    plain = tmp_path / "plain.svg"
+    assert main(["predict", "--figure", str(number), "-o", str(plain)]) == 0
+    assert target.read_text() != plain.read_text()
+
+
+def test_a_figure_without_falls_says_so(tmp_path, capsys):
+    target = str(tmp_path / "figure.svg")
+    assert main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
+    assert "figures 3 and 4" in capsys.readouterr().err
