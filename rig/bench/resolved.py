@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from rig.analysis.result import DropResult
-    from rig.bench.falls import Fall
+    from rig.bench.falls import SimulatedDrop
     from rig.protocol.protocol import Protocol
 
 UNIFORM, GRADED = "inclined-uniform.yaml", "graded-chain.yaml"
@@ -31,7 +31,7 @@ DROPS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class WorldCase:
     """A session: which chains, and how the resolved world differs from its default."""
 
     name: str
@@ -40,15 +40,15 @@ class Case:
 
 
 CASES = (
-    Case("damped strings", UNIFORM),
-    Case("dead strings", UNIFORM, {"string_restitution": "0.1"}),
-    Case("lively strings", UNIFORM, {"string_restitution": "0.7"}),
-    Case("no rods on rods", UNIFORM, {"rods_touch": "0"}),
-    Case("swinging", UNIFORM, {"swing_sd": "0.1 m/s"}),
-    Case("air", UNIFORM, {"drag": "0.03"}),
-    Case("graded", GRADED),
-    Case("graded, lively", GRADED, {"string_restitution": "0.7"}),
-    Case("graded, air", GRADED, {"drag": "0.03"}),
+    WorldCase("damped strings", UNIFORM),
+    WorldCase("dead strings", UNIFORM, {"string_restitution": "0.1"}),
+    WorldCase("lively strings", UNIFORM, {"string_restitution": "0.7"}),
+    WorldCase("no rods on rods", UNIFORM, {"rods_touch": "0"}),
+    WorldCase("swinging", UNIFORM, {"swing_sd": "0.1 m/s"}),
+    WorldCase("air", UNIFORM, {"drag": "0.03"}),
+    WorldCase("graded", GRADED),
+    WorldCase("graded, lively", GRADED, {"string_restitution": "0.7"}),
+    WorldCase("graded, air", GRADED, {"drag": "0.03"}),
 )
 """One difference at a time; the first and the seventh are the world's defaults."""
 _NUMBER = re.compile(r"[-+−]?\d[\d.,]*(?:e[-+]?\d+)?")
@@ -80,7 +80,7 @@ class JudgedDrop:
 
 
 def study(
-    folder: str, drops: int, cases: Sequence[Case], say: Callable[[str], None]
+    folder: str, drops: int, cases: Sequence[WorldCase], say: Callable[[str], None]
 ) -> list[JudgedDrop]:
     """Let chains fall in every case, and read them.
 
@@ -106,7 +106,7 @@ def study(
     return found
 
 
-def _asked(folder: Path, case: Case, protocol: Protocol, drops: int) -> Asked:
+def _asked(folder: Path, case: WorldCase, protocol: Protocol, drops: int) -> Asked:
     url = with_setting(
         "sim://?dynamics=resolved", "protocol", str((folder / case.protocol).resolve())
     )
@@ -120,7 +120,7 @@ def _asked(folder: Path, case: Case, protocol: Protocol, drops: int) -> Asked:
 
 
 @one_thread
-def judge(case: str, protocol: Protocol, session: Sequence[Fall]) -> list[JudgedDrop]:
+def judge(case: str, protocol: Protocol, session: Sequence[SimulatedDrop]) -> list[JudgedDrop]:
     """Analyse a session and set every drop beside its truth."""
     scale = time_scale(session[0].seed)
     by_run = {fall.drop.run: fall for fall in session}
@@ -128,7 +128,7 @@ def judge(case: str, protocol: Protocol, session: Sequence[Fall]) -> list[Judged
     return [_judged(case, protocol, result, by_run[result.run.number]) for result in found.runs]
 
 
-def _judged(case: str, protocol: Protocol, result: DropResult, fall: Fall) -> JudgedDrop:
+def _judged(case: str, protocol: Protocol, result: DropResult, fall: SimulatedDrop) -> JudgedDrop:
     truth = fall.truth
     errors = {
         name: (measured.value - truth[name], measured.expanded)

@@ -19,7 +19,7 @@ from rig.model import paper
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.bench.falls import Fall
+    from rig.bench.falls import SimulatedDrop
 
     Columns = dict[str, list[float]]
 
@@ -164,7 +164,7 @@ def _asked(
     return Asked(url, range(1, len(inclines) + 1), runs)
 
 
-def _ensemble(name: str, made: Sequence[Fall]) -> Ensemble:
+def _ensemble(name: str, made: Sequence[SimulatedDrop]) -> Ensemble:
     truths = [fall.truth for fall in made]
     tracks = tuple(truth["track"] for truth in truths)
     return Ensemble(
