@@ -22,9 +22,6 @@ T = TypeVar("T")
 AUDIT = tuple(field.name for field in fields(Audit))
 """Counts of edges in the order in which the runs table gives them."""
 
-AUDIT = ("received", "matched", "missed", "spurious", "lost")
-"""Counts of edges in the order in which the runs table gives them."""
-
 
 @dataclass(frozen=True, slots=True)
 class Column(Generic[T]):

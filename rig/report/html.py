@@ -208,7 +208,7 @@ def _table(
     off: Container[int] = (),
     reasons: Sequence[str] = (),
 ) -> str:
-    """Make a table; rows may be struck off, and have reasons."""
+    """Make a table; the rows numbered in `off` are grey, and below a row stands its reason."""
     kept, rows = filled(columns, records)
     sides = [' class="num"' if column.numeric else "" for column in kept]
     head = "".join(
