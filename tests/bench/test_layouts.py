@@ -7,15 +7,19 @@ import json
 from dataclasses import asdict, replace
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rig.bench.falls import SimulatedDrop
 from rig.bench.layout_catalogue import LAYOUTS, STANDARD
 from rig.bench.layouts import DISTURBANCES, Cell, as_json
 from rig.cli import main
 from rig.protocol.measurable import unmeasurable
+from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
 from sim.dials import Dials, read_dials
 from tests.analysis.drops import UNIFORM, case
+from tests.analysis.layouts import layouts
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda one: f"{one.kind.name}: {one.heights}")
@@ -25,6 +29,18 @@ def test_every_layout_is_a_protocol_that_can_be_measured(layout):
     assert len(protocol.gates.gates) == len(layout.impact) + len(layout.free)
     assert (protocol.surface is None) == (layout.kind.scene == "fence")
     assert protocol.two_chains == (layout.kind.scene == "two")
+
+
+@given(layouts(), st.integers(1, 16))
+@settings(max_examples=40)
+def test_every_rod_passes_every_gate_of_any_layout_that_properties_are_tried_on(layout, number):
+    """Undisturbed: two edges each, and nothing else."""
+    protocol = parse(layout.protocol())
+    one = case(protocol, Dials.quiet(), run=min(number, len(planned_runs(protocol))))
+    passages = sorted((channel, rod) for _, channel, _, rod in one.truth.edges)
+    rods = len(protocol.chains["A"].widths)
+    channels = [gate.channel for gate in protocol.gates.gates]
+    assert passages == sorted((c, rod) for c in channels for rod in range(rods) for _ in range(2))
 
 
 def test_from_one_gate_a_side_to_eight():
