@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rig.bench.layout_catalogue import GateLayout
     from rig.protocol.protocol import Protocol, Run
 
-DROPS = 24
+DROPS = 12
 """On each layout with each disturbance, every one on a rig of its own."""
 DISTURBANCES: Mapping[str, Mapping[str, str]] = {
     "quiet": {"quiet": "1"},
