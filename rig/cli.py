@@ -345,6 +345,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     other.add_argument("--drops", type=_count, metavar="N", help="at each incline (default 4)")
     other.add_argument("--only", metavar="TEXT", help="cases with this in their names")
+    other.add_argument(
+        "--work", action="store_true", help="error against run time of that world itself instead"
+    )
     _json(other)
     layouts = benches.add_parser("layouts", help="which layouts of gates let drops be read")
     layouts.set_defaults(module="bench_layouts")

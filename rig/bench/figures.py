@@ -50,6 +50,8 @@ _LONGEST_LABEL = 24
 _VOID_DARKEST = 0.2
 """Share of void drops from which on a layout is drawn as dark as can be."""
 _SHADES = "Oranges"
+_WORLD_ERROR_MM = 0.1
+"""Of Δz, that the resolved world may make before its falls are chaotic."""
 _STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), ("v", INK))
 
 
@@ -290,6 +292,40 @@ def resolved_figure(drops: Sequence[JudgedDrop]) -> str:
         foot.set_xlabel("inclination of the surface (°); bars are U95, cases side by side")
         handles, labels = panels[0].get_legend_handles_labels()
         drawing.figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=7.0)
+    return drawing.svg
+
+
+def work_figure(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Draw error against run time of the resolved world.
+
+    Parameters
+    ----------
+    lines
+        As `rig.bench.resolved.work` gives them.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    kinds = (
+        ("step", "step (s); touches last 0.2 ms", "o", MODEL, "step_s", 1.0),
+        ("touch", "length of touches (ms); step in proportion", "s", SECOND, "touch_s", 1e3),
+    )
+    with canvas((3.6,), simulated=False) as drawing:
+        (panel,) = drawing.axes
+        for kind, label, marker, color, field, scale in kinds:
+            some = [one for one in lines if one["changed"] == kind and one["rms_m"] > 0.0]
+            times, errors = [one["cpu_s"] for one in some], [1e3 * one["rms_m"] for one in some]
+            panel.plot(times, errors, color=color, marker=marker, markersize=4.5, label=label)
+            for time, error, one in zip(times, errors, some, strict=True):
+                panel.annotate(f" {scale * one[field]:g}", (time, error), fontsize=8, color=color)
+        panel.axhline(_WORLD_ERROR_MM, color=MUTED, linestyle=":", linewidth=1.2)
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_xlabel("processor time of a fall of three rods, four at once (s)")
+        panel.set_ylabel("rms error of Δz at the strike (mm)")
+        panel.legend(loc="best")
     return drawing.svg
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
+import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
+from subprocess import PIPE, run
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
@@ -14,8 +17,9 @@ from rig.analysis.session import analyze
 from rig.bench.accuracy import Errors
 from rig.bench.falls import Asked, falls, time_scale
 from rig.bench.fast_accuracy import with_setting
+from rig.errors import RigError
 from rig.protocol import reader
-from rig.protocol.plan import runs
+from rig.protocol.plan import runs as planned
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -113,8 +117,8 @@ def _asked(folder: Path, case: WorldCase, protocol: Protocol, drops: int) -> Ask
     for name, value in case.settings.items():
         url = with_setting(url, name, value)
     by_incline: dict[float, list[int]] = {}
-    for run in runs(protocol):
-        by_incline.setdefault(run.incline_deg, []).append(run.number)
+    for one in planned(protocol):
+        by_incline.setdefault(one.incline_deg, []).append(one.number)
     each = drops if len(by_incline) > 1 else 3 * drops
     return Asked(url, [1], [sorted(n for some in by_incline.values() for n in some[:each])])
 
@@ -199,3 +203,18 @@ def _inclined(drops: Sequence[JudgedDrop], incline: float) -> dict[str, Any]:
 def _by_case(drops: Sequence[JudgedDrop]) -> Iterator[tuple[str, list[JudgedDrop]]]:
     for name in dict.fromkeys(one.case for one in drops):
         yield name, [one for one in drops if one.case == name]
+
+
+def work() -> list[dict[str, Any]]:
+    """Measure error against run time of the resolved world's step and touches.
+
+    Raises
+    ------
+    RigError
+        The simulation gave up.
+    """
+    command = [sys.executable, "-m", "sim.work_precision"]
+    done = run(command, stdout=PIPE, text=True, check=False)  # noqa: S603 - our own
+    if done.returncode:
+        raise RigError(f"the simulation ended with exit code {done.returncode}")
+    return [json.loads(line) for line in done.stdout.splitlines()]

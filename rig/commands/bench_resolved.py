@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import resolved_figure
-from rig.bench.resolved import CASES, DROPS, as_json, study
+from rig.bench.figures import resolved_figure, work_figure
+from rig.bench.resolved import CASES, DROPS, as_json, study, work
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
-from rig.measurands import MEASURANDS
+from rig.measurands import told
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
@@ -21,13 +21,15 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-_SHOWN_REASONS = 12
+_SHOWN_REASONS = 16
 _TOLD = ("separation_m", "separation_strike_m", "speed_m_s", "speed_strike_m_s", "release_skew_s",
          "contact_height_m", "turning_rad_s", "slack")  # fmt: skip
 
 
 def main(arguments: Namespace) -> int:
     """Read sessions of the resolved world; keep table, picture and page, and print the table."""
+    if arguments.work:
+        return _work(arguments)
     wanted = arguments.only or ""
     chosen = [one for one in CASES if wanted in one.name]
     if not chosen:
@@ -45,6 +47,25 @@ def main(arguments: Namespace) -> int:
         print_json(whole)
     else:
         print("\n".join(["SIMULATED DATA", *lines]))
+    return 0
+
+
+def _work(arguments: Namespace) -> int:
+    """Keep and print error against run time of the world itself."""
+    folder = make_folder(arguments.output)
+    lines = work()
+    write_atomic(folder / "resolved-work.csv", csv_text(lines[0], lines))
+    write_atomic(folder / "resolved-work.svg", work_figure(lines))
+    if arguments.json:
+        print_json({"settings": lines})
+        return 0
+    rows = [["", "step (µs)", "touch (ms)", "rms error of Δz (mm)", "worst", "time a fall (s)"]]
+    rows += [
+        [one["changed"], f"{1e6 * one['step_s']:g}", f"{1e3 * one['touch_s']:g}",
+         f"{1e3 * one['rms_m']:.4f}", f"{1e3 * one['worst_m']:.4f}", f"{one['cpu_s']:.2f}"]
+        for one in lines
+    ]  # fmt: skip
+    print("\n".join(text_table(rows, left={0}, rule=True)))
     return 0
 
 
@@ -87,9 +108,7 @@ def _truths(one: Record) -> str:
 
 
 def _table(records: Sequence[Record], name: Any) -> list[str]:
-    shown = [
-        row for row in MEASURANDS.values() if any(row.name in one["quantities"] for one in records)
-    ]
+    shown = [row for row in told() if any(row.name in one["quantities"] for one in records)]
     head = ["", "drops", "void", "wrong"]
     for row in shown:
         head += [f"{row.label} rms ({row.fine})", "bias", "in U95"]

@@ -126,3 +126,22 @@ def test_a_figure_without_falls_says_so(tmp_path, capsys):
     target = str(tmp_path / "figure.svg")
     assert main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
     assert "figures 3 and 4" in capsys.readouterr().err
+
+
+WORK = [
+    {"changed": changed, "step_s": step, "touch_s": touch, "rms_m": rms, "worst_m": 2 * rms,
+     "cpu_s": cpu}
+    for changed, step, touch, rms, cpu in (
+        ("step", 1e-5, 2e-4, 2e-5, 1.0), ("step", 5e-6, 2e-4, 5e-6, 2.0),
+        ("touch", 1e-5, 2e-4, 1e-4, 1.0), ("touch", 5e-6, 1e-4, 0.0, 2.0),
+    )
+]  # fmt: skip
+
+
+def test_error_against_run_time_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(bench_resolved, "work", lambda: WORK)
+    assert main(["bench", "resolved", "--work", "-o", str(tmp_path)]) == 0
+    assert "0.0200" in capsys.readouterr().out
+    with (tmp_path / "resolved-work.csv").open(newline="") as table:
+        assert [float(row["rms_m"]) for row in csv.DictReader(table)] == [2e-5, 5e-6, 1e-4, 0.0]
+    ET.fromstring((tmp_path / "resolved-work.svg").read_text())
