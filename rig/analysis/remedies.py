@@ -8,28 +8,41 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+_COMPARE = (
+    "hold what hangs there against rig check PROTOCOL: chain, drop, incline, gates' heights and "
+    "channels"
+)
+_ADD_GATE = "add a gate near the contact point, or move one: rig design PROTOCOL says where"
 _REMEDIES: tuple[tuple[str, str], ...] = (
+    ("likeliest, but not clearly", _COMPARE),  # names several things, of which one may be true
     ("in the wrong way round", "exchange the two plugs, or their channels in the protocol"),
     ("upside down", "turn the chain round"),
+    ("on each other's side", "exchange the two chains, or hang them as the run asks for"),
     (
         r"has \d+ rods, not",
         "hang the chain that the protocol describes, or write its rods into the protocol",
     ),
+    ("(longer|shorter) than", "measure the chain's length again and write it into the protocol"),
+    (
+        "gates are .* (higher|lower)",
+        "measure the gates from the contact point, not from the board, and write that",
+    ),
+    ("post is .* (higher|lower)", "measure that post's zero against the other post's"),
+    ("chains hang .* (higher|lower)", "measure the drop again and write it into the protocol"),
+    ("clock is", "say how well the timer's clock is known, or compare it: rig import --help"),
+    ("gravity is", "look up gravity for your latitude and height: site: in the protocol"),
+    ("inclin", "set the board to the run's incline"),
     ("gave no edges", "plug the gate in, and see that it changes when a hand is in its beam"),
     (
         "sees something else",
         "clear the gate's beam and align it, or measure its height again",
     ),
-    ("off its height", "measure the gate's height again and write it into the protocol"),
     (
-        "ambiguous",
-        "add a gate near the contact point, or move one: rig design PROTOCOL says where",
+        "off its height|gate on channel .* (higher|lower) than",
+        "measure the gate's height again and write it into the protocol",
     ),
-    (
-        "does not look like",
-        "hold what hangs there against rig check PROTOCOL: chain, drop, incline, gates' heights "
-        "and channels",
-    ),
+    ("ambiguous|fit two falls", _ADD_GATE),
+    ("does not look like", _COMPARE),
     (
         "edges missed",
         "align the gates' beams with the chains; rig report SESSION shows which gate misses most",

@@ -40,6 +40,27 @@ def test_every_void_drop_is_told_with_its_reasons_and_what_to_do():
     assert void_lines(Analysis((void(1, 1, verdict="marginal"),), (), ())) == []
 
 
+@pytest.mark.parametrize(
+    ("reason", "what"),
+    [
+        ("the gate on channel 2 (impact side, 70 mm) gave no edges: it is dead", "plug"),
+        ("the gate on channel 2 (free side, 70 mm) is 3.1 ± 0.4 mm higher than it says", "gate's"),
+        ("the gate on channel 2 (free side, 70 mm) is off its height by 9 times", "gate's"),
+        ("all gates are 9.8 ± 0.4 mm lower above the contact point", "contact point"),
+        ("the free side's post is 2.0 ± 0.1 mm higher than the protocol says", "zero"),
+        ("the chains hang 9.8 ± 0.4 mm higher above the contact point", "the drop"),
+        ("chain A is 11.7 ± 0.4 mm longer than the protocol says", "length"),
+        ("chain A on the free side has 24 rods, not 25 as the protocol says", "its rods"),
+        ("chains A and B hang on each other's side", "two chains"),
+        ("likeliest, but not clearly: chain A is 1 mm longer; or gravity is 1 % less", "rig check"),
+        ("no certificate: the device did not close the record", "selftest"),
+        ("5 of 660 events missing, from number 3", "selftest"),
+    ],
+)
+def test_each_reason_has_its_remedy(reason, what):
+    assert what in remedy(reason)
+
+
 def test_what_nobody_foresaw_has_a_general_remedy_if_it_is_all_there_is():
     assert remedies(["moths", "a lorry"]) == [ELSE]
     assert remedies(["moths", SKEW, SKEW]) == [remedy(SKEW)] != [ELSE]
