@@ -40,6 +40,7 @@ IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""
 _ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
+_PATIENT = 6  # rounds after which a step back is no part of finding the way
 _DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
 _LEAST = {"floor": 5e-6}  # where others of its kind count for more
@@ -148,7 +149,7 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit:
     drops = [_begin(fit, shared) for fit in fits]
     x = _average(drops, shared)
     evidence = Evidence(STATED)
-    settled, moved = False, 0.0
+    settled, moved, damping, previous = False, 0.0, 1.0, np.zeros(len(shared))
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
         for drop in drops:
@@ -159,9 +160,16 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit:
                 drop.matches = match(drop.model, drop.x)
             sd[drop.here] = drop.model.unknowns.sd[drop.common]
         # At first the common unknowns are not yet what a drop's own go with: all may be far off.
-        covariance, step = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
-        x = x + step * sd
-        last, moved = moved, float((np.abs(step) / np.sqrt(np.diag(covariance))).max())
+        cut = STRAY if round_ else math.inf
+        covariance, step = joint_step(drops, x, sd, cut=cut, damping=damping)
+        x = x + damping * step * sd
+        ahead = step / np.sqrt(np.diag(covariance))
+        last, moved = moved, damping * float(np.abs(ahead).max())
+        # An edge at the very moment of an impact has a slope on either side: steps go to and fro
+        # over the best place, which lies between them.
+        if round_ > _PATIENT and ahead @ previous < 0.0:
+            damping *= 0.5
+        previous = ahead
         before = evidence.components
         evidence = _weigh(evidence, shared, x, sd, covariance, drops)
         # As long as steps get shorter alike, the next one is that of the last times their ratio.

@@ -75,6 +75,7 @@ def joint_step(
     sd: Array,
     centre: Array | None = None,
     cut: float = STRAY,
+    damping: float = 1.0,
 ) -> tuple[Array, Array]:
     """Take one Gauss–Newton step of all drops together; moves their own unknowns in place.
 
@@ -86,11 +87,13 @@ def joint_step(
         Prior means of the common unknowns, zero if not given.
     cut
         As for `rig.analysis.equations.normal_equations`.
+    damping
+        Which share of the step is taken.
 
     Returns
     -------
     covariance, step
-        Of the common unknowns, in units of `sd`.
+        Of the common unknowns, in units of `sd`; the whole step.
     """
     total = np.eye(x.size)
     vector = scaled(-x if centre is None else centre - x, sd)
@@ -105,9 +108,10 @@ def joint_step(
     for drop in drops:
         assert drop.reduced is not None
         scale = drop.model.unknowns.sd[drop.own]
-        drop.x[drop.own] += scale * (drop.reduced.own - drop.reduced.gain @ step[drop.here])
+        own = drop.reduced.own - drop.reduced.gain @ step[drop.here]
+        drop.x[drop.own] += damping * scale * own
         # Its copy of the common unknowns follows, so that the next equations are made there.
-        drop.x[drop.common] = (x + step * sd)[drop.here]
+        drop.x[drop.common] = (x + damping * step * sd)[drop.here]
     return covariance, step
 
 
