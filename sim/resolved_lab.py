@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
+from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +37,8 @@ BLOCK = 12
 """Runs whose falls are made together: by themselves they would take ten times as long each."""
 TRACK_S = 1 / 960
 """Between two moments of the track: half a frame of the paper's camera."""
+FEW = 20
+"""Chains are few below twice this: a process more would cost more than it saves."""
 ROD_LENGTH = 0.102
 """Of the paper's chains, m, where a protocol does not say it."""
 
@@ -204,8 +210,9 @@ class ResolvedLab(ChainLab):
                 rods, self.protocol.chains[run.impact], hang[0], swing, spin, run.incline_deg
             )
         if run.free is not None:
-            rods, swing, spin = self._hang("free", run.free, run, attempt)
-            found["free"] = self._chain(rods, self.protocol.chains[run.free], hang[1], swing, spin)
+            # Without its swing, which no beam sees: so it falls by a formula, whatever its length.
+            rods, _, spin = self._hang("free", run.free, run, attempt)
+            found["free"] = self._chain(rods, self.protocol.chains[run.free], hang[1], spin=spin)
         return found
 
     def _nominal(self, spec: RodChain) -> Rods:
@@ -369,11 +376,22 @@ def make_ahead(wanted: Iterable[tuple[ChainLab, Sequence[int]]]) -> None:
                     groups.setdefault(group, []).append((lab, label, chain))
     falls: dict[tuple[int, int], tuple[ResolvedLab, dict[Side, Fall]]] = {}
     for (side, _, step), members in groups.items():
-        found = fall([chain for _, _, chain in members], step=step)
+        found = _fall_together([chain for _, _, chain in members], step)
         for (lab, label, _), one in zip(members, found, strict=True):
             falls.setdefault((id(lab), label), (lab, {}))[1][side] = one
     for (_, label), (lab, sides) in falls.items():
         lab.keep(label, lab.made(label, sides))
+
+
+def _fall_together(chains: Sequence[Chain], step: float) -> list[Fall]:
+    """Let chains fall in several processes where there are many; that changes no bit of a fall."""
+    parts = min(os.cpu_count() or 1, len(chains) // FEW)
+    if parts < 2:
+        return fall(chains, step=step)
+    pieces = [chains[first::parts] for first in range(parts)]
+    with ProcessPoolExecutor(parts, get_context("spawn")) as pool:
+        done = list(pool.map(partial(fall, step=step), pieces))
+    return [done[n % parts][n // parts] for n in range(len(chains))]
 
 
 def _bounce(surface: Surface, dials: Dials, world: ResolvedDials) -> Bounce:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +18,10 @@ from rig.protocol import reader
 from rig.results import detailed
 from rig.runner import Operator, run_protocol
 from rig.session.store import Session
-from sim import fall_cache
+from sim import fall_cache, resolved_lab
 from sim.dials import Dials, read_dials
 from sim.edges import Request, falls
+from sim.resolved.fall import fall
 from sim.resolved_dials import NAMES, ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
 from sim.scene import choose_world, set_scene
@@ -104,8 +107,6 @@ def test_truth_at_level_and_at_strike(dropped):
 
 def test_a_rod_that_strikes_early_is_followed_to_the_level(dropped):
     lab, _, _ = dropped
-    from sim.resolved.fall import fall
-
     (struck,) = fall([lab.chains(pack_label(1, 1))["impact"]], step=lab.step)
     struck.touched_height[-1], struck.top_speed = 0.02, 4.0
     time_s, speed = at_level(struck, GRAVITY)
@@ -126,6 +127,25 @@ def test_a_drop_comes_out_the_same_alone_again_and_from_the_disk(dropped, monkey
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(ResolvedLab, "_block", lambda self, label: [label])
     assert again() == edges[1]
+
+
+def test_a_drop_comes_out_the_same_from_several_processes(dropped, monkeypatch, tmp_path):
+    lab, _, edges = dropped
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(resolved_lab, "FEW", 1)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    twin = ResolvedLab(lab.protocol, lab.dials, 3, world=lab.world)
+    labels = [pack_label(run, 1) for run in (1, 2)]
+    resolved_lab.make_ahead([(twin, labels)])
+    assert [twin.drop(label) for label in labels] == edges
+
+
+def test_a_scene_without_a_board_costs_little():
+    fence = reader.read(Path(__file__).parents[2] / "protocols/picket-fence.yaml")
+    lab = ResolvedLab(fence, Dials(), 3, world=ResolvedDials())
+    chain = lab.chains(pack_label(1, 1))["free"]
+    (found,) = fall([chain], step=lab.step)
+    assert found.frames_s.size == 0  # not one step: the whole way down is a formula
 
 
 def test_what_was_kept_for_other_parameters_is_not_taken(dropped):
