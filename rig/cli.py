@@ -346,6 +346,9 @@ def _parser() -> argparse.ArgumentParser:
     other.add_argument("--drops", type=_count, metavar="N", help="at each incline (default 4)")
     other.add_argument("--only", metavar="TEXT", help="cases with this in their names")
     other.add_argument(
+        "--film", type=float, metavar="DEG", help="draw one fall at this incline instead"
+    )
+    other.add_argument(
         "--work", action="store_true", help="error against run time of that world itself instead"
     )
     _json(other)

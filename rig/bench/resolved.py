@@ -55,6 +55,8 @@ CASES = (
     WorldCase("graded, air", GRADED, {"drag": "0.03"}),
 )
 """One difference at a time; the first and the seventh are the world's defaults."""
+PICTURES = 6
+"""Of a fall that is drawn."""
 _NUMBER = re.compile(r"[-+−]?\d[\d.,]*(?:e[-+]?\d+)?")
 
 
@@ -213,8 +215,34 @@ def work() -> list[dict[str, Any]]:
     RigError
         The simulation gave up.
     """
-    command = [sys.executable, "-m", "sim.work_precision"]
-    done = run(command, stdout=PIPE, text=True, check=False)  # noqa: S603 - our own
+    return [json.loads(line) for line in _told("sim.work_precision").splitlines()]
+
+
+def film(folder: str, incline_deg: float) -> dict[str, Any]:
+    """Let the uniform chain fall onto a board once, to be drawn.
+
+    Returns
+    -------
+    dict
+        As `sim.film` prints it.
+
+    Raises
+    ------
+    RigError
+        The simulation gave up.
+    """
+    path = Path(folder) / UNIFORM
+    number = next(
+        one.number for one in planned(reader.read(path)) if one.incline_deg == incline_deg
+    )
+    url = with_setting("sim://?dynamics=resolved", "protocol", str(path.resolve()))
+    found: dict[str, Any] = json.loads(_told("sim.film", url, str(number), str(PICTURES)))
+    return found
+
+
+def _told(module: str, *words: str) -> str:
+    """Return what a module of the simulation prints."""
+    done = run([sys.executable, "-m", module, *words], stdout=PIPE, text=True, check=False)  # noqa: S603 - our own
     if done.returncode:
         raise RigError(f"the simulation ended with exit code {done.returncode}")
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    return done.stdout

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import resolved_figure, work_figure
-from rig.bench.resolved import CASES, DROPS, as_json, study, work
+from rig.bench.figures import film_figure, resolved_figure, work_figure
+from rig.bench.resolved import CASES, DROPS, as_json, film, study, work
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
@@ -30,6 +30,12 @@ def main(arguments: Namespace) -> int:
     """Read sessions of the resolved world; keep table, picture and page, and print the table."""
     if arguments.work:
         return _work(arguments)
+    if arguments.film is not None:
+        folder = make_folder(arguments.output)
+        drawn = film_figure(film(arguments.protocols, arguments.film))
+        write_atomic(folder / "resolved-fall.svg", drawn)
+        say(f"{folder / 'resolved-fall.svg'}")
+        return 0
     wanted = arguments.only or ""
     chosen = [one for one in CASES if wanted in one.name]
     if not chosen:

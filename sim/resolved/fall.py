@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sim.resolved.scene import Chain, Numbers
 
 STEP = 1e-5
-"""s; see ``rig bench resolved`` for the error that this leaves and what smaller ones cost."""
+"""s; ``rig bench resolved --work`` shows the error that this leaves and what smaller ones cost."""
 SAMPLE = 5
 """Steps between two samples."""
 FRAME = 100

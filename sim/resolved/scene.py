@@ -164,7 +164,7 @@ class Fall:
     slack
         Mean share of strings that are slack while the chain strikes.
     turning
-        Root mean square rate of turning of the rods above, as the top rod strikes, rad/s.
+        Rate of turning of rods that had touched nothing before, as the top rod strikes, rad/s.
     """
 
     times: Numbers

@@ -10,10 +10,12 @@ from dataclasses import replace
 import pytest
 
 from rig.bench import resolved_paper
+from rig.bench.figures import film_figure
 from rig.bench.resolved import CASES, JudgedDrop, as_json, summary
 from rig.bench.resolved_paper import Ensemble
 from rig.cli import main
 from rig.commands import bench_resolved
+from rig.report.canvas import SECOND
 
 TWO = """
 protocol: 1
@@ -145,3 +147,19 @@ def test_error_against_run_time_is_kept_and_drawn(tmp_path, monkeypatch, capsys)
     with (tmp_path / "resolved-work.csv").open(newline="") as table:
         assert [float(row["rms_m"]) for row in csv.DictReader(table)] == [2e-5, 5e-6, 1e-4, 0.0]
     ET.fromstring((tmp_path / "resolved-work.svg").read_text())
+
+
+def test_a_fall_is_drawn(tmp_path, monkeypatch):
+    found = {
+        "incline_deg": 40.0, "board_m": -0.02, "times_s": [0.19, 0.2], "radii_m": [0.006] * 2,
+        "left": [[[-0.05, 0.0, 0.1], [-0.05, 0.0, 0.15]]] * 2,
+        "right": [[[0.05, 0.0, 0.08], [0.05, 0.0, 0.17]]] * 2,
+        "rest_m": [[0.05], [0.1]],
+    }  # fmt: skip
+    monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: found)
+    assert main(["bench", "resolved", "--film", "40", "-o", str(tmp_path)]) == 0
+    drawn = (tmp_path / "resolved-fall.svg").read_text()
+    ET.fromstring(drawn)
+    assert SECOND in drawn  # the right string is shorter than at rest
+    tight = film_figure(found | {"rest_m": [[0.05], [0.09]]})
+    assert SECOND not in tight

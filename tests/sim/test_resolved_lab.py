@@ -21,6 +21,7 @@ from rig.session.store import Session
 from sim import fall_cache, resolved_lab
 from sim.dials import Dials, read_dials
 from sim.edges import Request, falls
+from sim.film import film
 from sim.resolved.fall import fall
 from sim.resolved_dials import NAMES, ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
@@ -228,3 +229,16 @@ def test_air_takes_from_a_chain_what_the_dial_says(scene):
     chain = lab.chains(pack_label(1, 1))["impact"]
     mean = (chain.drag * chain.rods.masses).sum() / chain.rods.masses.sum()
     assert np.isclose(mean, 0.05, rtol=1e-12)
+
+
+def test_a_film_shows_rods_whole_and_above_the_board(scene):
+    settings = {"protocol": scene, "dynamics": "resolved", "quiet": "1", "yaw_sd": "1 deg"}
+    found = film(settings, 1, 3)
+    left, right = np.array(found["left"]), np.array(found["right"])
+    assert left.shape == right.shape == (3, 4, 3)
+    assert np.linalg.norm(right - left, axis=-1) == pytest.approx(np.full((3, 4), 0.102), abs=1e-6)
+    middle = (left + right) / 2
+    board = found["board_m"] - middle[..., 1] * math.tan(math.radians(found["incline_deg"]))
+    assert (middle[..., 2] > board).all()
+    # 18.8 mm: L/2 sin 12° and r/cos 40°, nearly
+    assert found["board_m"] == pytest.approx(-0.0188, abs=0.2e-3)
