@@ -210,9 +210,11 @@ class ResolvedLab(ChainLab):
                 rods, self.protocol.chains[run.impact], hang[0], swing, spin, run.incline_deg
             )
         if run.free is not None:
-            # Without its swing, which no beam sees: so it falls by a formula, whatever its length.
-            rods, _, spin = self._hang("free", run.free, run, attempt)
-            found["free"] = self._chain(rods, self.protocol.chains[run.free], hang[1], spin=spin)
+            rods, swing, spin = self._hang("free", run.free, run, attempt)
+            if self.protocol.surface is None:
+                # Where nothing is struck a fence may hang, which is stiff: strings do not turn it.
+                swing = np.zeros_like(swing)
+            found["free"] = self._chain(rods, self.protocol.chains[run.free], hang[1], swing, spin)
         return found
 
     def _nominal(self, spec: RodChain) -> Rods:

@@ -45,7 +45,7 @@ WOOD = Bounce(0.5, 2e-4, 0.3)
 
 
 def struck(incline: float, seed: int = 1) -> Chain:
-    return Chain(rods(4, spread=1.0, seed=seed), Strings(), DROP, GRAVITY, board(incline), WOOD)
+    return Chain(rods(3, spread=1.0, seed=seed), Strings(), DROP, GRAVITY, board(incline), WOOD)
 
 
 SCENES = [struck(0.0), struck(40.0, seed=9), struck(60.0, seed=8)]
@@ -54,7 +54,7 @@ SCENES = [struck(0.0), struck(40.0, seed=9), struck(60.0, seed=8)]
 @pytest.fixture(scope="module")
 def falls() -> dict[float, list[Fall]]:
     """The same three falls with two steps."""
-    return {step: fall(SCENES, step=step, after=3e-3) for step in (1e-5, 5e-6)}
+    return {step: fall(SCENES, step=step, after=1e-3) for step in (1e-5, 5e-6)}
 
 
 @pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9, 1.0])
@@ -110,7 +110,7 @@ def test_energy_never_grows_and_what_goes_is_accounted_for(falls):
     for step, some in falls.items():
         for found in some:
             assert np.diff(found.energy).max() < 1e-12 * found.energy[0]
-            assert min(found.lost.values()) >= 0.0
+            assert min(found.lost.values()) > -1e-15  # without air there is rounding alone
         spent = [found.energy[0] - found.energy[-1] for found in some]
         gaps = [sum(one.lost.values()) / e - 1 for one, e in zip(some, spent, strict=True)]
         assert max(map(abs, gaps)) < 0.02 * (step / 1e-5) ** 2
@@ -121,7 +121,7 @@ def test_energy_never_grows_and_what_goes_is_accounted_for(falls):
 
 def test_momentum_is_what_gravity_and_board_give(falls):
     for found in falls[1e-5]:
-        fallen = -4 * MASS * GRAVITY * found.frames_s
+        fallen = -3 * MASS * GRAVITY * found.frames_s
         assert np.abs(found.momentum[:, 2] - fallen).max() < 1e-12
         assert np.abs(found.momentum[:, :2]).max() < 1e-12
         assert found.board_impulse[2] > 0.0
@@ -168,14 +168,14 @@ def test_one_rods_impact_in_the_papers_limit():
 def test_the_step_converges_before_rods_strike_rods():
     """Errors of the top rod's height after the first impact fall with the square of the step."""
     chain = replace(SCENES[1], touching=None)
-    ends = math.sqrt(2 * DROP / GRAVITY) + 4e-3
+    ends = math.sqrt(2 * DROP / GRAVITY) + 3e-3
 
     def height(step: float) -> float:
         (found,) = fall([chain], until=ends, step=step)
         gained = found.heights[:, -1] + 0.5 * GRAVITY * found.times**2
         return float(np.interp(ends - 1e-4, found.times, gained))
 
-    exact = height(1e-6)
+    exact = height(1.25e-6)
     errors = [abs(height(step) - exact) for step in (1e-5, 5e-6)]
     assert errors[0] < 0.1e-3 / 4  # of Δz, shared by the impacts before chaos
     assert math.log2(errors[0] / errors[1]) > 1.5
@@ -188,17 +188,25 @@ def test_a_stiffer_string_needs_a_shorter_step():
 
 
 def test_error_against_run_time(monkeypatch):
-    for name, value in {
-        "RODS": 2,
-        "INCLINES": (60.0,),
-        "STEPS": (1e-5, 4e-6),
-        "REFERENCE": 4e-6,
-        "TIMES": (0.4e-3, 0.2e-3),
-        "DROP": 0.6,
-    }.items():
-        monkeypatch.setattr(work_precision, name, value)  # fmt: skip
-    coarse, same, soft, hard = work_precision.settings()
-    assert 0.0 < coarse["rms_m"] <= coarse["worst_m"] < 0.1e-3
-    assert coarse["cpu_s"] < same["cpu_s"]
-    assert same["worst_m"] == hard["worst_m"] == 0.0
-    assert soft["worst_m"] > 0.0
+    """Each setting is held against the finest step, or the shortest touch."""
+
+    def made_up(chains: list[Chain], step: float) -> tuple[list[float], float]:
+        touch = chains[0].board.bounce.time_s
+        return [0.1 + 100.0 * step**2 + touch], 1.0 / step
+
+    monkeypatch.setattr(work_precision, "separations", made_up)
+    lines = list(work_precision.settings())
+    steps = [one for one in lines if one["changed"] == "step"]
+    assert [one["step_s"] for one in steps] == list(work_precision.STEPS)
+    for one in steps:
+        wanted = 100.0 * (one["step_s"] ** 2 - work_precision.REFERENCE**2)
+        assert one["rms_m"] == one["worst_m"] == pytest.approx(wanted, rel=1e-6)
+    touches = [one for one in lines if one["changed"] == "touch"]
+    assert [one["touch_s"] for one in touches] == list(work_precision.TIMES)
+    assert touches[-1]["rms_m"] == 0.0 < touches[0]["rms_m"]
+
+
+def test_chains_of_the_study_strike_boards():
+    found, spent = work_precision.separations(work_precision.chains()[-1:], 1.6e-5)
+    assert 0.0 < found[0] < 5e-3  # at 70° two of three rods pull a little
+    assert spent > 0.0

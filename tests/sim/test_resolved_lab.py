@@ -242,3 +242,17 @@ def test_a_film_shows_rods_whole_and_above_the_board(scene):
     assert (middle[..., 2] > board).all()
     # 18.8 mm: L/2 sin 12° and r/cos 40°, nearly
     assert found["board_m"] == pytest.approx(-0.0188, abs=0.2e-3)
+
+
+def test_a_free_chain_swings_too(scene):
+    still, swinging = (
+        ResolvedLab(
+            reader.read(scene), Dials.quiet(), 3,
+            world=read_resolved_dials({"quiet": "1", "swing_sd": f"{speed} m/s"}),
+        ).chains(pack_label(1, 1))
+        for speed in (0.0, 0.1)
+    )  # fmt: skip
+    for side in ("impact", "free"):
+        assert not still[side].swing.any()
+        speeds = np.abs(swinging[side].swing)
+        assert speeds[0] > speeds[1] > speeds[2] > speeds[3] == 0.0  # it hangs by its top
