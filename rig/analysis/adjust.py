@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
     Matches = Mapping[str, Sequence[Index]]
 
-_STEPS = 60
+STEPS = 60
+"""Of an adjustment, which a good one never needs."""
 DONE = 1e-3
 """Of a standard uncertainty: a step so short is the last, for the next one is shorter again."""
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
@@ -78,6 +79,7 @@ def adjust(
     x: Array,
     centre: Array | None = None,
     done: float = DONE,
+    steps: int = STEPS,
 ) -> Estimate:
     """Find the unknowns that fit all matched edges best.
 
@@ -93,6 +95,8 @@ def adjust(
         Prior means of the unknowns, zero if not given.
     done
         How short a step is the last, see `length`.
+    steps
+        How many there are at most.
     """
     sd = model.unknowns.sd
     y = scaled(x, sd)
@@ -102,7 +106,7 @@ def adjust(
     chi2, edges, moved = 0.0, 0, 0.0
     inflation = 1.0
     settled = False
-    for step in range(_STEPS):
+    for step in range(steps):
         found = normal_equations(model, matches, y * sd, sd, inflation)
         data = found.matrix
         information = data + identity

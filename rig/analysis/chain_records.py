@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rig.errors import DomainError
 from rig.model.fall import kicks
+from rig.model.impact import impact_on
 from rig.model.rods import rod_impacts
 
 if TYPE_CHECKING:
@@ -113,12 +115,15 @@ class ChainRecord:
     ratios
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, shape ``(rods,)``; `None` for a chain
         that strikes nothing.
+    alpha
+        Of its impacts as the model expects it; 0 for a chain that strikes nothing.
     """
 
     role: Literal["impact", "free"]
     chain: RodChain
     trains: tuple[EdgeTrain, ...]
     ratios: Array | None = None
+    alpha: float = 0.0
 
     @property
     def expected(self) -> int:
@@ -180,12 +185,14 @@ def _passages(
 
 def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[ChainRecord]:
     """Collect each chain with the trains of its gates."""
-    return [
-        ChainRecord(
-            role, chain, trains, _ratios(protocol, chain.chain) if role == "impact" else None
-        )
-        for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop, hz))
-    ]
+    found = []
+    for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop, hz)):
+        if role == "free":
+            found.append(ChainRecord(role, chain, trains))
+        else:
+            ratios = _ratios(protocol, chain.chain)
+            found.append(ChainRecord(role, chain, trains, ratios, _alpha(protocol, chain, run)))
+    return found
 
 
 def edge_trains(
@@ -213,3 +220,12 @@ def _ratios(protocol: Protocol, chain: Chain) -> Array:
     # γ is the same at every incline, and level ground is always inside the domain of Eq. 13.
     gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain, 0.0)]
     return np.array(kicks(chain, [1.0] * chain.rods, gammas))
+
+
+def _alpha(protocol: Protocol, chain: RodChain, run: Run) -> float:
+    """α that the model expects, all rods taken together; 0 where it has none."""
+    assert protocol.surface is not None
+    try:
+        return impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
+    except DomainError:
+        return 0.0

@@ -1,9 +1,8 @@
 """What is wrong with the rig, by the edges: dead and exchanged gates, chains of other rods.
 
 It is said and never fitted away: a drop whose gates or chains are not those of the protocol is
-void, with the fault as its reason. An adjusted drop is diagnosed by what the adjustment left over
-(`diagnose`); where the edges are not even like the chain falling, one fault after another is tried
-(`diagnose_pattern`).
+void, with the fault as its reason. An adjusted drop is diagnosed by what the adjustment left over;
+`rig.analysis.explanations` weighs what is suspected against all else that it may be.
 """
 
 from __future__ import annotations
@@ -15,21 +14,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.align import align, possible
-from rig.analysis.chain_records import EdgeTrain, chain_records
+from rig.analysis.chain_records import EdgeTrain
 from rig.analysis.equations import scaled
-from rig.analysis.pattern import guess
+from rig.analysis.explanations import exchanged, name_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rig.analysis.chain_records import ChainRecord
     from rig.analysis.fit import Fit
-    from rig.analysis.pattern import Guess
     from rig.analysis.trajectory import Trajectory
-    from rig.protocol.protocol import Gate, Protocol, RodChain, Run
-    from rig.records import Drop
+    from rig.protocol.protocol import Gate
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -43,19 +39,24 @@ IMPLAUSIBLE = 6.0
 evenly spaced, an exchanged gate is fitted well at a wrong height."""
 RIGHT = 0.8
 """Share that says that it was exchanged with another."""
-CONVINCING = 0.85
-"""Share of the expected edges that must be where a suspicion puts them."""
-_LEAD = 0.1  # by which it must exceed the next best
 _WIDTH = 1e-3  # m: how far off an edge of another gate or rod may be
+_SOME = 3  # edges expected of a gate that say too little when they are missing
 _ENOUGH = 3  # gates that must agree on how many rods there are
 _MOST = 3  # rods by which a chain may differ
 
 
 class Diagnosis(NamedTuple):
-    """What is wrong, in words: beyond use, and worth a remark."""
+    """What is wrong, in words: beyond use, and worth a remark.
+
+    Attributes
+    ----------
+    suspects
+        Numbers of the gates that see something else than they should.
+    """
 
     void: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    suspects: tuple[int, ...] = ()
 
 
 def diagnose(fit: Fit) -> Diagnosis:
@@ -80,7 +81,8 @@ def diagnose(fit: Fit) -> Diagnosis:
         if gate.train.gate in found:
             continue
         if gate.strange:
-            void.append(
+            # Two edges may be missed by chance, and a gate without any bears on nothing.
+            (void if gate.match.size > _SOME else doubts).append(
                 f"{name} sees something else than this chain: only {gate.share:.0%} of its "
                 "expected edges are there"
             )
@@ -88,7 +90,7 @@ def diagnose(fit: Fit) -> Diagnosis:
             void.append(f"{name} is off its height by {gate.off:.0f} times its uncertainty")
     for role in fit.model.records:
         void += _rods(fit, role, [gate for gate in alive if gate.role == role])
-    return Diagnosis(tuple(void), tuple(doubts))
+    return Diagnosis(tuple(void), tuple(doubts), tuple(gate.train.gate for gate in suspect))
 
 
 class _Seen(NamedTuple):
@@ -134,16 +136,6 @@ def _gates(fit: Fit) -> list[_Seen]:
 def _gate(fit: Fit, train: EdgeTrain) -> Gate:
     assert fit.model.protocol.gates is not None
     return fit.model.protocol.gates.gates[train.gate]
-
-
-def exchanged(one: Gate, other: Gate) -> str:
-    """Say that two gates changed places."""
-    return f"{name_of(one)} and {name_of(other)} are plugged in the wrong way round"
-
-
-def name_of(gate: Gate) -> str:
-    """Say which gate, so that one can find it."""
-    return f"the gate on channel {gate.channel} ({gate.side} side, {gate.height * 1e3:g} mm)"
 
 
 def _exchanged(fit: Fit, one: _Seen, other: _Seen) -> bool:
@@ -249,83 +241,3 @@ def _above(fit: Fit, gate: _Seen, place: float, width: float) -> EdgeTrain:
         np.array([True, False]),
         np.array([level + width / 2, level - width / 2]),
     )
-
-
-def diagnose_pattern(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    hz: float,
-    records: Sequence[ChainRecord],
-    unlike: Sequence[str],
-) -> list[str]:
-    """Try one fault after another on each side that is unlike its chain, and say which one fits.
-
-    Parameters
-    ----------
-    hz
-        Of the drop's ticks.
-    sides
-        As the protocol has them.
-    unlike
-        Roles of those that do not look like it.
-    """
-    found: list[str] = []
-    for role, record in ((record.role, record) for record in records if record.role in unlike):
-        turned = upside_down(record.chain)
-        if turned is not None:
-            other = replace(protocol, chains={**protocol.chains, record.chain.name: turned})
-            (again,) = (s for s in chain_records(other, run, drop, hz) if s.role == role)
-            if _convincing(_guess(protocol, again)):
-                found.append(f"chain {record.chain.name} hangs upside down on the {role} side")
-                continue
-        found += _plugs(protocol, record)
-    return found
-
-
-def upside_down(chain: RodChain) -> RodChain | None:
-    """Turn a chain round; `None` where that makes no difference."""
-    rods = chain.chain
-    top = rods.heights[-1]
-    heights = tuple(top - height for height in rods.heights[::-1])
-    widths = chain.widths[::-1]
-    alike = all(abs(a - b) < 1e-3 for a, b in zip(heights, rods.heights, strict=True))
-    if alike and widths == chain.widths:
-        return None
-    inertias = rods.inertias and rods.inertias[::-1]
-    turned = replace(rods, masses=rods.masses[::-1], heights=heights, inertias=inertias)
-    return replace(chain, chain=turned, widths=widths)
-
-
-def _plugs(protocol: Protocol, record: ChainRecord) -> list[str]:
-    """Look for the one pair of gates that makes sense when exchanged."""
-    assert protocol.gates is not None
-    tried = []
-    for a, b in combinations(range(len(record.trains)), 2):
-        trains = list(record.trains)
-        trains[a], trains[b] = _saw(trains[a], trains[b]), _saw(trains[b], trains[a])
-        tried.append((_guess(protocol, replace(record, trains=tuple(trains))), a, b))
-    tried.sort(key=lambda one: -one[0].share)
-    if not tried or not _convincing(tried[0][0]):
-        return []
-    # Two exchanges that explain it as well explain nothing.
-    if len(tried) > 1 and tried[0][0].share - tried[1][0].share < _LEAD:
-        return []
-    gates = protocol.gates.gates
-    _, a, b = tried[0]
-    return [exchanged(gates[record.trains[a].gate], gates[record.trains[b].gate])]
-
-
-def _saw(train: EdgeTrain, other: EdgeTrain) -> EdgeTrain:
-    """Give a gate the edges of another."""
-    return replace(
-        train, times=other.times, blocked=other.blocked, burst=other.burst, edge=other.edge
-    )
-
-
-def _guess(protocol: Protocol, record: ChainRecord) -> Guess:
-    return guess(record, protocol.drop, protocol.gravity.value)
-
-
-def _convincing(one: Guess) -> bool:
-    return one.share >= CONVINCING and one.share - one.runner_up >= _LEAD

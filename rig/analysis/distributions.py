@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+_ONCE_IN = 1e-3
 _MANY = 1e6  # beyond this the distribution is normal to the last digit that anybody is shown
 
 
@@ -48,3 +49,19 @@ def chi2_tail(x: float, degrees: int) -> float:
         raise ValueError(f"{degrees} degrees of freedom; at least 1 is needed")
     # The difference of two equally good fits may be below zero by rounding.
     return float(chdtrc(degrees, max(x, 0.0)))
+
+
+@lru_cache(maxsize=1024)
+def most_by_chance(trials: int, share: float) -> int:
+    """Return how many of so many edges are missed at most, but for one drop in a thousand.
+
+    Parameters
+    ----------
+    trials
+        Number of edges.
+    share
+        Chance of each to be missed, independently: their number is binomial.
+    """
+    from scipy.special import bdtrc  # noqa: PLC0415 - see above
+
+    return next(k for k in range(trials + 1) if bdtrc(k, trials, share) < _ONCE_IN)

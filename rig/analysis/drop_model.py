@@ -11,7 +11,6 @@ import numpy as np
 
 from rig.analysis.components import STATED, Components
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
-from rig.analysis.pattern import air_is_told
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -73,6 +72,8 @@ class DropModel:
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters.
+    air
+        Whether κ is an unknown; `None` where that depends on whether these chains tell it.
     """
 
     def __init__(
@@ -82,9 +83,12 @@ class DropModel:
         guesses: Mapping[str, Guess],
         clock_u: float,
         components: Components = STATED,
+        *,
+        air: bool | None = None,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
+        self.air = air_is_told(records) if air is None else air
         self.records: dict[str, ChainRecord] = {record.role: record for record in records}
         self.guesses = guesses
         self.clock_u = clock_u
@@ -118,7 +122,7 @@ class DropModel:
         unknowns.add("drop", "drop height", protocol.drop.u)
         if len(self.records) > 1:
             unknowns.add("side", "hanging height", SIDE_U)
-        if air_is_told([*self.records.values()]):
+        if self.air:
             unknowns.add("drag", "air", DRAG_U)
         unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
         if self._steepest:
@@ -198,6 +202,8 @@ class DropModel:
         starts = [guess.start for guess in self.guesses.values()]
         # Their mean: how much lower each one hangs begins at zero.
         x[self.unknowns["drop"]] = sum(starts) / len(starts) - self.protocol.drop.value
+        clocks = [guess.clock for guess in self.guesses.values()]
+        x[self.unknowns["clock"]] = sum(clocks) / len(clocks)
         if "drag" in self.unknowns:
             x[self.unknowns["drag"]] = max(guess.kappa for guess in self.guesses.values())
         return x
@@ -322,3 +328,8 @@ class DropModel:
             ripple = self._tilts[role] * seen.turn
             slopes[row, local.at[at["ripple"].start + seen.gate]] += ripple
         return Equations(left, slopes, local.columns, len(at))
+
+
+def air_is_told(records: Sequence[ChainRecord]) -> bool:
+    """Whether κ can be told from what is struck: by a free chain, of rods that are all alike."""
+    return len(records) > 1 and all(record.chain.chain.alike for record in records)

@@ -162,8 +162,8 @@ def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
     cut
         Standard deviations beyond which an edge does not count at all.
     """
-    far = np.maximum(np.abs(residuals), np.finfo(float).tiny)
-    found: Array = np.where(far > cut, 0.0, np.minimum(1.0, HUBER / far))
+    far = np.abs(residuals)
+    found: Array = np.where(far > cut, 0.0, HUBER / np.maximum(far, HUBER))
     return found
 
 

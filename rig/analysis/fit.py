@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.adjust import Estimate, adjust
+from rig.analysis.adjust import STEPS, Estimate, adjust
 from rig.analysis.align import align
 from rig.analysis.equations import STRAY
 
@@ -27,6 +27,8 @@ _FINE = 0.5e-3  # m: how far off an adjusted trajectory may
 _NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
 _SAME = 1.0  # standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
+_MEDIAN = 0.6745  # of |normal numbers|, in standard deviations
+_MOST = 1.5  # by which few edges may happen to scatter more
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +67,30 @@ class Fit(Matched):
         return self.estimate.x
 
 
-def settle(model: DropModel) -> Fit:
-    """Match and adjust in turn until that moves the chain no more."""
+def settle(
+    model: DropModel,
+    matches: Matches | None = None,
+    rounds: int = _ROUNDS,
+    steps: int = STEPS,
+) -> Fit:
+    """Match and adjust in turn until that moves the chain no more.
+
+    Parameters
+    ----------
+    matches
+        To begin with; `None` where nothing is matched yet.
+    rounds, steps
+        How often at most, and how many steps each adjustment may take.
+    """
     x = model.first()
-    matches = match(model, x, _COARSE)
+    if matches is None:
+        matches = match(model, x, _COARSE)
     # Not to the end: the matches are about to change.
-    estimate = adjust(model, matches, x, done=_NEAR)
-    for _ in range(_ROUNDS):
+    estimate = adjust(model, matches, x, done=_NEAR, steps=steps)
+    for _ in range(rounds):
         x = estimate.x
         matches = without_strays(model, x, match(model, x), estimate.scatter)
-        estimate = adjust(model, matches, x)
+        estimate = adjust(model, matches, x, steps=steps)
         if estimate.beyond(x) < _SAME:
             break
     return Fit(model, matches, estimate)
@@ -110,7 +126,10 @@ def _kept(
     model: DropModel, role: str, x: Array, matches: Sequence[Index], scatter: float
 ) -> list[Index]:
     rows = model.residuals(role, x, matches)
-    stray = np.abs(rows.values) > STRAY * rows.sigma * scatter
+    far = np.abs(rows.values) / rows.sigma
+    # A few strays enlarge the scatter, and would hide behind it: most edges tell how much it is.
+    usual = max(1.0, _MOST * float(np.median(far)) / _MEDIAN) if far.size else 1.0
+    stray = far > STRAY * min(scatter, usual)
     kept, position = [], 0
     for one in matches:
         copy = one.copy()

@@ -1,61 +1,56 @@
-"""A first guess of the fall from edges that nobody has matched yet.
+"""Where a fall may begin, by edges that nobody has matched yet.
 
-Every pair of an observed and an expected edge votes for a release time; only the true one is
-voted for by all rods at all gates, because a pattern shifted by one rod has other speeds. What
-the impacts do is then found by trying one α after another.
+For every α, and every height and air that must be tried, the model says when each expected edge
+comes after the release. Every edge of a gate then votes for a release time with every expected edge
+that it could be: all rods at all gates vote for the true one, and many for those that are a rod
+off. All moments with many votes are kept; `rig.analysis.identify` judges between them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import itertools
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.components import STATED
-from rig.analysis.free_flight import fall_for, fall_through, leg_slopes
-from rig.analysis.unknowns import DRAG_U
+from rig.analysis.free_flight import fall_through
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from rig.analysis.chain_records import ChainRecord
-    from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
+    Counts = NDArray[np.int32]
 
-ALPHAS = np.arange(-0.10, 0.601, 0.01)
-"""Impact coefficients that are tried: beyond both ends of what energy allows."""
+Span = tuple[float, float]
+
+EVER: Span = (-np.inf, np.inf)
+ANY_ALPHA: Span = (-0.10, 0.60)
+"""Impact coefficients beyond both ends of what energy allows."""
+AIRS = tuple(0.02 * n for n in range(1, 11))
+"""κ that are tried where none is known and a fall in vacuum explains too little, 1/m."""
+_MOST = 8e-3  # how far off a rod may be and still vote, m
+_PART = 6.0  # and what part of the least distance of two rods: what is a rod off is well outside
 _LONGEST = 5e-3  # half width of a vote, s: at the very start a chain is too slow to tell more
-_ROUGH = 1e-3  # how far off a rod may be in a first guess, m
-_STEPS = 6
-_APART = 8e-3  # release times further apart than this are different answers, s
-
-
-class Air(NamedTuple):
-    """What is known of κ beforehand, 1/m: where to begin, and its standard uncertainty.
-
-    With no uncertainty it stays as it is.
-    """
-
-    kappa: float = 0.0
-    u: float = 0.0
-
-
-NO_AIR = Air()
-_AIRS = tuple(0.02 * n for n in range(1, 11))  # of which one brings a chain near enough
-_CLEAR = 0.9  # share of the expected edges with which no other κ is tried
-
-_FELT = 2e-3  # 1/m: less than a millimetre in a first guess
+_SHORTEST = 0.05e-3
+_SURE = 2.5  # standard uncertainties of the drop height within which starts are tried
+_FEWEST = 0.5  # of the most votes, below which a moment is not kept
+_RECORD = 4.0  # s: what longer a record is, is only searched where most of its edges are
+_FEW = 4  # edges of one kind, below which their order tells nothing
+_NEAR = 0.08  # how far α may be from what the model expects, and be found at once
+_KEPT = 8  # moments
+_CELLS = 2_000_000  # votes counted together, which bounds the memory they take
 
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A first guess and how well the edges support it.
+    """A fall as the edges might have it.
 
     Attributes
     ----------
@@ -65,225 +60,283 @@ class Guess:
         Height of the reference point before release, m.
     alpha
         Of all impacts; 0 for a free chain.
-    share
-        Share of the expected edges that are where they should be.
-    runner_up
-        The same for the best guess that is a really different one.
     kappa
         Of the air, 1/m.
+    clock
+        By what share the edges' clock is slow.
+    votes
+        How many expected edges have one near where this fall puts them.
     """
 
     release: float
     start: float
     alpha: float = 0.0
-    share: float = 0.0
-    runner_up: float = 0.0
     kappa: float = 0.0
+    clock: float = 0.0
+    votes: int = 0
 
 
-def guess(record: ChainRecord, start: Quantity, gravity: float, air: Air = NO_AIR) -> Guess:
-    """Guess the release time, κ of the air, and α where the chain is struck.
+class _Paths(NamedTuple):
+    """Falls of one chain from a release at zero, one a column.
+
+    Attributes
+    ----------
+    alphas
+        Shape ``(paths,)``.
+    times, speeds
+        At each expected edge; NaN where a path never comes by; shape ``(expected, paths)``.
+    end
+        When the last of them passes, shape ``(paths,)``.
+    """
+
+    alphas: Array
+    times: Array
+    speeds: Array
+    end: Array
+
+
+def slack_of(record: ChainRecord) -> float:
+    """How far off a rod may be in a first guess, m."""
+    places = np.array(record.chain.chain.heights)
+    pitch = float(np.diff(places).min()) if places.size > 1 else np.inf
+    return min(pitch / _PART, _MOST)
+
+
+def guesses(
+    record: ChainRecord,
+    start: Quantity,
+    gravity: float,
+    kappa: float = 0.0,
+    clock: float = 0.0,
+    window: Span = EVER,
+    alphas: Span = ANY_ALPHA,
+) -> list[Guess]:
+    """Find all moments for which many edges of a chain vote, those with the most first.
 
     Parameters
     ----------
     start
-        Height of the reference point before release, m.
-    air
-        What is known of κ.
+        Height of the reference point before release, m; those within its uncertainty are tried.
+    kappa, clock
+        Of all falls that are tried.
+    window
+        Within which the release must be, s.
+    alphas
+        Impact coefficients to try.
     """
-    places = np.array(record.chain.chain.heights)
-    pitch = float(np.diff(places).min()) if places.size > 1 else start.value
-    slack = pitch / 6  # either way: what is a rod off is well outside
-    # An impact chain falls freely until its bottom rod is down.
-    lowest = -np.inf if record.ratios is None else 0.0
-    free = guess_release(record, start, gravity, lowest, slack, air)
-    for kappa in _AIRS if air.u and free.share < _CLEAR else ():
-        other = guess_release(record, start, gravity, lowest, slack, Air(kappa, air.u))
-        free = max(free, other, key=lambda one: one.share)
-    if record.ratios is None or free.share == 0.0:
-        return free
-    return _alpha(record, gravity, record.ratios, slack, pitch, free)
+    slack = slack_of(record)
+    pairs = _pairs(record, clock)
+    if pairs.times.size == 0:
+        return []
+    found: list[Guess] = []
+    for height in _heights(start, slack):
+        paths = _paths(record, height, gravity, kappa, slack, alphas)
+        for release, path, votes in _moments(pairs, paths, slack, window):
+            alpha = float(paths.alphas[path])
+            found.append(Guess(release, height, alpha, kappa, clock, votes))
+    found.sort(key=lambda one: -one.votes)
+    most = found[0].votes if found else 0
+    return [one for one in found if one.votes >= _FEWEST * most][:_KEPT]
 
 
-def first_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
-    """Guess each side's fall."""
-    gravity, start = protocol.gravity.value, protocol.drop
-    # The free chain tells what the air does to both.
-    air = Air(0.0, DRAG_U) if air_is_told(records) else NO_AIR
-    found: dict[str, Guess] = {}
-    for record in reversed(records):  # the free chain first
-        found[record.role] = guess(record, start, gravity, air)
-        kappa = found[record.role].kappa
-        air = Air(kappa) if abs(kappa) > _FELT else NO_AIR
-    return {record.role: found[record.role] for record in records}
+def _heights(start: Quantity, slack: float) -> list[float]:
+    """Starts above the contact point to try, so that one is near enough; the stated one first."""
+    steps = int(np.ceil(max(0.0, _SURE * start.u - slack) / slack))
+    tried = [start.value + slack * n for n in sorted(range(-steps, steps + 1), key=abs)]
+    return [height for height in tried if height > 0.0]
 
 
-def air_is_told(records: Sequence[ChainRecord]) -> bool:
-    """Whether κ can be told from what is struck: by a free chain, of rods that are all alike."""
-    return len(records) > 1 and all(record.chain.chain.alike for record in records)
-
-
-def guess_release(
-    record: ChainRecord,
-    start: Quantity,
-    gravity: float,
-    lowest: float,
-    slack: float,
-    air: Air = NO_AIR,
-) -> Guess:
-    """Let all pairs vote and count at the moment that most of them agree on."""
-    times, levels, _ = _pairs(record, lowest)
-    if times.size == 0:
-        return Guess(0.0, start.value)
-    speed, tau = fall_through(start.value - levels, np.zeros_like(levels), gravity, air.kappa)
-    middle = times - tau
-    # A level passed fast tells the moment better; before it moves, a chain tells hardly anything.
-    half = np.minimum(slack / np.maximum(speed, slack / _LONGEST), _LONGEST)
-    begins = times.size  # the first so many of all ends of votes
-    moments = np.concatenate([np.sort(middle - half), np.sort(middle + half)])
-    order = np.argsort(moments, kind="stable")  # what begins comes before what ends then
-    moments = moments[order]
-    votes = np.cumsum(np.where(order < begins, 1, -1))  # just after each
-    best = int(np.argmax(votes))
-    release = 0.5 * float(moments[best] + moments[best + 1])
-    voters = np.abs(middle - release) <= half
-    expected = sum(int((train.levels > lowest).sum()) for train in record.trains)
-    elsewhere = votes[np.abs(moments - release) > _APART].max(initial=0)
-    most = float(votes[best])
-    release, height, kappa = _refine(times[voters], levels[voters], release, start, gravity, air)
-    return Guess(
-        release,
-        height,
-        share=min(1.0, most / expected),
-        runner_up=float(elsewhere) / expected,
-        kappa=kappa,
-    )
-
-
-class Pairs(NamedTuple):
+class _Pairs(NamedTuple):
     """Every edge with every expected edge of its gate and polarity, shape ``(pairs,)`` each.
 
     Attributes
     ----------
     times
         Of the edge, s.
-    levels
-        Of the expected edge, m.
     expected
         Number of the expected edge, counted over all gates.
     """
 
     times: Array
-    levels: Array
     expected: Index
 
 
-def _pairs(record: ChainRecord, lowest: float) -> Pairs:
-    """Pair up everything whose level is above `lowest`."""
-    times, levels, numbers, first = [], [], [], 0
+def _pairs(record: ChainRecord, clock: float) -> _Pairs:
+    times, numbers, first = [np.zeros(0)], [np.zeros(0, dtype=np.intp)], 0
     for train in record.trains:
-        same = train.blocked[:, None] == train.blocks[None, :]
-        observed, expected = np.nonzero(same & (train.levels > lowest)[None, :])
+        observed, expected = np.nonzero(train.blocked[:, None] == train.blocks[None, :])
         times.append(train.times[observed])
-        levels.append(train.levels[expected])
         numbers.append(first + expected)
         first += train.rods.size
-    return Pairs(np.concatenate(times), np.concatenate(levels), np.concatenate(numbers))
+    return _Pairs(np.concatenate(times) * (1.0 + clock), np.concatenate(numbers))
 
 
-def _refine(
-    times: Array, levels: Array, release: float, start: Quantity, gravity: float, air: Air
-) -> tuple[float, float, float]:
-    """Fit release time, start height and κ to the pairs that voted for them."""
-    offset, kappa = 0.0, air.kappa
-    # Of the release nothing is known; the others are held: early edges hardly tell all three apart.
-    prior = np.array([0.0, (_ROUGH / max(start.u, STATED.hang)) ** 2, 0.0])
-    prior[2] = (_ROUGH / air.u) ** 2 if air.u else 1.0
-    for _ in range(_STEPS):
-        since = np.maximum(times - release, 0.0)
-        still = np.zeros_like(since)
-        fallen, speed, _, _, by_kappa = leg_slopes(since, still, gravity, kappa)
-        residual = start.value + offset - fallen - levels
-        # Votes by chance are among the voters: beyond 2 mm they pull no harder than at 2 mm.
-        weight = np.minimum(1.0, 2.0 * _ROUGH / np.maximum(np.abs(residual), _ROUGH))
-        slopes = np.stack([speed, np.ones_like(since), -by_kappa if air.u else still])
-        right = slopes @ (weight * residual) + prior * [0.0, offset, kappa if air.u else 0.0]
-        step = np.linalg.solve((slopes * weight) @ slopes.T + np.diag(prior), right)
-        release, offset, kappa = release - step[0], offset - step[1], kappa - step[2]
-    return float(release), start.value + float(offset), float(kappa)
-
-
-def _alpha(
-    record: ChainRecord, gravity: float, ratios: Array, slack: float, pitch: float, free: Guess
-) -> Guess:
-    """Try one α after another."""
-    places = np.array(record.chain.chain.heights)
-    time, height, speed = _paths(free, gravity, ratios, places)
-    scores = _scores(record, time, height, speed, gravity, slack, free.kappa)
-    # The middle of a plateau, not its left end.
-    plateau = np.flatnonzero(scores == scores.max())
-    best = int(plateau[plateau.size // 2])
-    # Where the chain of each other α is when the best one's top rod strikes.
-    end = time[-1, best]
-    leg = np.clip((time <= end).sum(axis=0) - 1, 0, None)
-    since = end - time[leg, range(ALPHAS.size)]
-    at = height[leg] - fall_for(since, speed[leg, range(ALPHAS.size)], gravity, free.kappa)[0]
-    # Neighbouring α give the same edges the same rods: only another matching is another answer.
-    different = np.abs(at - at[best]) > pitch / 2
-    return replace(
-        free,
-        alpha=float(ALPHAS[best]),
-        share=min(free.share, float(scores[best]) / record.expected),
-        runner_up=float(scores[different].max(initial=0)) / record.expected,
-    )
-
-
-def _paths(free: Guess, gravity: float, ratios: Array, places: Array) -> tuple[Array, Array, Array]:
-    """Times and speeds at the beginning of each leg for every α, shape ``(legs, alphas)``."""
-    legs = places.size + 1
-    time, speed = np.empty((legs, ALPHAS.size)), np.zeros((legs, ALPHAS.size))
-    height = np.concatenate([[free.start], -places])
-    time[0] = free.release
-    for k, ratio in enumerate(ratios):
-        distance = height[k] - height[k + 1]
-        arrival, lasted = fall_through(distance, speed[k], gravity, free.kappa)
-        time[k + 1] = time[k] + lasted
-        speed[k + 1] = arrival * (1.0 + ALPHAS * ratio)
-    return time, height, speed
-
-
-def _scores(
-    record: ChainRecord,
-    time: Array,
-    height: Array,
-    speed: Array,
-    gravity: float,
-    slack: float,
-    kappa: float,
-) -> Index:
-    """Count for every α the expected edges that have an observed one where the chain would be."""
+def _paths(
+    record: ChainRecord, start: float, gravity: float, kappa: float, slack: float, span: Span
+) -> _Paths:
+    """Let the chain fall with every α that must be tried; once where nothing is struck."""
     levels = np.concatenate([train.levels for train in record.trains])
-    soonest = _passages(levels + slack, time, height, speed, gravity, kappa)
-    latest = _passages(levels - slack, time, height, speed, gravity, kappa)
-    times, _, expected = _pairs(record, -np.inf)
-    # The larger α, the sooner: most pairs are beyond what any of them reaches.
-    near = np.flatnonzero((soonest[expected, -1] < times) & (times < latest[expected, 0]))
-    near = near[np.argsort(expected[near], kind="stable")]
-    number, when = expected[near], times[near, None]
-    hit = (soonest[number] < when) & (when < latest[number])
-    if not number.size:
-        return np.zeros(time.shape[1], dtype=np.intp)
-    begins = np.flatnonzero(np.diff(number, prepend=-1))
-    scores: Index = np.logical_or.reduceat(hit, begins).sum(axis=0)
-    return scores
+    if record.ratios is None:
+        times, speeds = _passages(
+            levels, np.zeros((1, 1)), np.array([start]), np.zeros((1, 1)), gravity, kappa
+        )
+        return _Paths(np.zeros(1), times, speeds, _end(times))
+    places = np.array(record.chain.chain.heights)
+    height = np.concatenate([[start], -places])
+    ends = _legs(height, record.ratios, np.array(span), gravity, kappa)
+    # So fine that the chain's top is never off by more than half a vote's width.
+    apart = float((ends[0][-1, 0] - ends[0][-1, 1]) * ends[1][-1, 1])
+    count = int(np.ceil(max(apart, 0.0) / slack)) + 2
+    alphas = np.linspace(*span, count)
+    time, speed = _legs(height, record.ratios, alphas, gravity, kappa)
+    times, speeds = _passages(levels, time, height, speed, gravity, kappa)
+    return _Paths(alphas, times, speeds, _end(times))
+
+
+def _end(times: Array) -> Array:
+    found: Array = np.where(np.isnan(times), 0.0, times).max(axis=0, initial=0.0)
+    return found
+
+
+def _legs(
+    height: Array, ratios: Array, alphas: Array, gravity: float, kappa: float
+) -> tuple[Array, Array]:
+    """Times and speeds at the beginning of each leg for every α, shape ``(legs, alphas)``."""
+    time, speed = np.zeros((height.size, alphas.size)), np.zeros((height.size, alphas.size))
+    for k, ratio in enumerate(ratios):
+        arrival, lasted = fall_through(height[k] - height[k + 1], speed[k], gravity, kappa)
+        time[k + 1] = time[k] + lasted
+        speed[k + 1] = arrival * (1.0 + alphas * ratio)
+    return time, speed
 
 
 def _passages(
     levels: Array, time: Array, height: Array, speed: Array, gravity: float, kappa: float
-) -> Array:
-    """When each path comes down to each level, shape ``(levels, paths)``; −∞ above the start."""
+) -> tuple[Array, Array]:
+    """When each path comes down to each level, and how fast; NaN above the start."""
     leg = np.maximum(np.searchsorted(-height, -levels, side="right") - 1, 0)
     distance = np.maximum(height[leg] - levels, 0.0)[:, None]
-    passed = time[leg] + fall_through(distance, speed[leg], gravity, kappa)[1]
-    passed[levels > height[0]] = -np.inf
-    return passed
+    arrival, lasted = fall_through(distance, speed[leg], gravity, kappa)
+    passed = time[leg] + lasted
+    passed[levels >= height[0]] = np.nan
+    return passed, arrival
+
+
+def _moments(
+    pairs: _Pairs, paths: _Paths, slack: float, window: Span
+) -> Iterator[tuple[float, int, int]]:
+    """Yield release, path and number of votes of the moments with most votes that are apart."""
+    # A level passed fast tells the moment better; before it moves, a chain tells hardly anything.
+    half = np.clip(slack / np.maximum(paths.speeds, 1e-9), _SHORTEST, _LONGEST)
+    # The larger α, the sooner; a level that no path comes by is near no moment.
+    soonest, latest = paths.times[:, -1], paths.times[:, 0]
+    near = pairs.times - latest[pairs.expected] >= window[0] - _LONGEST
+    near &= pairs.times - soonest[pairs.expected] <= window[1] + _LONGEST
+    times, expected = pairs.times[near], pairs.expected[near]
+    if times.size == 0:
+        return
+    times, expected = _densest(times, expected, soonest[expected], latest[expected])
+    first = float((times - latest[expected]).min()) - 2.0 * _LONGEST
+    last = float((times - soonest[expected]).max()) + 2.0 * _LONGEST
+    first, last = max(first, window[0] - _LONGEST), min(last, window[1] + _LONGEST)
+    step = float(half.min()) / 2.0
+    bins = int((last - first) / step) + 2
+    votes = np.zeros((paths.alphas.size, bins + 1), dtype=np.int32)
+    block = max(1, _CELLS // times.size)
+    for begin in range(0, paths.alphas.size, block):
+        columns = slice(begin, begin + block)
+        middle = times[:, None] - paths.times[expected, columns] - first
+        width = half[expected, columns]
+        votes[columns] = _counted(middle - width, middle + width, step, bins)
+    yield from _peaks(votes, paths, slack, first, step)
+
+
+def _densest(times: Array, expected: Index, soonest: Array, latest: Array) -> tuple[Array, Index]:
+    """Of pairs whose releases are spread over minutes, return those of the fullest part."""
+    release = times - 0.5 * (soonest + latest)
+    ordered = np.sort(release)
+    held = np.searchsorted(ordered, ordered + _RECORD, side="right") - np.arange(ordered.size)
+    first = ordered[int(np.argmax(held))]
+    kept = (release >= first) & (release <= first + _RECORD)
+    return times[kept], expected[kept]
+
+
+def _counted(begin: Array, end: Array, step: float, bins: int) -> Counts:
+    """Count in each bin of each column how many intervals cover it."""
+    columns = begin.shape[1]
+    row = np.broadcast_to(np.arange(columns) * (bins + 1), begin.shape)
+    good = (end > 0.0) & (begin < bins * step)  # NaN is neither
+    lower = np.clip(np.rint(begin[good] / step), 0, bins).astype(np.intp)
+    upper = np.clip(np.rint(end[good] / step), 0, bins).astype(np.intp)
+    size = columns * (bins + 1)
+    found = np.bincount(row[good] + lower, minlength=size).astype(np.int32)
+    found -= np.bincount(row[good] + upper, minlength=size).astype(np.int32)
+    return np.cumsum(found.reshape(columns, -1), axis=1, dtype=np.int32)
+
+
+def _peaks(
+    votes: Counts, paths: _Paths, slack: float, first: float, step: float
+) -> Iterator[tuple[float, int, int]]:
+    """Yield the highest counts of which no two are the same fall to half a rod."""
+    best = votes.max(axis=1)
+    most = int(best.max())
+    fastest = float(paths.speeds.max())
+    apart = min(_PART / 2.0 * slack / fastest, _LONGEST)
+    moments = first + step * (np.arange(votes.shape[1]) + 0.5)
+    yielded = 0
+    while yielded < _KEPT:
+        path = int(np.argmax(best))
+        count = int(best[path])
+        if count == 0 or count < _FEWEST * most:
+            return
+        # The middle of a plateau, not its beginning: over all α, then over all moments.
+        at = int(np.argmax(votes[path]))
+        alike = np.flatnonzero(votes[:, at] == count)
+        runs = np.split(alike, 1 + np.flatnonzero(np.diff(alike) > 1))
+        mine = next(run for run in runs if path in run)
+        path = int(mine[mine.size // 2])
+        end = at + int(np.argmin(votes[path, at:] == count))
+        at = (at + max(end, at + 1) - 1) // 2
+        yield float(moments[at]), path, count
+        yielded += 1
+        # A fall of another α that begins and ends with this one is the same.
+        ends = paths.end - paths.end[path]
+        for other in range(paths.alphas.size):
+            if abs(ends[other]) < 2.0 * apart:
+                near = np.abs(moments - moments[at]) < apart
+                votes[other, near] = 0
+                best[other] = votes[other].max()
+
+
+def near_alpha(record: ChainRecord) -> Span:
+    """Impact coefficients not far from what the model expects of a chain."""
+    return max(ANY_ALPHA[0], record.alpha - _NEAR), min(ANY_ALPHA[1], record.alpha + _NEAR)
+
+
+def in_order(record: ChainRecord, start: float, gravity: float) -> Span:
+    """Return about when a chain was let go if its edges came one by one as expected.
+
+    The first edge of a gate is its first expected one and the last the last, but for few that were
+    missed or did not belong: a window of some rods, which may be wrong.
+    """
+    slack = slack_of(record)
+    paths = _paths(record, start, gravity, 0.0, slack, (record.alpha, record.alpha))
+    late, begin = [], 0
+    for train in record.trains:
+        due = paths.times[begin : begin + train.rods.size, 0]
+        begin += train.rods.size
+        for polarity in (True, False):
+            seen, wanted = train.times[train.blocked == polarity], due[train.blocks == polarity]
+            wanted = wanted[~np.isnan(wanted)]
+            size = min(seen.size, wanted.size)
+            if size >= _FEW:
+                late += [np.median(seen[:size] - wanted[:size])]
+                late += [np.median(seen[-size:] - wanted[-size:])]
+    if not late:
+        return EVER
+    return float(min(late)), float(max(late))
+
+
+def merged(*several: Sequence[Guess]) -> list[Guess]:
+    """Put several lists of guesses in one, those with the most votes first."""
+    return sorted(itertools.chain.from_iterable(several), key=lambda one: -one.votes)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], None]
 
+_EXPLAINED = 6  # void drops of a session, after which no cause is sought for the next ones
 _KEPT = 0.9
 """Share of its edges that a drop must keep among others: without them priors are all it has."""
 _MOVED = "somebody may have moved its gates or chains; it is judged and measured by itself"
@@ -128,7 +129,9 @@ def analyze(
                 f"run {drop.run} is not in the plan, which has {len(planned)} runs",
                 "is it the right protocol? rig check PROTOCOL shows the plan",
             )
-        result, fit = fit_drop(protocol, planned[drop.run], drop, scale(drop))
+        # What is wrong with a rig is wrong in drop after drop: some of them tell it.
+        told = sum(one.verdict == "void" for one in results) >= _EXPLAINED
+        result, fit = fit_drop(protocol, planned[drop.run], drop, scale(drop), explain=not told)
         results.append(overruled(result, rejected.get((drop.run, drop.attempt))))
         fits.append(fit)
         if progress is not None:

@@ -6,21 +6,23 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.diagnoses import diagnose
+from rig.analysis.distributions import most_by_chance
+from rig.analysis.identify import MISSED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from rig.analysis.adjust import Estimate
     from rig.analysis.fit import Fit
-    from rig.analysis.pattern import Guess
+    from rig.analysis.identify import Identification
     from rig.analysis.result import Audit, Measured, Verdict
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
 
 SUPPORT = 0.6
 """Share of the expected edges that must be where the first guess puts them."""
-LEAD = 0.1
-"""By how much that share must exceed the best really different guess."""
+LEAD = math.log(1000.0)
+"""Log odds of a reading against the likeliest really different one, below which neither counts."""
 RESTLESS = 2.0
 """Scatter of the edges about the adjusted motion, relative to the assumed one, that is remarked."""
 
@@ -35,16 +37,29 @@ GLITCHES = 0.02
 
 
 class Judgement(NamedTuple):
-    """The verdict and why."""
+    """The verdict and why.
+
+    Attributes
+    ----------
+    accused
+        Those of the reasons that blame gates or chains.
+    odd
+        Whether it is worth to ask what else than the protocol would explain the edges.
+    suspects
+        Numbers of the gates to look at for that.
+    """
 
     verdict: Verdict
     reasons: tuple[str, ...]
+    accused: tuple[str, ...] = ()
+    odd: bool = False
+    suspects: tuple[int, ...] = ()
 
 
 def judge(
     protocol: Protocol,
     drop: Drop,
-    guesses: Mapping[str, Guess],
+    unlike: Collection[str],
     audit: Audit,
     found: Mapping[str, Measured],
     fit: Fit | None,
@@ -52,37 +67,48 @@ def judge(
     """Judge a drop; without a `fit`, only whether it can be analysed at all."""
     void = [*drop.faults]
     doubts: list[str] = []
+    accused: tuple[str, ...] = ()
+    suspects: tuple[int, ...] = ()
+    odd = False
     if audit.lost:
         void.append(f"the device lost {audit.lost} edges: its memory was full")
-    for role, guess in guesses.items():
-        void += pattern_faults(role, guess)
+    odd = bool(unlike)
+    void += unlike
     if fit is not None:
         faults = diagnose(fit)
+        accused, suspects = faults.void, faults.suspects
         void += _limits(protocol, audit, found)
-        void += faults.void
+        void += accused
+        estimate, missed = (
+            fit.estimate,
+            audit.missed > _most_missed(audit.matched + audit.missed, protocol.accept.missed_edges),
+        )
+        odd = bool(accused) or missed or estimate.scatter > RESTLESS or not estimate.settled
         if void:
             void += faults.doubts  # which may be why
         doubts += faults.doubts
-        doubts += _doubts(protocol, drop, found, fit.estimate)
+        doubts += _doubts(protocol, drop, audit, found, fit.estimate)
         doubts += _pushed(fit)
     if void:
-        return Judgement("void", tuple(void))
-    return Judgement("marginal" if doubts else "accepted", tuple(doubts))
+        return Judgement("void", tuple(void), accused, odd, suspects)
+    return Judgement("marginal" if doubts else "accepted", tuple(doubts), accused, odd, suspects)
 
 
-def pattern_faults(role: str, guess: Guess) -> list[str]:
-    """Say why the edges of a side are not one fall of its chain; nothing where they are."""
-    if guess.share < SUPPORT:
-        return [
-            f"the {role} side does not look like this chain falling: only {guess.share:.0%} of "
-            "the expected edges are where one fall would put them"
-        ]
-    if guess.share - guess.runner_up < LEAD:
-        return [
-            f"the {role} side is ambiguous: {guess.share:.0%} of the expected edges fit one fall, "
-            f"{guess.runner_up:.0%} a different one"
-        ]
-    return []
+def pattern_faults(identified: Identification) -> dict[str, str]:
+    """Say why the edges are not one fall of each chain, by role; nothing where they are."""
+    found = {
+        role: f"the {role} side does not look like this chain falling: only {share:.0%} of the "
+        "expected edges are where one fall would put them"
+        for role, share in identified.shares.items()
+        if share < SUPPORT
+    }
+    if not found and identified.log_odds < LEAD:
+        odds = math.exp(identified.log_odds)
+        return dict.fromkeys(
+            identified.shares,
+            f"these edges fit two falls: the odds of the likelier one are only {odds:.3g} to 1",
+        )
+    return found
 
 
 def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> list[str]:
@@ -90,11 +116,8 @@ def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> 
     accept = protocol.accept
     void = []
     expected = audit.matched + audit.missed
-    if expected and audit.missed > accept.missed_edges * expected:
-        void.append(
-            f"{audit.missed} of {expected} edges missed ({audit.missed / expected:.1%}), "
-            f"more than {accept.missed_edges:.1%}"
-        )
+    if audit.missed > _most_missed(expected, accept.missed_edges):
+        void.append(_many_missed(audit, accept.missed_edges))
     skew = found.get("release_skew_s")
     if skew is not None and abs(skew.value) > accept.release_skew:
         void.append(
@@ -103,11 +126,33 @@ def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> 
     return void
 
 
+def _most_missed(expected: int, limit: float) -> float:
+    """Return how many edges may be missed before a drop is void.
+
+    Of few edges one is a large share: a rig that misses as many as usual must not lose more than a
+    drop in a thousand by chance.
+    """
+    return max(limit * expected, most_by_chance(expected, min(MISSED, limit / 2.0)))
+
+
+def _many_missed(audit: Audit, limit: float) -> str:
+    expected = audit.matched + audit.missed
+    share = audit.missed / expected
+    return f"{audit.missed} of {expected} edges missed ({share:.1%}), more than {limit:.1%}"
+
+
 def _doubts(
-    protocol: Protocol, drop: Drop, found: Mapping[str, Measured], estimate: Estimate
+    protocol: Protocol,
+    drop: Drop,
+    audit: Audit,
+    found: Mapping[str, Measured],
+    estimate: Estimate,
 ) -> list[str]:
     """Return what makes a drop marginal."""
     doubts = []
+    expected, missed = audit.matched + audit.missed, protocol.accept.missed_edges
+    if missed * expected < audit.missed <= _most_missed(expected, missed):
+        doubts.append(f"{_many_missed(audit, missed)}, which of so few edges may be chance")
     skew = found.get("release_skew_s")
     limit = protocol.accept.release_skew
     if skew is not None and abs(skew.value) + skew.expanded > limit >= abs(skew.value):

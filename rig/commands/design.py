@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.components import STATED
 from rig.commands.output import print_json, say
-from rig.design.cases import beams_of, cases
+from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import forecast
 from rig.design.search import better, readable, room
+from rig.design.trials import trials, trials_text
 from rig.errors import InputError
 from rig.estimate.coefficients import KNOWN
 from rig.measurands import MEASURANDS
@@ -87,6 +88,11 @@ def _length(option: str, text: str | None) -> float | None:
     return value
 
 
+def _tried(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> dict[str, Any]:
+    found = trials(with_beams(protocol, beams))
+    return {"drops": found.drops, "read": found.read, "text": trials_text(found)}
+
+
 def _said(
     protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
 ) -> dict[str, Any]:
@@ -100,6 +106,7 @@ def _said(
             for gate, (side, height) in zip(protocol.gates.gates, beams, strict=True)
         ],
         "readable": readable(protocol, beams),
+        "trials": _tried(protocol, beams),
         "measurands": [
             {
                 "name": name,
@@ -142,6 +149,7 @@ def design_text(found: Mapping[str, Any]) -> str:
                 if gate["side"] == side
             )
             lines.append(f"{name}, {side} side (mm): {heights}")
+        lines.append(f"{name}: {found[name]['trials']['text']}")
         if not found[name]["readable"]:
             lines.append(
                 f"{name}: edges may be given to wrong rods, and drops be void; beams above the "

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.pattern import guess, guess_release
-from rig.analysis.verdict import LEAD, SUPPORT
-from rig.design.cases import cases, perfect, with_beams
+from rig.analysis.components import STATED
+from rig.analysis.identify import identify
+from rig.analysis.verdict import LEAD
+from rig.design.cases import CLOCK_U, cases, perfect, with_beams
 from rig.design.forecast import forecast
+from rig.design.trials import misread
 from rig.measurands import averaged
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -22,16 +24,20 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from numpy.typing import NDArray
+
     from rig.analysis.components import Components
     from rig.design.cases import Cases
     from rig.protocol.protocol import Protocol, Side
+
+    Index = NDArray[np.intp]
 
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
 FEW = 3
 """Inclines that the search looks at; the forecast looks at all of them."""
-MARGIN = 0.03
-"""Share of the expected edges beyond what a verdict asks for: real ones are missed, and flicker."""
+MARGIN = 2.0 * LEAD
+"""Log odds that perfect edges must have: real ones are missed, and flicker."""
 _OFF = 2.0  # standard uncertainties that the drop may be off
 _GRID_M = 4e-3  # between candidates
 _COARSE = 5  # every so many of them are tried first, then those about the best
@@ -142,7 +148,7 @@ def better(
                     trial = score(protocol, found, [*layout[:slot], n, *layout[slot + 1 :]])
                     if trial >= best - _WORTH:
                         continue
-                    # Only now: whether it can be read takes a pattern search for each chain.
+                    # Only now: whether it can be read takes a few drops to be read.
                     proposed = [beams[one] for one in (*layout[:slot], n, *layout[slot + 1 :])]
                     if _held(protocol, proposed) and margin(protocol, proposed) >= floor:
                         best, layout[slot] = trial, n
@@ -183,26 +189,24 @@ def _crowded(
 
 
 def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
-    """Share of the expected edges by which the right fall leads the next best one.
+    """Log odds by which the right fall leads the next best one; −∞ where it is not found at all.
 
-    The least over both chains at the outermost inclines, hung higher or lower than stated; less
-    what a drop needs not to be void.
+    The least over the outermost inclines, with chains hung higher or lower than stated and every
+    edge seen where it should be; no more than `MARGIN`.
     """
     protocol = with_beams(protocol, beams)
-    planned, gravity = runs(protocol), protocol.gravity.value
-    ends = {run.incline_deg: run for run in reversed(planned)}
-    least = 1.0
+    ends = {run.incline_deg: run for run in reversed(runs(protocol))}
+    least = MARGIN
     for incline in {min(ends), max(ends)}:
         for off in (-_OFF, _OFF):
-            for side, _ in perfect(protocol, ends[incline], off * protocol.drop.u):
-                found = guess(side, protocol.drop, gravity)
-                lead = found.share - found.runner_up
-                if side.ratios is not None:
-                    # The other chain's fall is found in two steps: when it was let go, then α.
-                    pitch = float(np.diff(side.chain.chain.heights).min())
-                    first = guess_release(side, protocol.drop, gravity, 0.0, pitch / 6.0)
-                    lead = min(lead, first.share - first.runner_up)
-                least = min(least, lead - LEAD, found.share - SUPPORT)
+            records = [one for one, _ in perfect(protocol, ends[incline], off * protocol.drop.u)]
+            found = identify(protocol, records, CLOCK_U, STATED)
+            all_seen: dict[str, list[Index]] = {
+                one.role: [np.arange(train.rods.size) for train in one.trains] for one in records
+            }
+            if found.fit is None or misread(found, all_seen):
+                return -math.inf
+            least = min(least, found.log_odds)
     return least
 
 

@@ -12,7 +12,8 @@ from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import STATED, Components
 from rig.analysis.drop import analyze_drop
 from rig.analysis.drop_model import DropModel
-from rig.analysis.pattern import Guess, first_guesses
+from rig.analysis.identify import Identification, adjusted, identify
+from rig.analysis.pattern import Guess
 from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
@@ -20,6 +21,7 @@ from rig.model.chain import Chain
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop, Edge
+from rig.threads import one_thread
 from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
@@ -76,8 +78,16 @@ class Case:
         names = {"impact": self.run.impact, "free": self.run.free}
         return [self.side(role) for role, name in names.items() if name is not None]
 
+    @one_thread
+    def identify(self) -> Identification:
+        """The best reading of the edges."""
+        return identify(self.protocol, self.records, self.scale.u, STATED)
+
     def guesses(self) -> dict[str, Guess]:
-        return first_guesses(self.protocol, self.records)
+        """Where the best reading has each chain begin."""
+        found = self.identify()
+        assert found.fit is not None
+        return {role: adjusted(found.fit, role) for role in found.fit.model.records}
 
     def model(self) -> tuple[DropModel, dict]:
         """The observation equations of this drop, and the matches that the first guess gives."""

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import pytest
 
-from rig.analysis.diagnoses import upside_down
+from rig.analysis.explanations import upside_down
 from rig.protocol.protocol import Protocol
 from tests.analysis.drops import GRADED, SCENES, UNIFORM, Case, case
 from tests.analysis.sessions import MILD

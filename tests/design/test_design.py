@@ -10,9 +10,10 @@ import pytest
 
 from rig.analysis.components import Components
 from rig.analysis.session import Analysis
-from rig.design.cases import beams_of, cases
+from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import forecast
 from rig.design.search import Room, better, candidates, readable, room, score
+from rig.design.trials import Trials, trials, trials_text
 from rig.errors import InputError
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.quadratic_forms import merged
@@ -144,12 +145,24 @@ def test_a_proposed_layout_is_better_as_predicted_and_in_fact():
         assert 0.6 < realised / predicted_speed_u(layout) < 1.6
 
 
-def test_low_beams_alone_tell_much_and_cannot_be_read():
-    """Nothing sees the chain before it strikes, so that many falls fit the same edges."""
-    low = [("impact", h) for h in (0.02, 0.044, 0.056, 0.084)]
-    assert not readable(SINGLE, low)
+LOW = [("impact", h) for h in (0.02, 0.044, 0.056, 0.084)]
+
+
+def test_low_beams_alone_are_read_too():
+    """No beam sees the chain before it strikes: what rods pass is enough to tell the fall."""
+    assert readable(SINGLE, LOW)
     assert readable(SINGLE, beams_of(SINGLE))
     assert readable(UNIFORM, beams_of(UNIFORM))
+    found = trials(with_beams(SINGLE, LOW), 6)
+    assert (found.drops, found.read) == (6, 6)
+
+
+def test_trials_that_fail_name_the_side_and_a_gate():
+    found = Trials(20, 13, (("free", 7),), ("free", 0.3))
+    assert trials_text(found) == (
+        "of 20 trial drops 13 are read; what fails is the free side (7); a further free gate at "
+        "300 mm would tell most"
+    )
 
 
 def test_proposals_respect_limits_and_are_never_worse():

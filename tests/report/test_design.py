@@ -7,6 +7,7 @@ def test_uncertainties_are_plain_numbers():
     layout = {
         "gates": [{"side": "free", "height_m": 0.05}],
         "readable": True,
+        "trials": {"drops": 20, "read": 20, "text": "of 20 trial drops 20 are read"},
         "measurands": [
             {"name": "speed_m_s", "u_run": 1.234},
             {"name": "gravity_m_s2", "u_run": 0.0256},

@@ -1,0 +1,406 @@
+"""Which fall a drop's edges are: several readings, and one judge.
+
+Each guess of `rig.analysis.pattern` is matched in order and adjusted; what is left is weighed by
+its marginal likelihood (Laplace's method), every unknown of the rig integrated out. Both sides are
+decided together, for they were released together. How much more likely the best reading is than
+the best really different one is the odds of the identification.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.adjust import adjust
+from rig.analysis.drop_model import DropModel, air_is_told
+from rig.analysis.equations import HUBER, scaled
+from rig.analysis.fit import Fit, settle
+from rig.analysis.pattern import (
+    AIRS,
+    ANY_ALPHA,
+    EVER,
+    Guess,
+    in_order,
+    merged,
+    near_alpha,
+    slack_of,
+)
+from rig.analysis.pattern import guesses as votes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rig.analysis.chain_records import ChainRecord
+    from rig.analysis.components import Components
+    from rig.analysis.pattern import Span
+    from rig.protocol.protocol import Protocol
+
+MISSED = 0.02
+"""Share of expected edges that leave no trace, as far as one can know beforehand."""
+STRAYS = 2.0
+"""Edges of a gate that belong to no rod, 1/s."""
+SLOWEST = 0.05
+"""m/s: no edge is stamped by a chain slower than this, as far as the density of its time goes."""
+_MARGIN = 3  # edges by which votes may fall short of what an adjusted fall matches
+_CLEAR = 0.97  # share of all that could be matched with which no other air or clock is tried
+_LEAST = 0.6  # and of all that is expected
+_CALM = 2.0  # scatter of edges above which a reading is none that ends the search
+_OTHER = 0.02  # share of a side's edges at another rod that makes a different reading
+_FEW = 2  # edges that make none: a stray in place of a missed edge
+_CLOSE = 30.0  # log odds of one side alone within which both sides are adjusted together
+_PAIRS = 4  # of readings, adjusted together
+_TOGETHER = 30e-3  # s: chains let go at once are not further apart, if it can be helped
+_TRIED = 12  # guesses of a side
+_TENSE = 4.0  # standard uncertainties off its place at which a rod may be held by a stray
+_RELAXED = 3  # rods of a side that are looked at
+_QUICK = 3  # guesses that are looked at
+_INSTANTS = 12  # at which two falls are compared
+_SAME = 1.0  # how far apart they may be, in what a vote may be off
+_ROUNDS, _STEPS = 3, 15  # of matching and of adjusting them
+_CLOCKS = (-2.0, -1.0, 1.0, 2.0)  # standard uncertainties of the clock that are tried
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One way to read a side's edges, or a whole drop's.
+
+    Attributes
+    ----------
+    fit
+        Matched and adjusted.
+    evidence
+        Logarithm of its marginal likelihood, up to what all readings of the same edges share.
+    """
+
+    fit: Fit
+    evidence: float
+
+    @property
+    def share(self) -> float:
+        """Share of the expected edges that are matched."""
+        expected = sum(record.expected for record in self.fit.model.records.values())
+        return self.fit.matched / max(1, expected)
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """The best reading of a drop.
+
+    Attributes
+    ----------
+    fit
+        All sides together; `None` where the edges of a side are like no fall of its chain at all.
+    shares
+        Of each side's expected edges, by role, that are matched.
+    log_odds
+        Of that reading against the best different one; infinite where there is none.
+    evidence
+        As in `Reading`.
+    other
+        That different reading, where it was adjusted: what else the edges may be.
+    """
+
+    fit: Fit | None
+    shares: Mapping[str, float]
+    log_odds: float = math.inf
+    evidence: float = -math.inf
+    other: Fit | None = None
+
+
+def identify(
+    protocol: Protocol,
+    records: Sequence[ChainRecord],
+    clock_u: float,
+    components: Components,
+    window: Span = EVER,
+) -> Identification:
+    """Find out which fall the edges are.
+
+    Parameters
+    ----------
+    records
+        The chains with their trains.
+    clock_u
+        Relative standard uncertainty of the time scale.
+    components
+        How much everything scatters.
+    window
+        Within which chains were let go, s since the release fired.
+    """
+    air = air_is_told(records)
+    found: dict[str, list[Reading]] = {}
+    # The free chain first: it tells what the air does to both, and when they were let go.
+    near, kappa, clock = window, 0.0, 0.0
+    for record in reversed(records):
+        side = _Side(protocol, record, clock_u, components, air)
+        readings = side.readings(near, kappa, clock)
+        if near != window and not _convincing(readings):
+            readings = _best([*readings, *side.readings(window, kappa, clock)])
+        found[record.role] = readings
+        if _convincing(readings):
+            sure = adjusted(readings[0].fit, record.role)
+            kappa, clock = sure.kappa, sure.clock
+            near = _around([adjusted(one.fit, record.role).release for one in readings], window)
+    if not all(found.values()):
+        shares = {
+            role: max((one.share for one in readings), default=0.0)
+            for role, readings in found.items()
+        }
+        return Identification(None, shares)
+    return _together(protocol, records, found, clock_u, components)
+
+
+def read_side(
+    protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
+) -> Reading | None:
+    """Read one side quickly, near where its edges are if they come one by one as expected."""
+    side = _Side(protocol, record, clock_u, components, air=False)
+    near = around_order(protocol, record)
+    found = side.judged(side.guesses(near, 0.0, 0.0, near_alpha(record))[:_QUICK])
+    return found[0] if found else None
+
+
+def around_order(protocol: Protocol, record: ChainRecord) -> Span:
+    """Return about when a chain was let go if its edges came one by one as expected."""
+    return _around(in_order(record, protocol.drop.value, protocol.gravity.value), EVER)
+
+
+def well_read(reading: Reading) -> bool:
+    """Whether nearly all that could be matched is, and scatters as it should."""
+    return _convincing([reading])
+
+
+def _convincing(readings: Sequence[Reading]) -> bool:
+    if not readings:
+        return False
+    best = readings[0]
+    calm = best.fit.estimate.scatter < _CALM
+    most = sum(possible(record) for record in best.fit.model.records.values())
+    return calm and best.share >= _LEAST and best.fit.matched >= _CLEAR * most
+
+
+def possible(record: ChainRecord) -> int:
+    """Count the edges of a side that could be rods by their gates and polarities alone."""
+    return sum(
+        min(int((train.blocked == polarity).sum()), int((train.blocks == polarity).sum()))
+        for train in record.trains
+        for polarity in (True, False)
+    )
+
+
+def _around(releases: Sequence[float], window: Span) -> Span:
+    """Return the part of a window that is near some releases; all of it where none is."""
+    first, last = min(releases) - _TOGETHER, max(releases) + _TOGETHER
+    if last < window[0] or first > window[1]:
+        return window
+    return max(window[0], first), min(window[1], last)
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """One chain's edges, to be read by themselves."""
+
+    protocol: Protocol
+    record: ChainRecord
+    clock_u: float
+    components: Components
+    air: bool
+
+    def readings(self, window: Span, kappa: float, clock: float) -> list[Reading]:
+        """Judge the guesses within a window, those first that are known to be near."""
+        record, found = self.record, list[Reading]()
+        hint = in_order(record, self.protocol.drop.value, self.protocol.gravity.value)
+        hint = _around(hint, window)
+        searches = [(hint, near_alpha(record)), (hint, ANY_ALPHA), (window, ANY_ALPHA)]
+        for span, alphas in searches[:: 2 if record.ratios is None else 1]:
+            found = _best([*found, *self.judged(self.guesses(span, kappa, clock, alphas))])
+            if _convincing(found):
+                return found
+        if possible(record) < _LEAST * record.expected:
+            return found  # whatever the air and the clock are
+        others = [self.guesses(window, one, clock) for one in (AIRS if self.air else ())]
+        top = float(np.max(self.record.chain.chain.heights)) + self.protocol.drop.value
+        # In a share of its time a chain falls twice that share of its way.
+        if 2.0 * self.clock_u * top > slack_of(self.record):
+            others += [self.guesses(window, kappa, clock + self.clock_u * n) for n in _CLOCKS]
+        return _best([*found, *self.judged(merged(*others))]) if others else found
+
+    def guesses(
+        self, window: Span, kappa: float, clock: float, alphas: Span = ANY_ALPHA
+    ) -> list[Guess]:
+        drop, gravity = self.protocol.drop, self.protocol.gravity.value
+        record = self.record
+        return votes(record, drop, gravity, kappa, clock, window, alphas)
+
+    def judged(self, tried: Iterable[Guess]) -> list[Reading]:
+        """Adjust one guess after another while a better one may still come."""
+        found: list[Reading] = []
+        for one in itertools.islice(tried, _TRIED):
+            enough = [r for r in found if r.fit.estimate.scatter < _CALM]
+            if enough and one.votes + _MARGIN < max(reading.fit.matched for reading in enough):
+                break
+            model = DropModel(
+                self.protocol,
+                [self.record],
+                {self.record.role: one},
+                self.clock_u,
+                self.components,
+                air=self.air,
+            )
+            if any(_alike(model, one, reading.fit) for reading in enough):
+                continue
+            fit = settle(model, rounds=_ROUNDS, steps=_STEPS)
+            if fit.matched:
+                found.append(Reading(fit, log_evidence(fit)))
+        return _best(found)
+
+
+def _alike(model: DropModel, guess: Guess, known: Fit) -> bool:
+    """Whether a guess is the fall of an adjusted reading, to a part of the distance of two rods."""
+    (role,) = model.records
+    path, other = model.trajectory(role, model.first()), known.model.trajectory(role, known.x)
+    latest = max(train.times.max(initial=guess.release) for train in model.records[role].trains)
+    times = np.linspace(guess.release, float(latest), _INSTANTS)
+    apart = np.abs(path.heights(times)[0] - other.heights(times)[0])
+    return float(apart.max()) < _SAME * slack_of(model.records[role])
+
+
+def _best(readings: Iterable[Reading]) -> list[Reading]:
+    """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
+    found: list[Reading] = []
+    for reading in sorted(readings, key=lambda one: -one.evidence):
+        if all(different(reading.fit, other.fit) for other in found):
+            found.append(reading)
+    return found
+
+
+def different(one: Fit, other: Fit) -> bool:
+    """Whether two readings give really different rods to the same edges of a side."""
+    for role, matches in one.matches.items():
+        mine, theirs = np.concatenate(matches), np.concatenate(other.matches[role])
+        matched = int(np.count_nonzero((mine >= 0) | (theirs >= 0)))
+        if np.count_nonzero(mine != theirs) > max(_FEW, _OTHER * matched):
+            return True
+    return False
+
+
+def log_evidence(fit: Fit) -> float:
+    """Logarithm of the marginal likelihood of a reading, up to what depends on the edges alone.
+
+    A matched edge has the density of its time about the motion; a missed and an extra one what is
+    known of such beforehand. The unknowns are integrated out by Laplace's method: −½‖y‖² −
+    ½ ln det A at the best estimate, with y and A in units of the prior uncertainties.
+    """
+    estimate, model = fit.estimate, fit.model
+    total = 0.0
+    for role, matches in fit.matches.items():
+        rows = model.residuals(role, estimate.x, matches)
+        sigma = rows.sigma * estimate.scatter
+        far = np.abs(rows.values) / sigma
+        loss = np.where(far <= HUBER, 0.5 * far**2, HUBER * far - 0.5 * HUBER**2)
+        density = np.log(np.maximum(rows.speed, SLOWEST) / (sigma * math.sqrt(2.0 * math.pi)))
+        total += float(np.sum(density - loss))
+        # Relative to a reading in which all edges are strays and every rod was missed.
+        total += far.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS))
+    y = scaled(estimate.x, estimate.sd)
+    _, volume = np.linalg.slogdet(estimate.information)
+    return total - 0.5 * float(y @ y) - 0.5 * float(volume)
+
+
+def _relaxed(fit: Fit) -> Fit:
+    """Take back edges that only rods far off their places explain, where that is likelier.
+
+    A stray near a rod that was missed is matched with it: few edges tell where that rod is, so it
+    gives way, and nothing is left over by which the edge could be told.
+    """
+    for role, record in fit.model.records.items():
+        block = fit.model.unknowns[f"{role} rods"]
+        tense = np.abs(scaled(fit.x[block], fit.model.unknowns.sd[block]))
+        for rod in np.argsort(-tense)[:_RELAXED]:
+            if tense[rod] < _TENSE:
+                break
+            matches = dict(fit.matches)
+            matches[role] = [
+                np.where(train.rods == rod, -1, match)
+                for train, match in zip(record.trains, fit.matches[role], strict=True)
+            ]
+            other = Fit(fit.model, matches, adjust(fit.model, matches, fit.x))
+            if other.matched < fit.matched and log_evidence(other) > log_evidence(fit):
+                fit = other
+    return fit
+
+
+def adjusted(fit: Fit, role: str) -> Guess:
+    """Return where an adjustment has a chain begin, as a guess for a further one."""
+    at, x = fit.model.unknowns, fit.x
+    path = fit.model.trajectory(role, x)
+    one = fit.model.guesses[role]
+    return Guess(
+        float(path.time[0]),
+        float(path.height[0]),
+        one.alpha + (float(x[at["alpha"]][0]) if role == "impact" else 0.0),
+        path.kappa,
+        float(x[at["clock"]][0]),
+        one.votes,
+    )
+
+
+def _together(
+    protocol: Protocol,
+    records: Sequence[ChainRecord],
+    found: Mapping[str, Sequence[Reading]],
+    clock_u: float,
+    components: Components,
+) -> Identification:
+    """Adjust the best readings of all sides together, and weigh them against each other."""
+    roles: list[str] = [record.role for record in records]
+    pairs = sorted(
+        itertools.product(*(found[role] for role in roles)),
+        key=lambda pair: -_likely(protocol, roles, pair),
+    )
+    most = _likely(protocol, roles, pairs[0])
+    close = [pair for pair in pairs if most - _likely(protocol, roles, pair) < _CLOSE][:_PAIRS]
+    tried: list[Reading] = []
+    for pair in close:
+        if len(pair) == 1:
+            # One side is all there is: the same again, to the end.
+            fit = settle(pair[0].fit.model)
+            tried.append(Reading(fit, log_evidence(fit)))
+            continue
+        begin: dict[str, Guess] = {
+            role: adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)
+        }
+        matches = {role: one.fit.matches[role] for role, one in zip(roles, pair, strict=True)}
+        fit = settle(DropModel(protocol, records, begin, clock_u, components), matches)
+        tried.append(Reading(fit, log_evidence(fit) + _simultaneous(protocol, begin.values())))
+    best, *rest = _best(tried)
+    odds = best.evidence - rest[0].evidence if rest else math.inf
+    if len(pairs) > len(close):
+        odds = min(odds, most - _likely(protocol, roles, pairs[len(close)]))
+    fit = _relaxed(best.fit)
+    other = rest[0].fit if rest else None
+    return Identification(fit, _shares(fit), odds, best.evidence, other)
+
+
+def _shares(fit: Fit) -> dict[str, float]:
+    found = {}
+    for role, record in fit.model.records.items():
+        matched = sum(int(np.count_nonzero(match >= 0)) for match in fit.matches[role])
+        found[role] = matched / max(1, record.expected)
+    return found
+
+
+def _likely(protocol: Protocol, roles: Sequence[str], pair: Sequence[Reading]) -> float:
+    begins = [adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)]
+    return sum(one.evidence for one in pair) + _simultaneous(protocol, begins)
+
+
+def _simultaneous(protocol: Protocol, begins: Iterable[Guess]) -> float:
+    """Log prior of how far apart two releases are: a Cauchy of the skew that is accepted."""
+    releases = [one.release for one in begins]
+    apart = (max(releases) - min(releases)) / protocol.accept.release_skew
+    return -math.log1p(apart**2)

@@ -1,0 +1,178 @@
+"""Trial drops: how many of a layout's drops would be read, by the same code that reads real ones.
+
+Everything that a protocol states an uncertainty of is off by chance, edges are missed, and chains
+are let go one after the other. A drop is read if it is not void for what its edges look like and
+every edge that is given to a rod is that rod's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import cycle, islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.chain_records import chain_records
+from rig.analysis.components import STATED
+from rig.analysis.deciding import deciding_gate
+from rig.analysis.identify import MISSED, identify
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.analysis.verdict import pattern_faults
+from rig.design.cases import CLOCK_U, RELEASE_S
+from rig.model.rods import rod_impacts
+from rig.protocol.plan import runs
+from rig.records import Drop
+from rig.threads import one_thread
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.chain_records import ChainRecord
+    from rig.analysis.identify import Identification
+    from rig.analysis.trajectory import Trajectory
+    from rig.protocol.protocol import Protocol, Run
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+
+DROPS = 20
+"""Trials of a layout: one drop in twenty that fails shows in two lists of three."""
+_WINDOW = (0.0, np.inf)
+_SEED = 1  # the same drops for every layout, and on every machine
+
+
+@dataclass(frozen=True, slots=True)
+class Trials:
+    """What became of a layout's trial drops.
+
+    Attributes
+    ----------
+    drops, read
+        How many there were, and how many were read rightly.
+    failing
+        Side whose edges told too little, and in how many drops.
+    wanted
+        Side and height of a further gate that would tell apart what looked alike, m.
+    """
+
+    drops: int
+    read: int
+    failing: tuple[tuple[str, int], ...] = ()
+    wanted: tuple[str, float] | None = None
+
+
+@one_thread
+def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
+    """Let chains fall before a protocol's gates, and read their edges.
+
+    Parameters
+    ----------
+    drops
+        How many, in turn at all inclines and with either chain where they are unlike.
+    """
+    rng = np.random.default_rng(_SEED)
+    kinds = {(run.incline_deg, run.impact, run.free): run for run in reversed(runs(protocol))}
+    read, failing = 0, dict[str, int]()
+    wanted: tuple[str, float] | None = None
+    for run in islice(cycle(kinds.values()), drops):
+        start = protocol.drop.value + protocol.drop.u * rng.standard_normal()
+        fallen = [_fallen(protocol, one, run, start, rng) for one in _blank(protocol, run)]
+        found = identify(protocol, [one for one, _ in fallen], CLOCK_U, STATED, _WINDOW)
+        wrong = misread(found, {record.role: truth for record, truth in fallen})
+        if not wrong:
+            read += 1
+        for side in wrong:
+            failing[side] = failing.get(side, 0) + 1
+        if wrong and wanted is None and found.fit is not None and found.other is not None:
+            wanted = deciding_gate(found.fit, found.other)
+    return Trials(drops, read, tuple(failing.items()), wanted)
+
+
+def _blank(protocol: Protocol, run: Run) -> list[ChainRecord]:
+    return chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
+
+
+def _fallen(
+    protocol: Protocol, record: ChainRecord, run: Run, start: float, rng: np.random.Generator
+) -> tuple[ChainRecord, list[Index]]:
+    """Let one chain fall; with it, for each train, which edge each expected edge is."""
+    assert protocol.gates is not None
+    chain = record.chain
+    rods = chain.position_u * rng.standard_normal(chain.chain.rods)
+    wider = chain.width_u * rng.standard_normal()
+    path = _path(protocol, record, run, start, rods, rng)
+    trains, truth = [], []
+    for train in record.trains:
+        levels = train.levels + protocol.gates.height_u * rng.standard_normal() - rods[train.rods]
+        levels -= np.where(train.blocks, -0.5, 0.5) * wider
+        seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
+        times = path.times(levels[seen]) + STATED.jitter * rng.standard_normal(seen.size)
+        order = np.argsort(times, kind="stable")
+        seen = seen[order]
+        edges = np.full(levels.size, -1)
+        edges[seen] = np.arange(seen.size)
+        blocked, burst = train.blocks[seen], np.zeros(seen.size)
+        number = np.arange(seen.size)
+        trains.append(replace(train, times=times[order], blocked=blocked, burst=burst, edge=number))
+        truth.append(edges)
+    return replace(record, trains=tuple(trains)), truth
+
+
+def _path(
+    protocol: Protocol,
+    record: ChainRecord,
+    run: Run,
+    start: float,
+    rods: Array,
+    rng: np.random.Generator,
+) -> Trajectory:
+    """Where a chain is that hangs and is let go a little off, with impulses that scatter."""
+    start += STATED.hang * rng.standard_normal()
+    release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
+    gravity = protocol.gravity.value
+    if record.ratios is None:
+        return free_trajectory(release, start, gravity)
+    assert protocol.surface is not None
+    impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
+    alphas = np.array([one.alpha for one in impacts])
+    alphas += STATED.impulses(float(alphas.mean())) * rng.standard_normal(alphas.size)
+    places = np.array(record.chain.chain.heights) + rods
+    return struck_trajectory(release, start, gravity, alphas, record.ratios, places)
+
+
+def misread(found: Identification, truth: Mapping[str, Sequence[Index]]) -> list[str]:
+    """Return the sides of which no fall, or the wrong one, was found.
+
+    Parameters
+    ----------
+    truth
+        For each train of each side which edge every expected edge is, −1 for a missed one.
+    """
+    unlike = list(pattern_faults(found))
+    if unlike or found.fit is None:
+        return unlike or list(truth)
+    return [
+        role
+        for role, matches in found.fit.matches.items()
+        if any(
+            np.any((match >= 0) & (match != true))
+            for match, true in zip(matches, truth[role], strict=True)
+        )
+    ]
+
+
+def trials_text(found: Trials) -> str:
+    """Say in a sentence what became of trial drops, and what would help."""
+    text = f"of {found.drops} trial drops {found.read} are read"
+    if found.failing:
+        sides = " and ".join(f"{side} side ({count})" for side, count in found.failing)
+        text += f"; what fails is the {sides}"
+    if found.wanted is not None:
+        side, height = found.wanted
+        text += f"; a further {side} gate at {height * 1e3:.0f} mm would tell most"
+    elif found.failing:
+        text += "; another gate there, well above the lowest one, would help"
+    return text

@@ -1,0 +1,309 @@
+"""The chosen reading against all readings there are, and against the truth on any layout."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rig.analysis.components import STATED
+from rig.analysis.deciding import deciding_gate
+from rig.analysis.identify import MISSED, STRAYS
+from rig.analysis.verdict import LEAD, pattern_faults
+from rig.errors import InputError
+from rig.protocol import reader
+from rig.protocol.protocol import Protocol
+from rig.records import Edge
+from sim.dials import Dials
+from tests.analysis.drops import CLOCK_U, Case, case, wrong_rods
+
+FENCE = """
+protocol: 1
+title: A few bars
+chains: {{fence: {{rods: {rods}, length: {length} mm, diameter: {width} mm}}}}
+drop: {drop}
+gravity: 9.81 m/s^2
+gates: {{free: [{gates}], height_uncertainty: 0.3 mm}}
+release: {{channel: 0, pulse: 80 ms}}
+plan: {{repeats: 4}}
+accept: {{missed_edges: 15 %}}
+"""
+TWO = """
+protocol: 1
+title: Any layout
+chains:
+  A: {{rods: {rods}, length: {length} mm, diameter: 12.7 mm, rod_length: {rod} mm, tilt: 12 deg}}
+  B: {{like: A}}
+surface: {{restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}}
+drop: {drop}
+gravity: 9.81 m/s^2
+gates: {{impact: [{impact}], free: [{free}], height_uncertainty: 0.3 mm}}
+release: {{channel: 0, pulse: 80 ms}}
+plan: {{incline: [40 deg, 60 deg], repeats: 4, order: ABBA}}
+accept: {{release_skew: 5 ms, missed_edges: 5 %}}
+"""
+
+
+def beams(heights: list[int], first: int = 0) -> str:
+    return ", ".join(
+        f"{{channel: {first + n}, height: {height} mm}}" for n, height in enumerate(heights)
+    )
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Protocols from their text."""
+    folder, count = tmp_path_factory.mktemp("protocols"), itertools.count()
+
+    @cache
+    def read(text: str) -> Protocol:
+        path = folder / f"{next(count)}.yaml"
+        path.write_text(text, encoding="utf-8")
+        return reader.read(path)
+
+    return read
+
+
+# Every reading there is ---------------------------------------------------------------------------
+
+
+SCATTERS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 10.0)
+MOST = 40  # readings of which anything is asked
+
+
+def readings(edges: list[bool], expected: list[bool]) -> list[tuple[int, ...]]:
+    """All ways to give each expected edge of a beam an edge of its polarity, or none, in order."""
+    if not expected:
+        return [()]
+    found = [(-1, *rest) for rest in readings(edges, expected[1:])]
+    for n, blocked in enumerate(edges):
+        if blocked == expected[0]:
+            later = readings(edges[n + 1 :], expected[1:])
+            found += [(n, *(m + n + 1 if m >= 0 else -1 for m in rest)) for rest in later]
+    return found
+
+
+def log_likelihood(
+    protocol: Protocol, times: np.ndarray, rods, blocks, gates, scatter: float = 1.0
+) -> float:
+    """Marginal likelihood of edges that are given to rods, in a fall from rest in vacuum.
+
+    `scatter` is how much more the edges scatter than stated.
+
+    From where the fall is likeliest the equations are taken as linear: then heights at the edges'
+    times are normal, with a covariance of edge errors and of everything that is not known.
+    """
+    chain = protocol.chains["fence"]
+    heights = np.array([gate.height for gate in protocol.gates.gates])
+    places, half = np.array(chain.chain.heights), np.array(chain.widths) / 2.0
+    levels = heights[gates] - places[rods] + np.where(blocks, half[rods], -half[rods])
+
+    # Release, start, gravity; then one by one clock, beams, rods, width.
+    sd = np.array([1.0, math.hypot(protocol.drop.u, STATED.hang), 5.0])
+    release, start, gravity = 0.0, protocol.drop.value, protocol.gravity.value
+    centre = np.array([release, start, gravity])
+    value = centre.copy()
+    constant = np.hstack(
+        [
+            protocol.gates.height_u * (gates[:, None] == np.arange(heights.size)),
+            chain.position_u * (rods[:, None] == np.arange(places.size)),
+            np.where(blocks, 0.5, -0.5)[:, None] * chain.width_u,
+        ]
+    )
+    for _ in range(60):
+        since = times - value[0]
+        residual = value[1] - 0.5 * value[2] * since**2 - levels
+        slopes = np.stack([value[2] * since, np.ones(times.size), -0.5 * since**2], axis=1)
+        speed = np.abs(value[2] * since)
+        noise = scatter**2 * (STATED.floor**2 + (speed * STATED.jitter) ** 2)
+        clock = (-value[2] * since * times * CLOCK_U)[:, None]
+        rest = np.diag(noise) + constant @ constant.T + clock @ clock.T
+        weight = np.linalg.inv(rest)
+        matrix = slopes.T @ weight @ slopes + np.diag(sd**-2.0)
+        right = slopes.T @ weight @ residual + (value - centre) / sd**2
+        step = np.linalg.solve(matrix, right)
+        value = value - step
+        if np.all(np.abs(step) < 1e-9):
+            break
+    if (since <= 0.0).any():
+        return -math.inf
+    covariance = rest + (slopes * sd**2) @ slopes.T
+    far = residual + slopes @ (centre - value)
+    _, volume = np.linalg.slogdet(2.0 * math.pi * covariance)
+    # A density of heights; of times it is speed times as much.
+    density = -0.5 * volume - 0.5 * far @ np.linalg.solve(covariance, far)
+    density += np.log(np.maximum(speed, 0.05)).sum()
+    return float(density + times.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS)))
+
+
+def oracle(one: Case, least: float = 0.5) -> list[tuple[float, float, dict[int, int]]]:
+    """Every reading of a fence's edges, edge → rod, with its logarithm, the likeliest first.
+
+    Beside it the logarithm at whatever scatter makes it likeliest. Left out is what gives a rod to
+    less than the `least` share of the expected edges: no reading that explains so little is near.
+    """
+    (record,) = one.records
+    choices = [readings(train.blocked.tolist(), train.blocks.tolist()) for train in record.trains]
+    found = []
+    for choice in itertools.product(*choices):
+        times, rods, blocks, gates, numbers = [], [], [], [], []
+        for train, matches in zip(record.trains, choice, strict=True):
+            for place, edge in enumerate(matches):
+                if edge >= 0:
+                    times.append(train.times[edge])
+                    rods.append(train.rods[place])
+                    blocks.append(train.blocks[place])
+                    gates.append(train.gate)
+                    numbers.append(int(train.edge[edge]))
+        if len(times) < least * record.expected:
+            continue
+        arrays = np.array(times), np.array(rods), np.array(blocks), np.array(gates)
+        given = dict(zip(numbers, map(int, rods), strict=True))
+        likely = log_likelihood(one.protocol, *arrays)
+        found.append((likely, arrays, given))
+    found.sort(key=lambda row: -row[0])
+    return [
+        (likely, max(log_likelihood(one.protocol, *arrays, s) for s in SCATTERS), given)
+        for likely, arrays, given in found[:MOST]
+    ]
+
+
+def unlike(one: dict[int, int], other: dict[int, int]) -> bool:
+    """Whether two readings differ in more than a stray in place of a missed edge."""
+    changed = {edge for edge in one | other if one.get(edge) != other.get(edge)}
+    return len(changed) > 2
+
+
+def few_bars(written, rods: int, gates: list[int], drop: str, pitch: int = 40) -> Protocol:
+    return written(
+        FENCE.format(rods=rods, length=pitch * (rods - 1), width=15, drop=drop, gates=beams(gates))
+    )
+
+
+def spoiled(one: Case, missed: list[int], strays: list[tuple[float, bool]]) -> Case:
+    """Without some edges, and with others at a share of the time between the first and last."""
+    edges = list(one.drop.edges)
+    first, last = edges[0].tick, edges[-1].tick
+    kept = [edge for n, edge in enumerate(edges) if n not in missed]
+    kept += [Edge(round(first + share * (last - first)), 0, blocked) for share, blocked in strays]
+    return one.with_edges(kept)
+
+
+CASES = {
+    "two rods, one gate": (2, [60], [], [], 0.5),
+    "three rods, one gate, a stray": (3, [60], [], [(0.4, True)], 0.5),
+    "three rods, two gates": (3, [30, 120], [], [], 0.8),
+    "two rods, two gates, one missed": (2, [30, 150], [2], [], 0.5),
+    "three rods, two gates, one missed and a stray": (3, [30, 120], [4], [(0.3, True)], 0.8),
+    "four rods, one gate, a rod missed": (4, [60], [0, 1], [], 0.5),
+    "four rods, one gate, a middle rod missed": (4, [60], [2, 3], [], 0.5),
+}
+
+
+UNDISTURBED = Dials(bounce=0.0, missed=0.0, chatter=0.0, string=0.0)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_likeliest_of_all_readings_is_chosen(written, name):
+    rods, gates, missed, strays, least = CASES[name]
+    protocol = few_bars(written, rods, gates, "180 mm ± 2 mm")
+    one = spoiled(case(protocol, UNDISTURBED), missed, strays)
+    (likeliest, _, given), *rest = oracle(one, least)
+    found = one.identify()
+    assert found.fit is not None
+    assert found.fit.rods == given
+    # Laplace's method is exact for what is normal; a fall is, but for the noise's own slope.
+    assert found.evidence == pytest.approx(likeliest, abs=0.01)
+    others = [row for row in rest if unlike(row[2], given)]
+    most = likeliest - max((row[0] for row in others), default=-math.inf)
+    least_odds = likeliest - max((row[1] for row in others), default=-math.inf)
+    # A reading that fits badly is given more scatter than is stated, which makes it likelier.
+    if most < 2.0 * LEAD:
+        assert least_odds - 0.1 < found.log_odds < most + 0.1
+    else:
+        # What is so unlikely need not be tried.
+        assert found.log_odds > min(2.0 * LEAD, least_odds - 0.1)
+
+
+def test_what_cannot_be_told_is_void_and_the_odds_are_stated(written):
+    """One rod of three was missed, and nobody knows how high they hung: two falls, equally good."""
+    protocol = few_bars(written, 3, [60], "180 mm ± 60 mm")
+    one = spoiled(case(protocol, Dials.quiet()), [0, 1], [])
+    (likeliest, _, given), *rest = oracle(one)
+    odds = likeliest - max(log for log, _, other in rest if unlike(other, given))
+    assert odds < math.log(3.0)
+    found = one.identify()
+    assert found.evidence == pytest.approx(likeliest, abs=0.01)
+    assert found.log_odds == pytest.approx(odds, abs=0.1)
+    assert any(
+        f"{math.exp(found.log_odds):.3g} to 1" in why for why in pattern_faults(found).values()
+    )
+    assert one.analyze().verdict == "void"
+    assert found.other is not None
+    assert {found.fit.rods[edge] for edge in found.fit.rods} != set(found.other.rods.values())
+
+
+def test_a_further_gate_tells_what_one_cannot(written):
+    """It is put where the two falls differ, and there the same drop is read."""
+    protocol = few_bars(written, 3, [60], "180 mm ± 60 mm")
+    found = spoiled(case(protocol, Dials.quiet()), [0, 1], []).identify()
+    role, height = deciding_gate(found.fit, found.other)
+    assert role == "free"
+    two = few_bars(written, 3, [60, round(height * 1e3)], "180 mm ± 60 mm")
+    whole = case(two, Dials.quiet())
+    first = [n for n, edge in enumerate(whole.drop.edges) if edge.channel == 0][:2]
+    told = spoiled(whole, first, [])
+    again = told.identify()
+    assert again.log_odds > LEAD
+    kept = [origin for n, origin in enumerate(whole.truth.edges) if n not in first]
+    assert all(again.fit.rods[n] == kept[n][3] for n in again.fit.rods)
+
+
+# Any layout ---------------------------------------------------------------------------------------
+
+
+def any_layout(written, rng: np.random.Generator) -> Protocol:
+    """One to eight gates a side or on one alone, two to sixty rods, low and high drops."""
+    rods = int(rng.choice([2, 3, 5, 12, 25, 25, 60]))
+    length = max(int(rng.choice([300, 600, 1165, 2900])), 25 * rods)
+    drop = f"{rng.choice([60, 180, 400])} mm ± 2 mm"
+    top = int(min(1100, 0.9 * length))
+    spots = np.arange(20, max(top, 130), 12)
+    impact, free = (
+        sorted(rng.choice(spots, min(int(rng.integers(1, 9)), spots.size), replace=False).tolist())
+        for _ in range(2)
+    )
+    if rng.random() < 0.2:
+        gates = beams(free)
+        return written(FENCE.format(rods=rods, length=length, width=12, drop=drop, gates=gates))
+    rod = int(np.clip(2.5 * (length / (rods - 1) - 13), 20, 100))
+    return written(
+        TWO.format(
+            rods=rods,
+            length=length,
+            rod=rod,
+            drop=drop,
+            impact=beams(impact),
+            free=beams(free, 8),
+        )
+    )
+
+
+@pytest.mark.parametrize("dials", [Dials.quiet(), Dials()], ids=["quiet", "default"])
+def test_any_layout_is_read(written, dials):
+    rng = np.random.default_rng(7)
+    tried = 0
+    while tried < 40:
+        try:
+            protocol = any_layout(written, rng)
+        except InputError:  # a rod would hang in a beam
+            continue
+        tried += 1
+        one = case(protocol, dials, seed=tried)
+        result = one.analyze()
+        assert wrong_rods(result, one.truth) == []
+        if dials.missed == 0.0:
+            assert result.verdict != "void", (protocol.title, result.reasons)
