@@ -230,8 +230,8 @@ def _moments(
     half = np.clip(slack / np.maximum(paths.speeds, 1e-9), _SHORTEST, _LONGEST)
     # The larger α, the sooner; a level that no path comes by is near no moment.
     soonest, latest = paths.times[:, -1], paths.times[:, 0]
-    near = pairs.times - latest[pairs.expected] >= window[0] - _LONGEST
-    near &= pairs.times - soonest[pairs.expected] <= window[1] + _LONGEST
+    near = pairs.times - soonest[pairs.expected] >= window[0] - _LONGEST
+    near &= pairs.times - latest[pairs.expected] <= window[1] + _LONGEST
     times, expected = pairs.times[near], pairs.expected[near]
     if times.size == 0:
         return
