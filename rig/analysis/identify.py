@@ -46,7 +46,8 @@ STRAYS = 2.0
 SLOWEST = 0.05
 """m/s: no edge is stamped by a chain slower than this, as far as the density of its time goes."""
 _MARGIN = 3  # edges by which votes may fall short of what an adjusted fall matches
-_CLEAR = 0.97  # share of all that could be matched with which no other air or clock is tried
+_CLEAR = 0.97  # share of all that could be matched with which no other α is tried
+_FAIR = 0.9  # and with which, all α being tried, no other air or clock is
 _LEAST = 0.6  # and of all that is expected
 _CALM = 2.0  # scatter of edges above which a reading is none that ends the search
 _OTHER = 0.02  # share of a side's edges at another rod that makes a different reading
@@ -174,13 +175,13 @@ def well_read(reading: Reading) -> bool:
     return _convincing([reading])
 
 
-def _convincing(readings: Sequence[Reading]) -> bool:
+def _convincing(readings: Sequence[Reading], clear: float = _FAIR) -> bool:
     if not readings:
         return False
     best = readings[0]
     calm = best.fit.estimate.scatter < _CALM
     most = sum(possible(record) for record in best.fit.model.records.values())
-    return calm and best.share >= _LEAST and best.fit.matched >= _CLEAR * most
+    return calm and best.share >= _LEAST and best.fit.matched >= clear * most
 
 
 def possible(record: ChainRecord) -> int:
@@ -218,7 +219,7 @@ class _Side:
         searches = [(hint, near_alpha(record)), (hint, ANY_ALPHA), (window, ANY_ALPHA)]
         for span, alphas in searches[:: 2 if record.ratios is None else 1]:
             found = _best([*found, *self.judged(self.guesses(span, kappa, clock, alphas))])
-            if _convincing(found):
+            if _convincing(found, _CLEAR if alphas != ANY_ALPHA else _FAIR):
                 return found
         if possible(record) < _LEAST * record.expected:
             return found  # whatever the air and the clock are
