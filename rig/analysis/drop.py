@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import STATED, Components
 from rig.analysis.edge_classes import unmatched_edges
-from rig.analysis.explanations import Explainer, Setting, explained, faults
+from rig.analysis.explanations import Explainer, Premise, explained, faults
 from rig.analysis.identify import identify
 from rig.analysis.quantities import quantities
 from rig.analysis.result import Audit, DropResult
@@ -121,5 +121,6 @@ def _explained(
     suspects = judged.suspects
     if judged.verdict == "void" and not suspects and len(protocol.gates.gates) <= _FEW_GATES:
         suspects = tuple(range(len(protocol.gates.gates)))
-    explainer = Explainer(Setting(protocol, run, scale.hz), drop, scale.u, components)
-    return explained(explainer.explain(faults(protocol, run, suspects[:_SUSPECTS])))
+    explainer = Explainer(Premise(protocol, run, scale.hz), drop, scale.u, components)
+    weighed = explainer.explain(faults(protocol, run, suspects[:_SUSPECTS]))
+    return explained(weighed, judged.accused)

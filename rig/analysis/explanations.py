@@ -44,7 +44,7 @@ _VOTED = 0.8  # share of all expected edges that must vote for a fall with a fau
 _TRIED = 4  # kinds whose size is sought: those that most edges vote for
 
 
-class Setting(NamedTuple):
+class Premise(NamedTuple):
     """What a drop is read with."""
 
     protocol: Protocol
@@ -68,7 +68,7 @@ class Fault:
         Whether sizes between them count too, so that the best one is sought.
     """
 
-    change: Callable[[Setting, float], Setting]
+    change: Callable[[Premise, float], Premise]
     words: Callable[[float, float], str]
     sizes: tuple[float, ...] = (0.0,)
     steady: bool = False
@@ -109,7 +109,7 @@ class Explainer:
     """
 
     def __init__(
-        self, setting: Setting, drop: Drop, clock_u: float, components: Components
+        self, setting: Premise, drop: Drop, clock_u: float, components: Components
     ) -> None:
         self.setting = setting
         self.drop = drop
@@ -127,8 +127,9 @@ class Explainer:
         """Weigh faults; the likeliest first, and only those likelier than none."""
         if any(possible(one) < _SOME * one.expected for one in self._records(self.setting)):
             return []  # too few edges came for any fall
-        voted = sorted(((self._votes(one), n) for n, one in enumerate(faults)), reverse=True)
-        likely = [n for votes, n in voted if votes >= _VOTED][:_TRIED]
+        voted = [(*self._votes(one), n) for n, one in enumerate(faults)]
+        voted.sort(key=lambda one: -one[1])
+        likely = [n for share, _, n in voted if share >= _VOTED][:_TRIED]
         if not likely:
             return []
         stated = sum(one.evidence for one in self._read(self.setting) if one is not None)
@@ -139,11 +140,13 @@ class Explainer:
                 found.append(one)
         return sorted(found, key=lambda one: -one.log_odds)
 
-    def _votes(self, fault: Fault) -> float:
-        """Best share of expected edges that vote for a fall with this fault, over its sizes."""
-        return max(self._share(fault.change(self.setting, size)) for size in fault.sizes)
+    def _votes(self, fault: Fault) -> tuple[float, int]:
+        """Best share of expected edges, and votes less edges without, over a fault's sizes."""
+        found = [self._voted(fault.change(self.setting, size)) for size in fault.sizes]
+        return max(share for share, _ in found), max(net for _, net in found)
 
-    def _share(self, setting: Setting) -> float:
+    def _voted(self, setting: Premise) -> tuple[float, int]:
+        """Share of the expected edges that vote for one fall, and votes less edges without."""
         votes = expected = 0
         for record in self._records(setting):
             key = _key(setting, record)
@@ -159,12 +162,12 @@ class Explainer:
                 self._shares[key] = tried[0].votes if tried else 0, record.expected
             votes += self._shares[key][0]
             expected += self._shares[key][1]
-        return votes / max(1, expected)
+        return votes / max(1, expected), 2 * votes - expected
 
-    def _records(self, setting: Setting) -> list[ChainRecord]:
+    def _records(self, setting: Premise) -> list[ChainRecord]:
         return chain_records(setting.protocol, setting.run, self.drop, setting.hz)
 
-    def _read(self, setting: Setting) -> list[Reading | None]:
+    def _read(self, setting: Premise) -> list[Reading | None]:
         found = []
         for record in self._records(setting):
             key = _key(setting, record)
@@ -182,7 +185,7 @@ class Explainer:
 
     def _weighed(self, fault: Fault, stated: float) -> Explanation | None:
         ranked = sorted(
-            fault.sizes, key=lambda size: -self._share(fault.change(self.setting, size))
+            fault.sizes, key=lambda size: -self._voted(fault.change(self.setting, size))[1]
         )
         size, (best, whole) = max(
             ((one, self._evidence(fault, one)) for one in ranked[:2]), key=lambda pair: pair[1]
@@ -223,7 +226,7 @@ class Explainer:
         return size, best, whole, step / math.sqrt(bend)
 
 
-def _key(setting: Setting, record: ChainRecord) -> Hashable:
+def _key(setting: Premise, record: ChainRecord) -> Hashable:
     """Return what a side's reading depends on."""
     protocol = setting.protocol
     levels = b"".join(train.levels.tobytes() for train in record.trains)
@@ -233,14 +236,19 @@ def _key(setting: Setting, record: ChainRecord) -> Hashable:
     )  # fmt: skip
 
 
-def explained(found: Sequence[Explanation]) -> list[str]:
-    """Put the weighed faults of a drop into words: the clear one, or the likeliest."""
-    if not found:
-        return []
-    best = found[0]
+def explained(found: Sequence[Explanation], accused: Sequence[str] = ()) -> list[str]:
+    """Put the weighed faults of a drop into words: the clear one, or what there is beside.
+
+    Parameters
+    ----------
+    accused
+        What is said where no fault is clear.
+    """
     second = max([0.0, *(one.log_odds for one in found[1:])])
-    if best.whole and best.log_odds - second > CLEAR:
-        return [f"{best.words} (odds {_odds(best.log_odds - second)} to 1)"]
+    if found and found[0].whole and found[0].log_odds - second > CLEAR:
+        return [f"{found[0].words} (odds {_odds(found[0].log_odds - second)} to 1)"]
+    if accused or not found:
+        return [*accused]
     told = "; or ".join(one.words for one in found[:_NAMED])
     return [f"likeliest, but not clearly: {told}"]
 
@@ -393,7 +401,7 @@ def _gate_off(gate: Gate) -> Fault:
 
 
 def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
-    def change(setting: Setting, _: float) -> Setting:
+    def change(setting: Premise, _: float) -> Premise:
         found = list(gates)
         found[a] = replace(gates[a], channel=gates[b].channel)
         found[b] = replace(gates[b], channel=gates[a].channel)
@@ -412,16 +420,16 @@ def name_of(gate: Gate) -> str:
     return f"the gate on channel {gate.channel} ({gate.side} side, {gate.height * 1e3:g} mm)"
 
 
-def _protocol(setting: Setting, **changes: object) -> Setting:
+def _protocol(setting: Premise, **changes: object) -> Premise:
     return setting._replace(protocol=replace(setting.protocol, **changes))  # type: ignore[arg-type]
 
 
-def _with_gates(setting: Setting, gates: Sequence[Gate]) -> Setting:
+def _with_gates(setting: Premise, gates: Sequence[Gate]) -> Premise:
     assert setting.protocol.gates is not None
     return _protocol(setting, gates=replace(setting.protocol.gates, gates=tuple(gates)))
 
 
-def _moved(setting: Setting, by: float, which: Callable[[Gate], bool]) -> Setting:
+def _moved(setting: Premise, by: float, which: Callable[[Gate], bool]) -> Premise:
     gates = setting.protocol.gates
     assert isinstance(gates, Gates)
     return _with_gates(
@@ -432,8 +440,8 @@ def _moved(setting: Setting, by: float, which: Callable[[Gate], bool]) -> Settin
 
 def _with_chains(
     names: set[str], other: Callable[[RodChain, float], RodChain]
-) -> Callable[[Setting, float], Setting]:
-    def change(setting: Setting, size: float) -> Setting:
+) -> Callable[[Premise, float], Premise]:
+    def change(setting: Premise, size: float) -> Premise:
         chains = {
             name: other(chain, size) if name in names else chain
             for name, chain in setting.protocol.chains.items()

@@ -119,7 +119,8 @@ def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> 
     if audit.missed > _most_missed(expected, accept.missed_edges):
         void.append(_many_missed(audit, accept.missed_edges))
     skew = found.get("release_skew_s")
-    if skew is not None and abs(skew.value) > accept.release_skew:
+    # A skew that may be within the limit is a doubt.
+    if skew is not None and abs(skew.value) - skew.expanded > accept.release_skew:
         void.append(
             f"release skew {skew.value * 1e3:.2f} ms is beyond {accept.release_skew * 1e3:g} ms"
         )
@@ -155,7 +156,7 @@ def _doubts(
         doubts.append(f"{_many_missed(audit, missed)}, which of so few edges may be chance")
     skew = found.get("release_skew_s")
     limit = protocol.accept.release_skew
-    if skew is not None and abs(skew.value) + skew.expanded > limit >= abs(skew.value):
+    if skew is not None and abs(abs(skew.value) - limit) < skew.expanded:
         doubts.append(
             f"release skew {skew.value * 1e3:.2f} ms is within its uncertainty of the limit"
         )
