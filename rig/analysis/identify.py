@@ -134,6 +134,7 @@ def identify(
     """
     air = air_is_told(records)
     found: dict[str, list[Reading]] = {}
+    shares: dict[str, float] = {}
     # The free chain first: it tells what the air does to both, and when they were let go.
     near, kappa, clock = window, 0.0, 0.0
     for record in reversed(records):
@@ -142,15 +143,12 @@ def identify(
         if near != window and not _convincing(readings):
             readings = _best([*readings, *side.readings(window, kappa, clock)])
         found[record.role] = readings
+        shares[record.role] = readings[0].share if readings else side.most_votes(window)
         if _convincing(readings):
             sure = adjusted(readings[0].fit, record.role)
             kappa, clock = sure.kappa, sure.clock
             near = _around([adjusted(one.fit, record.role).release for one in readings], window)
     if not all(found.values()):
-        shares = {
-            role: max((one.share for one in readings), default=0.0)
-            for role, readings in found.items()
-        }
         return Identification(None, shares)
     return _together(protocol, records, found, clock_u, components)
 
@@ -237,6 +235,11 @@ class _Side:
         record = self.record
         return votes(record, drop, gravity, kappa, clock, window, alphas)
 
+    def most_votes(self, window: Span) -> float:
+        """Share of the expected edges that vote for the same fall, at most."""
+        tried = self.guesses(window, 0.0, 0.0, near_alpha(self.record))
+        return min(1.0, max((one.votes for one in tried), default=0) / max(1, self.record.expected))
+
     def judged(self, tried: Iterable[Guess]) -> list[Reading]:
         """Adjust one guess after another while a better one may still come."""
         found: list[Reading] = []
@@ -244,6 +247,8 @@ class _Side:
             enough = [r for r in found if r.fit.estimate.scatter < _CALM]
             if enough and one.votes + _MARGIN < max(reading.fit.matched for reading in enough):
                 break
+            if one.votes + _MARGIN < _LEAST * self.record.expected:
+                break  # too few for any reading, however it is adjusted
             model = DropModel(
                 self.protocol,
                 [self.record],
@@ -255,8 +260,9 @@ class _Side:
             if any(_alike(model, one, reading.fit) for reading in enough):
                 continue
             fit = settle(model, rounds=_ROUNDS, steps=_STEPS)
-            if fit.matched:
-                found.append(Reading(fit, log_evidence(fit)))
+            evidence = log_evidence(fit) if fit.matched else 0.0
+            if evidence > 0.0:  # likelier than that all edges are strays and every rod was missed
+                found.append(Reading(fit, evidence))
         return _best(found)
 
 
@@ -379,6 +385,8 @@ def _together(
         fit = settle(DropModel(protocol, records, begin, clock_u, components), matches)
         tried.append(Reading(fit, log_evidence(fit) + _simultaneous(protocol, begin.values())))
     best, *rest = _best(tried)
+    if not best.evidence > 0.0:
+        return Identification(None, _shares(best.fit))
     odds = best.evidence - rest[0].evidence if rest else math.inf
     if len(pairs) > len(close):
         odds = min(odds, most - _likely(protocol, roles, pairs[len(close)]))

@@ -102,6 +102,13 @@ def pattern_faults(identified: Identification) -> dict[str, str]:
         for role, share in identified.shares.items()
         if share < SUPPORT
     }
+    if not found and identified.fit is None:
+        return dict.fromkeys(
+            identified.shares,
+            "this does not look like this chain falling: no motion fits edges enough of both sides"
+            if len(identified.shares) > 1
+            else "this does not look like this chain falling: no motion fits its edges",
+        )
     if not found and identified.log_odds < LEAD:
         odds = math.exp(identified.log_odds)
         return dict.fromkeys(
@@ -119,12 +126,19 @@ def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> 
     if audit.missed > _most_missed(expected, accept.missed_edges):
         void.append(_many_missed(audit, accept.missed_edges))
     skew = found.get("release_skew_s")
-    # A skew that may be within the limit is a doubt.
-    if skew is not None and abs(skew.value) - skew.expanded > accept.release_skew:
+    if skew is not None and _too_late(skew, accept.release_skew):
         void.append(
             f"release skew {skew.value * 1e3:.2f} ms is beyond {accept.release_skew * 1e3:g} ms"
         )
     return void
+
+
+def _too_late(skew: Measured, limit: float) -> bool:
+    """Whether releases were further apart than is accepted.
+
+    What is less sure than the limit is large must be beyond it with its uncertainty.
+    """
+    return abs(skew.value) - (skew.expanded if skew.expanded > limit else 0.0) > limit
 
 
 def _most_missed(expected: int, limit: float) -> float:
@@ -156,7 +170,8 @@ def _doubts(
         doubts.append(f"{_many_missed(audit, missed)}, which of so few edges may be chance")
     skew = found.get("release_skew_s")
     limit = protocol.accept.release_skew
-    if skew is not None and abs(abs(skew.value) - limit) < skew.expanded:
+    near = skew is not None and abs(abs(skew.value) - limit) < skew.expanded
+    if skew is not None and near and not _too_late(skew, limit):
         doubts.append(
             f"release skew {skew.value * 1e3:.2f} ms is within its uncertainty of the limit"
         )
