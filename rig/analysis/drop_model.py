@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 
+_ABOVE = 1e-3
+"""Where a struck chain hangs at least, m: an adjustment of nonsense tries what is below ground."""
+
+
 class _Local(NamedTuple):
     """The unknowns that one side knows of, by their places in its own equations.
 
@@ -229,6 +233,7 @@ class DropModel:
             return free_trajectory(release, start, gravity, kappa)
         record = self.records["impact"]
         assert record.ratios is not None
+        start = max(start, _ABOVE)
         places = np.array(record.chain.chain.heights) + x[at["impact rods"]]
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
         return struck_trajectory(release, start, gravity, gains, record.ratios, places, kappa)

@@ -114,8 +114,7 @@ def one_leg(distance: float, speed: float, gravity: float, kappa: float) -> tupl
     """`fall_through` of one leg: much quicker than an array of one."""
     if abs(kappa) < _NONE:
         arrival = math.sqrt(speed * speed + 2.0 * gravity * max(distance, 0.0))
-        # A chain that an adjustment has begin below the ground, at rest, is there already.
-        return arrival, 2.0 * distance / (speed + arrival) if speed + arrival else 0.0
+        return arrival, 2.0 * distance / (speed + arrival)
     left = math.exp(-2.0 * kappa * distance)
     reach = -math.expm1(-2.0 * kappa * distance) / kappa
     arrival = math.sqrt(max(left * speed * speed + gravity * reach, 0.0))
