@@ -190,7 +190,7 @@ def _gate(pins: Pins, x: float, y: float) -> None:
         y - 1.35,
         "100 nF at each chip, between +5 V and ground.",
         f"The next gates go to {_listed(pins.gates[1:])}.",
-        "A pin without a gate goes to ground.",
+        "A pin without a gate needs nothing.",
     )
 
 
@@ -288,6 +288,9 @@ def _contact(
 def _stop(pins: Pins, x: float, y: float) -> None:
     _title(x - 0.6, y + 3.7, "Emergency stop")
     _contact(x, y, pins.others["STOP"][0], lambda: elm.Button(nc=True), "opens when\nstruck")
+    elm.Dot().at((x + 2.6, y + 0.8))
+    _down(elm.Capacitor(), x + 2.6, y + 0.8, y - 0.9, "47 nF")
+    _ground(x + 2.6, y - 0.9)
     _note(x - 0.6, y - 2.0, "Open, or a broken wire, means stop.")
 
 

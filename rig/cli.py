@@ -132,7 +132,9 @@ def _parser() -> argparse.ArgumentParser:
 
     _tui(command("tui", "the lab session in the terminal: protocol, gates, runs, results"))
 
-    _protocol(command("check", "say what a protocol's scene has and what follows from it"))
+    check = command("check", "say what a protocol's scene has and what follows from it")
+    _protocol(check)
+    check.add_argument("--board", choices=tuple(BOARDS), help="refuse what this kind cannot do")
 
     design = command("design", "predict what a gate layout will tell, and propose better heights")
     _protocol(design)
@@ -201,6 +203,9 @@ def _parser() -> argparse.ArgumentParser:
     analyze.add_argument(
         "--scatter", action="store_true", help="SD, SE and U of each incline, and half-SD bars"
     )
+    analyze.add_argument(
+        "--priors", action="store_true", help="how results move with each prior: takes longer"
+    )
     _json(analyze)
 
     estimated = command("estimate", "estimate restitution, friction and impulses from a session")
@@ -227,6 +232,8 @@ def _parser() -> argparse.ArgumentParser:
     recover.add_argument(
         "--protocol", metavar="FILE", help="the protocol file, where the session has lost it"
     )
+
+    _session(command("unblind", "show a blind session's numbers from now on; recorded in it, once"))
 
     _session(command("replay", "feed the recorded bytes through the whole stack and compare"))
 
@@ -351,6 +358,9 @@ def _parser() -> argparse.ArgumentParser:
     other.add_argument(
         "--work", action="store_true", help="error against run time of that world itself instead"
     )
+    other.add_argument(
+        "--published", action="store_true", help="chains of other experiments in that world instead"
+    )
     _json(other)
     layouts = benches.add_parser("layouts", help="which layouts of gates let drops be read")
     layouts.set_defaults(module="bench_layouts")
@@ -365,6 +375,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     layouts.add_argument("--jobs", type=_count, metavar="N", help="layouts at a time")
     _json(layouts)
+    diagnoses = benches.add_parser("diagnoses", help="which faults of a rig are named rightly")
+    diagnoses.set_defaults(module="bench_diagnoses")
+    diagnoses.add_argument(
+        "-o", "--output", required=True, metavar="DIR", help="folder for table, page and JSON"
+    )
+    diagnoses.add_argument(
+        "--drops", type=_count, metavar="N", help="with each fault of each size on each layout"
+    )
+    diagnoses.add_argument("--clean", type=int, metavar="N", help="on each layout without a fault")
+    diagnoses.add_argument("--only", metavar="TEXT", help='layouts such as "10 rods: 2 + 2"')
+    diagnoses.add_argument("--jobs", type=_count, metavar="N", help="layouts at a time")
+    _json(diagnoses)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")

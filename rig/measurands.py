@@ -77,8 +77,8 @@ MEASURANDS: dict[str, Measurand] = {
     for row in (
         Measurand(
             "separation_m", "Δz", "Δz corrected", "separation",
-            "height of the free chain's top rod over the impact chain's when that one reaches the "
-            "surface, corrected to simultaneous release",
+            "height of the free chain's top rod over the impact chain's when the middle of that "
+            "one passes the contact level, corrected to simultaneous release",
             "cm", 100.0, 2, "mm", 1e3, 3, averaged=True, listed=True, told=True, by_chain=True,
         ),
         Measurand(
@@ -87,9 +87,20 @@ MEASURANDS: dict[str, Measurand] = {
             "cm", 100.0, 2, "mm", 1e3, 3, listed=True, by_chain=True,
         ),
         Measurand(
+            "separation_strike_m", "Δz at strike", "Δz at strike", "separation",
+            "the corrected one when the impact chain's top rod really strikes, on the board or on "
+            "rods that lie there",
+            "cm", 100.0, 2, "mm", 1e3, 3,
+        ),
+        Measurand(
             "speed_m_s", "V", "V", "end speed",
-            "speed of the impact chain's top rod just before it reaches the surface",
+            "speed of the impact chain's top rod as its middle passes the contact level",
             "m/s", 1.0, 3, "mm/s", 1e3, 2, averaged=True, listed=True, told=True, by_chain=True,
+        ),
+        Measurand(
+            "speed_strike_m_s", "V at strike", "V at strike", "end speed",
+            "speed of the impact chain's top rod as it really strikes",
+            "m/s", 1.0, 3, "mm/s", 1e3, 2,
         ),
         Measurand(
             "release_skew_s", "skew", "release skew", "release",

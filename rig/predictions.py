@@ -6,16 +6,18 @@ Mechanics that a scene does not have are not loaded.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
+from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import FALL_TIME, GRAVITY, SEPARATION, SPEED
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rig.model.predict import Prediction
-    from rig.protocol.protocol import Protocol, Run
+    from rig.protocol.protocol import Protocol, RodChain, Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +153,48 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     }
 
 
+def predicted_parts(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]:
+    """By how much each prediction moves with each thing stated that measuring needs, too.
+
+    By one standard uncertainty, that is; none of what is exact.
+    """
+    if run.impact is None:
+        return {}
+    found: dict[str, dict[str, float]] = {}
+    for name, low, high, share in _moved(protocol):
+        below, above = predicted_run(low, run), predicted_run(high, run)
+        for measurand in below.keys() & above.keys():
+            moved = above[measurand].value - below[measurand].value
+            found.setdefault(measurand, {})[name] = share * moved
+    return found
+
+
+def _moved(protocol: Protocol) -> Iterator[tuple[str, Protocol, Protocol, float]]:
+    """Each stated thing, made less and more, and its uncertainty over the distance between them."""
+    stated: list[tuple[str, Quantity, Callable[[Quantity], Protocol]]] = [
+        ("drop", protocol.drop, lambda to: replace(protocol, drop=to)),
+        ("gravity", protocol.gravity, lambda to: replace(protocol, gravity=to)),
+    ]
+    drag, sign = protocol.drag, 1.0
+    if drag is not None and drag.terminal_speed is not None:
+        sign = -1.0  # the faster, the less air
+        slower = partial(replace, drag)
+        stated.append(
+            ("drag", drag.terminal_speed,
+             lambda to: replace(protocol, drag=slower(terminal_speed=to)))
+        )  # fmt: skip
+    elif drag is not None and drag.coefficient is not None:
+        thicker = partial(replace, drag)
+        stated.append(
+            ("drag", drag.coefficient, lambda to: replace(protocol, drag=thicker(coefficient=to)))
+        )
+    for name, one, moved in stated:
+        if one.u:
+            step = min(one.u, 0.5 * one.value)  # all of these are above zero
+            low, high = (moved(Quantity(one.value + way * step)) for way in (-1.0, 1.0))
+            yield name, low, high, (sign if name == "drag" else 1.0) * one.u / (2.0 * step)
+
+
 def notes(protocol: Protocol) -> list[str]:
     """Every note on a planned incline, the same ones of several inclines together."""
     at: dict[str, list[str]] = {}
@@ -213,6 +257,37 @@ def air_of(protocol: Protocol, name: str) -> list[float]:
             for diameter in rods.diameters
         ],
     )
+
+
+def air_shares(protocol: Protocol) -> dict[str, list[float]]:
+    """κ of each chain on the leg before each impact, in units of the first chain's as it hangs.
+
+    What the air takes goes with a rod's width over its mass: of like material, and where masses are
+    not given, with 1/diameter. Where widths are not known, all are taken to be alike.
+    """
+    if protocol.drag is not None:
+        found = {name: air_of(protocol, name) for name in protocol.chains}
+    else:
+        every = protocol.chains.values()
+        if any(min(rods.diameters, default=0.0) == 0.0 for rods in every):
+            return {name: [1.0] * rods.chain.rods for name, rods in protocol.chains.items()}
+        measured = not any(isnan(rods.rod_length) for rods in every)
+        weighed = measured and all(rods.weighed for rods in every)
+        found = {
+            name: _per_mass(rods, rods.rod_length if measured else 1.0, weighed=weighed)
+            for name, rods in protocol.chains.items()
+        }
+    one = next(iter(found.values()))[0]
+    return {name: [kappa / one for kappa in kappas] for name, kappas in found.items()}
+
+
+def _per_mass(rods: RodChain, length: float, *, weighed: bool) -> list[float]:
+    """Width over mass, up to a factor, of all rods from each one up."""
+    from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only to measure
+
+    drags = [cylinder_drag(1.0, 1.0, d, length, rods.tilt_deg) for d in rods.diameters]
+    volumes = tuple(d * d * length for d in rods.diameters)
+    return leg_drags(rods.chain if weighed else replace(rods.chain, masses=volumes), drags)
 
 
 def _held_back(

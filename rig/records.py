@@ -78,6 +78,14 @@ class Certificate:
     release_sense
         Ticks from the fire stamp to the first change of the release-sense input; `None` when it
         did not change.
+    pulse_ticks
+        How long the release was on; `None`, as all that follows, from a device that does not say.
+    pulse_end
+        What ended the pulse, see `rig.link.messages.PulseEnd`.
+    restarts
+        0, or 128 and the cause of the latest restart since the device said who it is.
+    supply_mv, lowest_mv
+        The board's supply when it fired, and its lowest while it recorded; 0 where not measured.
     """
 
     events: int
@@ -86,6 +94,11 @@ class Certificate:
     glitches: int = 0
     late: int = 0
     release_sense: int | None = None
+    pulse_ticks: int | None = None
+    pulse_end: int | None = None
+    restarts: int | None = None
+    supply_mv: int | None = None
+    lowest_mv: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

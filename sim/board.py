@@ -31,6 +31,7 @@ POWER_ON, EXTERNAL_RESET = 1, 2  # the AVR's PORF and EXTRF in MCUSR
 _EXECUTION_NS = 60_000  # from a request's last byte to its execution
 _BATCH = 16  # events worth a frame of their own
 _OLDEST_NS = 10_000_000  # an event waits no longer than this for company
+_STEADY_NS = 300_000  # the emergency stop's input is the same for so long
 _BOOT_NS = 300_000_000
 _CHANNELS = " ".join([f"PB{n}" for n in range(8)] + [f"PK{n}" for n in range(8)])
 
@@ -132,7 +133,7 @@ class VirtualBoard:
         self.advance(at_ns)
         self.line.clear(at_ns)
         before = self._controller
-        self._forget()
+        self._forget(cause)
         if before.drop is not None and before.phase is Phase.HOLDING and not cause & POWER_ON:
             self._controller.drop = before.drop
             before.drop.aborted = False  # so it must be acknowledged
@@ -151,10 +152,9 @@ class VirtualBoard:
         self._controller.touch(gates)
 
     def stop(self, opened: bool) -> None:
-        """Open or close the emergency stop, now."""
-        self._inputs.stopped = opened
-        if opened:
-            self._tell(self._controller.stop(self._now_ns))
+        """Open or close the emergency stop, now; what is over too soon does not count."""
+        turned = opened != self._inputs.stopped
+        self._inputs.stop_turns_ns = self._now_ns + _STEADY_NS if turned else None
 
     def reference(self, times_ns: Iterable[int], period_ns: int = 0) -> None:
         """Have the 1 Hz reference give pulses.
@@ -189,13 +189,13 @@ class VirtualBoard:
         upcoming = self._upcoming()
         return None if upcoming is None else upcoming[0]
 
-    def _forget(self) -> None:
+    def _forget(self, cause: int | None = None) -> None:
         self._decoder = Decoder()
         self._inbox: deque[tuple[int, bytes]] = deque()
         self._last: tuple[int, int, int] | None = None  # type, seq and CRC of the last request
         self._answer = b""
         self._controller = Microcontroller(
-            self.lab, self.counter, self.identity, self._inputs, self._random
+            self.lab, self.counter, self.identity, self._inputs, self._random, cause
         )
         self._oldest_ns = 0
 
@@ -206,6 +206,8 @@ class VirtualBoard:
         found: list[tuple[int, Callable[[], None]]] = []
         free_ns = self.line.free_ns
         state = self._controller
+        if self._inputs.stop_turns_ns is not None:
+            found.append((self._inputs.stop_turns_ns, self._stop_turns))
         if self._inputs.pulses_ns:
             found.append((self._inputs.pulses_ns[0], self._reference_pulse))
         if state.coming:
@@ -260,8 +262,7 @@ class VirtualBoard:
 
     def _close(self) -> None:
         state = self._controller
-        state.end_ns = state.sense_ns = None
-        state.coming.clear()
+        state.close()
         if state.drop is not None:
             while state.drop.unsent:
                 self._stream()
@@ -276,6 +277,12 @@ class VirtualBoard:
 
     def _send(self, message: wire.DeviceMessage) -> None:
         self.line.send(self._now_ns, self.line.frame(message, ack=0))
+
+    def _stop_turns(self) -> None:
+        inputs = self._inputs
+        inputs.stopped, inputs.stop_turns_ns = not inputs.stopped, None
+        if inputs.stopped:
+            self._tell(self._controller.stop(self._now_ns))
 
     def _listen(self) -> None:
         _, data = self._inbox.popleft()

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from sim.inputs import Inputs
     from sim.lab_interface import Lab
 
+_NO_PULSE = (0, wire.PulseEnd.ORDERED)
+_RESTARTED = 128
 _SILENCE_NS = wire.HOST_SILENCE_MS * 10**6
 
 
@@ -45,6 +47,8 @@ class Microcontroller:
         What else it is wired to.
     tokens
         Where tokens come from.
+    cause
+        Of the restart that made it; `None` at power-up.
 
     Attributes
     ----------
@@ -69,6 +73,7 @@ class Microcontroller:
         identity: wire.Identity,
         inputs: Inputs,
         tokens: random.Random,
+        cause: int | None = None,
     ) -> None:
         self.gates = 0
         self.order: wire.Arm | None = None
@@ -88,6 +93,7 @@ class Microcontroller:
         self._token = 0
         self._changed = 0  # armed gates that moved since ARM
         self._now_ns = 0
+        self._restarts = 0 if cause is None else _RESTARTED | cause
 
     @property
     def phase(self) -> Phase:
@@ -111,7 +117,7 @@ class Microcontroller:
 
     def stop(self, now_ns: int) -> wire.Disarmed | None:
         """Do what the opening of the emergency stop demands; a recording goes on to its end."""
-        self.release.off(now_ns)
+        self.release.off(now_ns, wire.PulseEnd.STOPPED)
         return self._disarm(DisarmReason.STOPPED)
 
     def heard(self, now_ns: int) -> None:
@@ -178,6 +184,7 @@ class Microcontroller:
         version = self._identity.protocol_version
         if request.protocol_version != version:
             return wire.Refused(Reason.VERSION, version)
+        self._restarts = 0
         return self._identity
 
     def _status(self) -> wire.State:
@@ -251,9 +258,18 @@ class Microcontroller:
         self.order = None
         return wire.Fired(tick)
 
+    def close(self) -> None:
+        """End the recording: what the certificate says of the release is known now."""
+        self.end_ns = self.sense_ns = None
+        self.coming.clear()
+        if self.drop is not None:
+            lasted_ns, by = self.release.lasted() if self.drop.order.release else _NO_PULSE
+            ticks = round(lasted_ns * 1e-9 * self._identity.tick_hz)
+            self.drop.released(ticks, by, self._restarts)
+
     def _abort(self) -> wire.DeviceMessage:
         self.order = None
-        self.release.off(self._now_ns)
+        self.release.off(self._now_ns, wire.PulseEnd.ABORTED)
         if self.drop is not None:
             self.drop.aborted = True
         if self.end_ns is not None:

@@ -35,6 +35,8 @@ class Dials:
         Effective rod width off its nominal value, m; one draw a chain.
     gate_sd
         Beam heights off their stated values, m; the same in every run.
+    datum_sd
+        Zero of each post off the contact point, m: all gates of a side share it in every run.
     beam_sd
         Beams off the rods' middle, m: shifts edges by x·tan(tilt), up and down rod by rod.
     impulse_sd
@@ -64,7 +66,8 @@ class Dials:
     corrupt, lose
         Share of bytes on the line, either way, that are changed or lost.
     drag
-        The air takes drag·v² from the acceleration of either chain, 1/m.
+        The air takes drag·v² from the acceleration of the first chain, 1/m, beyond what the
+        protocol states; of other rods, and of what still falls, as width over mass goes.
     restitution, friction
         True coefficients; not-a-number takes the protocol's.
     """
@@ -77,6 +80,7 @@ class Dials:
     rod_sd: float = 0.3e-3
     width_sd: float = 0.1e-3
     gate_sd: float = 0.2e-3
+    datum_sd: float = 0.2e-3
     beam_sd: float = 0.5e-3
     impulse_sd: float = 0.02
     jitter_sd: float = 2e-6
@@ -106,7 +110,7 @@ class Dials:
 _NAMES = tuple(field.name for field in fields(Dials))
 _KEPT = {"delay", "restitution", "friction", "reference", "stall"}
 _TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall"}
-_LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd"}
+_LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd"}
 _SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled"}
 _SIGNED = {"clock", "drift", "reference", "restitution"}
 _RATES = {"clock", "reference"}

@@ -19,18 +19,16 @@ from sim.dials import read_dials
 from sim.scene import choose_world
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
-    from sim.lab import ChainLab
-    from sim.scene import World
     from sim.truth import Truth
-
-TOGETHER = 80
-"""Drops that are made at once, at most; more would take little less time each, but much memory."""
 
 
 class Request(NamedTuple):
-    """A simulation's URL, the seeds of its rigs, and the runs that are made on each."""
+    """A simulation's URL, the seeds of its rigs, and the runs that are made on each.
+
+    With ``film=1`` in the URL truths have films, see `rig.films`.
+    """
 
     url: str
     seeds: list[int]
@@ -45,43 +43,21 @@ def falls(asked: Iterable[Request]) -> Iterator[str]:
     str
         ``{"seed", "edges": [[seconds, channel, blocked], …], "truth": {…}}``.
     """
-    together: list[_Rig] = []
-    for rig in (rig for one in asked for rig in _rigs(one)):
-        drops = sum(len(one.labels) for one in together)
-        other = bool(together) and rig.world.make_ahead is not together[0].world.make_ahead
-        if together and (other or drops + len(rig.labels) > TOGETHER):
-            yield from _drops(together)
-            together = []
-        together.append(rig)
-    yield from _drops(together)
-
-
-class _Rig(NamedTuple):
-    seed: int
-    world: World
-    lab: ChainLab
-    labels: list[int]
-    told: list[Truth]
-
-
-def _rigs(asked: Request) -> Iterator[_Rig]:
-    settings = read_settings(asked.url)
-    protocol = reader.read(settings.pop("protocol"))
-    world, settings = choose_world(settings)
-    dials = read_dials(settings)
-    for seed, numbers in zip(asked.seeds, asked.runs, strict=True):
-        told: list[Truth] = []
-        lab = world.hang(protocol, dials, seed, told.append)
-        yield _Rig(seed, world, lab, [pack_label(number, 1) for number in numbers], told)
-
-
-def _drops(rigs: Sequence[_Rig]) -> Iterator[str]:
-    if rigs:
-        rigs[0].world.make_ahead([(rig.lab, rig.labels) for rig in rigs])
-    for rig in rigs:
-        for label in rig.labels:
-            edges = rig.lab.drop(label)
-            yield json.dumps({"seed": rig.seed, "edges": edges, "truth": asdict(rig.told.pop())})
+    for url, seeds, runs in asked:
+        settings = read_settings(url)
+        protocol = reader.read(settings.pop("protocol"))
+        filmed = settings.pop("film", "0") == "1"
+        hang, settings = choose_world(settings)
+        dials = read_dials(settings)
+        for seed, numbers in zip(seeds, runs, strict=True):
+            told: list[Truth] = []
+            lab = hang(protocol, dials, seed, told.append)
+            lab.filmed = filmed
+            labels = [pack_label(number, 1) for number in numbers]
+            lab.make_ahead(labels)
+            for label in labels:
+                edges = lab.drop(label)
+                yield json.dumps({"seed": seed, "edges": edges, "truth": asdict(told.pop())})
 
 
 if __name__ == "__main__":

@@ -13,7 +13,9 @@ class Inputs:
     Attributes
     ----------
     stopped
-        Whether the emergency stop is open.
+        Whether the emergency stop counts as open.
+    stop_turns_ns
+        When it will count as what it is now; `None` while it does.
     pulses_ns
         When the reference will give a pulse, in order of time.
     period_ns
@@ -23,6 +25,7 @@ class Inputs:
     """
 
     stopped: bool = False
+    stop_turns_ns: int | None = None
     pulses_ns: deque[int] = field(default_factory=deque)
     period_ns: int = 0
     sense_s: float | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
+from sim.air import air
 from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
 from sim.path import Path
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
     from sim.dials import Dials
 
+AnyTruth = TypeVar("AnyTruth", bound=Truth)
+
 
 @dataclass(frozen=True, slots=True)
 class Body:
@@ -36,6 +39,26 @@ class Body:
     spec: RodChain
     offsets: np.ndarray  # height of each rod's middle above the nominal bottom rod's place, m
     widths: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Hung:
+    """What differs from drop to drop, drawn from the drop's own label.
+
+    Attributes
+    ----------
+    release_s, skew_s
+        When the first chain leaves after fire, and how much later the free one does.
+    hang
+        How much too high the impact chain and the free one hang, m.
+    rng
+        For all else.
+    """
+
+    release_s: float
+    skew_s: float
+    hang: tuple[float, float]
+    rng: np.random.Generator
 
 
 class ChainLab:
@@ -55,10 +78,15 @@ class ChainLab:
     tell
         Called with the hidden truth of each drop.
 
+    Attributes
+    ----------
+    filmed
+        Whether the truth says how every rod moved, where that is known: it is much to say.
+
     Raises
     ------
     InputError
-        If chains that start with a speed, or fall in air, are asked for.
+        If chains that start with a speed are asked for.
     """
 
     def __init__(
@@ -73,13 +101,17 @@ class ChainLab:
         self.dials = dials
         self.seed = seed
         self.tell = tell
+        self.filmed = False
         self.runs = {run.number: run for run in runs(protocol)}
         self.gates = protocol.gates.gates if protocol.gates else ()
         rig = self._rng("rig")
         self.hang_height = protocol.drop.value + protocol.drop.u * dials.drop_error * rig.normal()
+        self.air = air(protocol, dials.drag)
         self.bodies = {name: self._body(spec) for name, spec in protocol.chains.items()}
         self.heights = {
-            gate.channel: gate.height + dials.gate_sd * self._rng("gate", gate.channel).normal()
+            gate.channel: gate.height
+            + dials.datum_sd * self._rng("post", gate.side).normal()
+            + dials.gate_sd * self._rng("gate", gate.channel).normal()
             for gate in self.gates
         }
         self.beams = {
@@ -131,24 +163,21 @@ class ChainLab:
         if is_test(label):
             return []
         run, attempt = self._run(label)
-        rng = self._rng("drop", run.number, attempt)
-        dials = self.dials
-        release = dials.delay + dials.delay_sd * float(rng.normal())
-        skew = dials.skew_sd * float(rng.normal())
-        hang = dials.hang_sd * rng.normal(size=2)
+        hung = self._hung(run, attempt)
+        rng, dials = hung.rng, self.dials
         paths: dict[Side, tuple[Body, Path]] = {}
         if run.impact is not None:
             body = self.bodies[run.impact]
-            start = self.hang_height + float(hang[0])
-            paths["impact"] = body, self._impact_path(body, run.incline_deg, release, start, rng)
+            start = self.hang_height + hung.hang[0]
+            paths["impact"] = (
+                body, self._impact_path(body, run.incline_deg, hung.release_s, start, rng),
+            )  # fmt: skip
         if run.free is not None:
-            start = self.hang_height + float(hang[1])
-            # A chain that falls alone has nothing to be late against.
-            late = skew if paths else 0.0
+            start = self.hang_height + hung.hang[1]
             gravity = self.protocol.gravity.value
             paths["free"] = (
                 self.bodies[run.free],
-                Path(release + late, start, gravity, kappa=dials.drag),
+                Path(hung.release_s + hung.skew_s, start, gravity, kappas=self.air[run.free][:1]),
             )
         edges = [
             edge
@@ -161,6 +190,19 @@ class ChainLab:
         edges.sort(key=lambda edge: edge.time_s)
         self.tell(self._truth(run, attempt, paths, edges, rng))
         return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
+
+    def _hung(self, run: Run, attempt: int) -> Hung:
+        rng = self._rng("drop", run.number, attempt)
+        dials = self.dials
+        release = dials.delay + dials.delay_sd * float(rng.normal())
+        skew = dials.skew_sd * float(rng.normal())
+        # A chain that falls alone has nothing to be late against.
+        late = skew if run.impact is not None else 0.0
+        hang = dials.hang_sd * rng.normal(size=2)
+        return Hung(release, late, (float(hang[0]), float(hang[1])), rng)
+
+    def make_ahead(self, labels: Sequence[int]) -> None:
+        """Make drops before they are asked for: these need no time worth saving."""
 
     def _impact_path(
         self, body: Body, incline: float, release: float, start: float, rng: np.random.Generator
@@ -181,9 +223,9 @@ class ChainLab:
         actual = Chain(chain.masses, tuple((body.offsets - bottom).tolist()), chain.inertia)
         gains = kicks(actual, alphas.tolist(), impact.gamma)
         gravity = self.protocol.gravity.value
-        air = [dials.drag] * chain.rods
-        events = drag_hits(actual, gains, air, start + bottom, gravity)
-        return Path(release, start, gravity, events, tuple((-body.offsets).tolist()), dials.drag)
+        air = self.air[body.spec.name]
+        events = drag_hits(actual, gains, air or [0.0] * chain.rods, start + bottom, gravity)
+        return Path(release, start, gravity, events, tuple((-body.offsets).tolist()), air)
 
     def _shift(self, body: Body, gate: Gate) -> np.ndarray:
         """How far each rod's crossing is shifted because the beam is off its middle, m."""
@@ -215,6 +257,19 @@ class ChainLab:
                     shadows.append(Shadow(at, at + float(rng.uniform(2e-3, 10e-3)), NOT_A_ROD))
         return shadows
 
+    def _began(
+        self, kind: type[AnyTruth], run: Run, attempt: int, edges: Sequence[SeenEdge]
+    ) -> AnyTruth:
+        """Begin to write a drop's truth."""
+        return kind(
+            run=run.number,
+            attempt=attempt,
+            incline_deg=run.incline_deg,
+            impact_chain=run.impact,
+            gravity_m_s2=self.protocol.gravity.value,
+            edges=[(e.time_s, e.channel, e.blocked, e.rod) for e in edges],
+        )
+
     def _truth(
         self,
         run: Run,
@@ -224,19 +279,13 @@ class ChainLab:
         rng: np.random.Generator,
     ) -> Truth:
         """Write down what really happened, for the judge of the analysis alone."""
-        truth = Truth(
-            run=run.number,
-            attempt=attempt,
-            incline_deg=run.incline_deg,
-            impact_chain=run.impact,
-            gravity_m_s2=self.protocol.gravity.value,
-            edges=[(e.time_s, e.channel, e.blocked, e.rod) for e in edges],
-        )
+        truth = self._began(Truth, run, attempt, edges)
         if "impact" not in paths:
             return truth
         body, path = paths["impact"]
         hit_s = path.release_s + path.hits[-1].time_s
-        truth.speed_m_s = path.hits[-1].speed_before
+        # In the model's world a rod strikes at the contact level.
+        truth.speed_m_s = truth.speed_strike_m_s = path.hits[-1].speed_before
         truth.fall_time_s = path.hits[-1].time_s
         if "free" not in paths:
             return truth
@@ -245,7 +294,7 @@ class ChainLab:
         skew = fallen.release_s - path.release_s
         truth.release_skew_s = skew
         truth.separation_raw_m = fallen.height_at(hit_s) + top
-        truth.separation_m = fallen.height_at(hit_s + skew) + top
+        truth.separation_m = truth.separation_strike_m = fallen.height_at(hit_s + skew) + top
         truth.camera_separation_m, truth.camera_speed_m_s = camera_reading(
             lambda t: path.height_at(t) + float(body.offsets[-1]),
             lambda t: fallen.height_at(t) + top,

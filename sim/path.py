@@ -31,8 +31,9 @@ class Path:
         Impacts, with times counted from release; empty in free fall.
     hit_heights
         Height of the reference point at each impact, falling.
-    kappa
-        The air takes κv² from the acceleration, 1/m.
+    kappas
+        The air takes κv² from the acceleration, 1/m: before each hit, and after the last one what
+        it was before; empty without air.
     """
 
     release_s: float
@@ -40,7 +41,7 @@ class Path:
     gravity: float
     hits: Sequence[Hit] = ()
     hit_heights: Sequence[float] = ()
-    kappa: float = 0.0
+    kappas: Sequence[float] = ()
 
     def time_at(self, height: float) -> float:
         """When the reference point comes down to `height`, s."""
@@ -54,8 +55,8 @@ class Path:
         distance = top - height
         if distance <= 0.0:
             return time
-        if self.kappa:
-            return time + drag_leg(distance, speed, self.gravity, self.kappa)[1]
+        if self.kappas:
+            return time + drag_leg(distance, speed, self.gravity, self._kappa(done))[1]
         arrival = math.sqrt(speed * speed + 2.0 * self.gravity * distance)
         return time + 2.0 * distance / (speed + arrival)
 
@@ -70,6 +71,9 @@ class Path:
             hit = self.hits[done - 1]
             since -= hit.time_s
             top, speed = self.hit_heights[done - 1], hit.speed_after
-        if self.kappa:
-            return top - fallen(since, self.gravity, self.kappa, speed)
+        if self.kappas:
+            return top - fallen(since, self.gravity, self._kappa(done), speed)
         return top - (speed + 0.5 * self.gravity * since) * since
+
+    def _kappa(self, done: int) -> float:
+        return self.kappas[min(done, len(self.kappas) - 1)]

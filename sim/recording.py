@@ -5,12 +5,13 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING
 
-from rig.link.messages import EVENTS_PER_FRAME, DropCertificate, EventsFrame
+from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, EventsFrame, PulseEnd
 from rig.link.wiretypes import Event
 
 if TYPE_CHECKING:
     from rig.link.messages import Arm, Identity
 
+_SUPPLY_MV = 5000
 _MOST = 0xFFFF  # an event's number is a u16
 
 
@@ -48,6 +49,8 @@ class Recording:
         self._overflows = 0
         self._glitches = 0
         self._late = 0
+        self._pulse_ticks = self._restarts = 0
+        self._pulse_end = PulseEnd.ORDERED
 
     def __len__(self) -> int:
         return len(self._events)
@@ -75,17 +78,21 @@ class Recording:
         self._glitches += state == (self._events[-1].state if self._events else 0)
         self._events.append(Event(tick, state))
 
+    def released(self, ticks: int, by: PulseEnd, restarts: int) -> None:
+        """Note how long the release was on, and what else only the board knows."""
+        self._pulse_ticks, self._pulse_end, self._restarts = ticks, by, restarts
+
     def part(self, first: int, count: int) -> EventsFrame:
         """Give some events, at most a frame full."""
         count = min(count, EVENTS_PER_FRAME)
         return EventsFrame(self.order.label, first, tuple(self._events[first : first + count]))
 
-    def certificate(self) -> DropCertificate:
+    def certificate(self) -> DropCertificate2:
         """Account for the drop."""
         packed = b"".join(
             tick.to_bytes(4, "little") + state.to_bytes(2, "little") for tick, state in self._events
         )
-        return DropCertificate(
+        return DropCertificate2(
             label=self.order.label,
             fire_tick=self._fire_tick,
             gates=self.order.gates,
@@ -97,4 +104,9 @@ class Recording:
             late=self._late,
             sensed=int(self.sense_tick is not None),
             sense_tick=self.sense_tick or 0,
+            pulse_ticks=self._pulse_ticks,
+            pulse_end=self._pulse_end,
+            restarts=self._restarts,
+            supply_mv=_SUPPLY_MV,
+            lowest_mv=_SUPPLY_MV,
         )

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import math
-import os
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
-from functools import partial
-from multiprocessing import get_context
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.errors import InputError
-from rig.link.messages import pack_label
+from rig.link.messages import pack_label, unpack_label
 from sim import fall_cache
+from sim.ahead import Ahead
 from sim.beam import SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
+from sim.film import film
 from sim.lab import ChainLab, is_test
 from sim.resolved.contact_law import DEADEST
-from sim.resolved.fall import STEP, fall, stable_step
+from sim.resolved.fall import fall
 from sim.resolved.scene import Board, Bounce, Chain, Rods, Strings
 from sim.resolved_beam import shadows
 from sim.truth import Truth
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol, RodChain, Run, Side
@@ -33,29 +31,26 @@ if TYPE_CHECKING:
     from sim.resolved.scene import Fall
     from sim.resolved_dials import ResolvedDials
 
-BLOCK = 12
-"""Runs whose falls are made together: by themselves they would take ten times as long each."""
+NEXT = 4
+"""Runs that are made in the background, from the one on that is being armed."""
 TRACK_S = 1 / 960
 """Between two moments of the track: half a frame of the paper's camera."""
-FEW = 20
-"""Chains are few below twice this: a process more would cost more than it saves."""
 ROD_LENGTH = 0.102
 """Of the paper's chains, m, where a protocol does not say it."""
 
 
 @dataclass(slots=True)
 class ResolvedTruth(Truth):
-    """The truth of a resolved drop. Without ``strike`` it is at level.
+    """The truth of a resolved drop.
 
-    At level the middle of the top rod passes the contact level; where it strikes before, on the
-    rods that lie there, that is when it would have passed had it fallen on. At strike it touches
-    the board or a rod. Lists are by rod, bottom up: impulses in N s, times in s; energy lost in J.
-    ``track`` are heights of both top rods until the strike, each counted from its own release.
+    Where the top rod strikes before the level, on rods that lie there, at level is when it would
+    have passed had it fallen on. Lists are by rod, bottom up: impulses in N s, times in s; energy
+    lost in J.
+    ``track`` are heights of both top rods until the strike, each counted from its own release;
+    ``film`` is told where a session is kept.
     """
 
-    separation_strike_m: float | None = None
     separation_strike_raw_m: float | None = None
-    speed_strike_m_s: float | None = None
     strike_time_s: float | None = None
     contact_height_m: float | None = None
     impulses: list[float] | None = None
@@ -64,16 +59,7 @@ class ResolvedTruth(Truth):
     slack: float | None = None
     turning_rad_s: float | None = None
     track: dict[str, list[float]] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Hung:
-    """What differs from drop to drop, drawn from the drop's own label."""
-
-    release_s: float
-    skew_s: float
-    hang: tuple[float, float]
-    rng: np.random.Generator
+    film: dict[str, Any] | None = None
 
 
 class ResolvedLab(ChainLab):
@@ -111,21 +97,27 @@ class ResolvedLab(ChainLab):
             protocol.chains, protocol.surface, protocol.drop, protocol.gravity, self.gates,
             protocol.plan, asdict(dials), world, seed,
         )  # fmt: skip
-        self.step = min(
-            [STEP]
-            + [
-                0.95 * stable_step([self._chain(self._nominal(body.spec), body.spec)])
-                for body in self.bodies.values()
-                if body.spec.chain.rods > 1
-            ]
-        )
-        self._made: dict[int, dict[str, Any]] = {}
+        self._ahead = Ahead(self._make)
+
+    def rest(self, label: int) -> int:
+        """As of `ChainLab`; the drop that is being armed and the next ones begin to be made."""
+        if not is_test(label):
+            number, _ = unpack_label(label)
+            following = (n for n in range(number + 1, number + NEXT) if n in self.runs)
+            self._ahead.begin([label, *(pack_label(n, 1) for n in following)])
+        return super().rest(label)
+
+    def make_ahead(self, labels: Sequence[int]) -> None:
+        """Make drops on all processors, and wait for them."""
+        self._ahead.begin(labels)
+        for label in labels:
+            self._ahead.get(label)
 
     def drop(self, label: int) -> list[tuple[float, int, bool]]:
         """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
         if is_test(label):
             return []
-        made = self._find(label)
+        made = self._ahead.get(label)
         run, attempt = self._run(label)
         hung = self._hung(run, attempt)
         rng = hung.rng
@@ -141,63 +133,22 @@ class ResolvedLab(ChainLab):
             seen += string_shadows(seen, self.dials.string, rng)
             edges += receive(seen, gate.channel, self.dials, rng)
         edges.sort(key=lambda edge: edge.time_s)
-        truth = ResolvedTruth(
-            run=run.number,
-            attempt=attempt,
-            incline_deg=run.incline_deg,
-            impact_chain=run.impact,
-            gravity_m_s2=self.protocol.gravity.value,
-            edges=[(e.time_s, e.channel, e.blocked, e.rod) for e in edges],
-            **made["truth"],
-        )
+        truth = replace(self._began(ResolvedTruth, run, attempt, edges), **made["truth"])
         self.tell(truth)
         return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
 
-    def _find(self, label: int) -> dict[str, Any]:
-        """Look for a drop: made already, kept on the disk, or to be made with its block."""
-        if label not in self._made:
-            found = fall_cache.load(fall_cache.key(self._key, label))
-            if found is not None:
-                self._made[label] = found
-            else:
-                make_ahead([(self, self._block(label))])
-        return self._made[label]
-
-    def _block(self, label: int) -> list[int]:
-        """Labels of the drops that are made together with this one."""
-        run, attempt = self._run(label)
-        if attempt > 1:
-            return [label]
-        for block in self.blocks():
-            if label in block:
-                return block
-        raise AssertionError(run)
-
-    def blocks(self) -> list[list[int]]:
-        """Labels of all first attempts, in blocks."""
-        labels = [pack_label(number, 1) for number in sorted(self.runs)]
-        return [labels[first : first + BLOCK] for first in range(0, len(labels), BLOCK)]
-
-    def keep(self, label: int, made: dict[str, Any]) -> None:
-        """Take a drop that was made, and keep it on the disk."""
-        self._made[label] = made
-        fall_cache.save(fall_cache.key(self._key, label), made)
-
-    def lacks(self, label: int) -> bool:
-        """Whether a drop still has to be made."""
-        return label not in self._made and (
-            fall_cache.load(fall_cache.key(self._key, label)) is None
-        )
-
-    def _hung(self, run: Run, attempt: int) -> Hung:
-        rng = self._rng("drop", run.number, attempt)
-        dials = self.dials
-        release = dials.delay + dials.delay_sd * float(rng.normal())
-        skew = dials.skew_sd * float(rng.normal())
-        # A chain that falls alone has nothing to be late against.
-        late = skew if run.impact is not None else 0.0
-        hang = dials.hang_sd * rng.normal(size=2)
-        return Hung(release, late, (float(hang[0]), float(hang[1])), rng)
+    def _make(self, label: int) -> dict[str, Any]:
+        """Find a drop on the disk, or let its chains fall."""
+        name = fall_cache.key(self._key, self.filmed, label)
+        made: dict[str, Any] | None = fall_cache.load(name)
+        if made is None:
+            chains = self.chains(label)
+            falls = {side: fall(chain) for side, chain in chains.items()}
+            made = self._seen(label, falls)
+            if self.filmed and "impact" in chains:
+                made["truth"]["film"] = film(chains["impact"], falls["impact"])
+            fall_cache.save(name, made)
+        return made
 
     def chains(self, label: int) -> dict[Side, Chain]:
         """Hang the chains of a drop as they really are."""
@@ -275,7 +226,7 @@ class ResolvedLab(ChainLab):
             self.protocol.gravity.value, board, touching, drag, swing, spin,
         )  # fmt: skip
 
-    def made(self, label: int, falls: dict[Side, Fall]) -> dict[str, Any]:
+    def _seen(self, label: int, falls: dict[Side, Fall]) -> dict[str, Any]:
         """Keep of a drop's falls what beams and truth need."""
         run, attempt = self._run(label)
         aside = self._rng("centre", run.number, attempt).normal(size=2) * self.world.off_centre_sd
@@ -361,39 +312,6 @@ def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
         struck.heights[after - 1 : after + 1, -1],
     )
     return float(t0 + (t1 - t0) * z0 / (z0 - z1)), float((z0 - z1) / (t1 - t0))
-
-
-def make_ahead(wanted: Iterable[tuple[ChainLab, Sequence[int]]]) -> None:
-    """Let the chains of many drops fall together, also those of several rigs.
-
-    Falls do not see each other, so what is made with what changes nothing but the time it takes.
-    """
-    groups: dict[tuple[Side, int, float], list[tuple[ResolvedLab, int, Chain]]] = {}
-    for lab, labels in wanted:
-        assert isinstance(lab, ResolvedLab)
-        for label in labels:
-            if lab.lacks(label):
-                for side, chain in lab.chains(label).items():
-                    group = side, chain.rods.masses.size, lab.step
-                    groups.setdefault(group, []).append((lab, label, chain))
-    falls: dict[tuple[int, int], tuple[ResolvedLab, dict[Side, Fall]]] = {}
-    for (side, _, step), members in groups.items():
-        found = _fall_together([chain for _, _, chain in members], step)
-        for (lab, label, _), one in zip(members, found, strict=True):
-            falls.setdefault((id(lab), label), (lab, {}))[1][side] = one
-    for (_, label), (lab, sides) in falls.items():
-        lab.keep(label, lab.made(label, sides))
-
-
-def _fall_together(chains: Sequence[Chain], step: float) -> list[Fall]:
-    """Let chains fall in several processes where there are many; that changes no bit of a fall."""
-    parts = min(os.cpu_count() or 1, len(chains) // FEW)
-    if parts < 2:
-        return fall(chains, step=step)
-    pieces = [chains[first::parts] for first in range(parts)]
-    with ProcessPoolExecutor(parts, get_context("spawn")) as pool:
-        done = list(pool.map(partial(fall, step=step), pieces))
-    return [done[n % parts][n // parts] for n in range(len(chains))]
 
 
 def _bounce(surface: Surface, dials: Dials, world: ResolvedDials) -> Bounce:

@@ -16,11 +16,13 @@ from sim.lab import ChainLab
 from sim.truth import append_truth
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     from rig.protocol.protocol import Protocol
     from sim.dials import Dials
     from sim.truth import Truth
+
+    Hang = Callable[[Protocol, Dials, int, Callable[[Truth], None]], ChainLab]
 
 
 class LineDials(TypedDict):
@@ -41,20 +43,16 @@ class Scene:
     ----------
     pace
         Real seconds a virtual second takes.
-    make_ahead
-        See `World`.
     """
 
     lab: ChainLab
     dials: Dials
     seed: int
     pace: int
-    make_ahead: Callable[[Iterable[tuple[ChainLab, Sequence[int]]]], None]
 
     def get_ready(self) -> None:
         """Make all planned drops now, for a board that answers in real time."""
-        labels = [pack_label(number, 1) for number in sorted(self.lab.runs)]
-        self.make_ahead([(self.lab, labels)])
+        self.lab.make_ahead([pack_label(number, 1) for number in sorted(self.lab.runs)])
 
     def line(self) -> LineDials:
         """Name the dials of the line."""
@@ -71,22 +69,6 @@ class Scene:
         """Length of the wired reference's second; `None` where none is wired."""
         error = self.dials.reference
         return None if math.isnan(error) else round(1e9 / (1.0 + error))
-
-
-@dataclass(frozen=True, slots=True)
-class World:
-    """The mechanics behind which chains fall.
-
-    Attributes
-    ----------
-    hang
-        Makes the lab from protocol, dials, seed, and whom to tell the truth.
-    make_ahead
-        Makes drops of labs before they are asked for, where that saves time.
-    """
-
-    hang: Callable[[Protocol, Dials, int, Callable[[Truth], None]], ChainLab]
-    make_ahead: Callable[[Iterable[tuple[ChainLab, Sequence[int]]]], None]
 
 
 def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
@@ -113,7 +95,7 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     seed = _number(scheme, "seed", rest.pop("seed", "0"))
     pace = _number(scheme, "pace", rest.pop("pace", "0"))
     truth = rest.pop("truth", "")
-    world, rest = choose_world(rest, scheme)
+    hang, rest = choose_world(rest, scheme)
     dials = read_dials(rest, scheme)
     if truth:
         _check_writable(scheme, Path(truth))
@@ -122,12 +104,20 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
         if truth:
             append_truth(Path(truth), what)
 
-    lab = world.hang(reader.read(source), dials, seed, tell)
-    return Scene(lab, dials, seed, pace, world.make_ahead)
+    lab = hang(reader.read(source), dials, seed, tell)
+    lab.filmed = bool(truth)
+    return Scene(lab, dials, seed, pace)
 
 
-def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[World, dict[str, str]]:
+def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Hang, dict[str, str]]:
     """Find out behind which mechanics chains fall, and what is left for `read_dials`.
+
+    Returns
+    -------
+    hang
+        Makes the lab from protocol, dials, seed, and whom to tell the truth.
+    rest
+        Settings that are no dial of this world.
 
     Raises
     ------
@@ -137,21 +127,17 @@ def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Worl
     rest = dict(settings)
     dynamics = rest.pop("dynamics", "model")
     if dynamics == "model":
-        return World(ChainLab, _at_once), rest
+        return ChainLab, rest
     if dynamics != "resolved":
         raise InputError(
             f"{scheme}://: dynamics: {dynamics!r} is not known", "model or resolved is accepted"
         )
     from sim.resolved_dials import NAMES, read_resolved_dials  # noqa: PLC0415 - few ask for it
-    from sim.resolved_lab import ResolvedLab, make_ahead  # noqa: PLC0415
+    from sim.resolved_lab import ResolvedLab  # noqa: PLC0415
 
     world = read_resolved_dials(rest, scheme)
     left = {name: text for name, text in rest.items() if name not in NAMES}
-    return World(partial(ResolvedLab, world=world), make_ahead), left
-
-
-def _at_once(_: Iterable[tuple[ChainLab, Sequence[int]]]) -> None:
-    """Nothing: the model needs no time worth saving."""
+    return partial(ResolvedLab, world=world), left
 
 
 def _check_writable(scheme: str, path: Path) -> None:

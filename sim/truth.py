@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 class Truth:
     """What really happened in one drop; `None` for what the scene does not have.
 
+    Without ``strike`` it is at level, where the top rod's middle passes the contact level; at
+    strike that rod touches something.
+
     Each of `edges` is (seconds after fire, channel, blocked, rod), rod −1 for what was no rod.
     """
 
@@ -25,7 +28,9 @@ class Truth:
     edges: list[tuple[float, int, bool, int]] = field(default_factory=list)
     separation_m: float | None = None
     separation_raw_m: float | None = None
+    separation_strike_m: float | None = None
     speed_m_s: float | None = None
+    speed_strike_m_s: float | None = None
     fall_time_s: float | None = None
     release_skew_s: float | None = None
     camera_separation_m: float | None = None

@@ -38,17 +38,34 @@
 #define REFERENCE _BV(PL0) /* D49, ICP4 */
 #define SENSE _BV(PL1)     /* D48, ICP5 */
 #define RELEASE_PORT PORTE /* SYNC is on it too */
+#define RELEASE_PIN PINE
+#define RELEASE_COUNTER TCNT3 /* PE3 is OC3A, PE5 is OC3C */
+#define RELEASE_MATCH_0 OCR3A
+#define RELEASE_MATCH_1 OCR3C
+#define RELEASE_UNITS TCCR3A
+#define RELEASE_SET_0 (_BV(COM3A1) | _BV(COM3A0))
+#define RELEASE_SET_1 (_BV(COM3C1) | _BV(COM3C0))
+#define RELEASE_CLEAR_0 _BV(COM3A1)
+#define RELEASE_CLEAR_1 _BV(COM3C1)
+#define RELEASE_FORCE TCCR3C
+#define RELEASE_FORCE_BOTH (_BV(FOC3A) | _BV(FOC3C))
 #define STOP_PORT PINA
 #define LED_PORT PORTA
+
+#define SUPPLY_CHANNEL 0x1E /* the ADC's name of its reference voltage */
+#define BOARD_INTERRUPTS (_BV(PCIE0) | _BV(PCIE2))
+
+#include <stdint.h>
+
+/* How far timer 5, which stamps, is ahead of timer 4, which catches the reference; and how far
+ * timer 3, which ends the release, is ahead of timer 5. */
+extern uint16_t reference_offset, release_offset;
 
 #include "board_avr.h"
 
 static const char board_type[] PROGMEM = "Arduino Mega 2560";
 static const char board_channels[] PROGMEM =
     "D53 D52 D51 D50 D10 D11 D12 D13 A8 A9 A10 A11 A12 A13 A14 A15";
-
-/* How far timer 5, which stamps, is ahead of timer 4, which catches the reference. */
-extern uint16_t reference_offset;
 
 void board_start(void);
 
@@ -72,7 +89,7 @@ static inline void board_watch(uint16_t gates)
     PCMSK0 = (uint8_t)gates;
     PCMSK2 = (uint8_t)(gates >> 8);
     PCIFR = _BV(PCIF0) | _BV(PCIF2); /* what came before does not count */
-    PCICR = gates ? _BV(PCIE0) | _BV(PCIE2) : 0;
+    PCICR = BOARD_INTERRUPTS;
 }
 
 static inline bool board_reference(uint16_t *count)

@@ -7,8 +7,8 @@ void board_start(void)
     DDRB = RELEASE_0 | RELEASE_1 | SYNC | LED;
     DDRC = 0;
     DDRD &= 0x03;
-    PORTC = 0; /* the comparators drive the gate inputs */
-    PORTD &= 0x03;
+    PORTC = 0x3F; /* a gate whose wire is broken reads blocked */
+    PORTD |= 0xFC;
 
     TCCR1A = 0;
     TCCR1B = _BV(ICNC1) | _BV(ICES1) | _BV(CS10);

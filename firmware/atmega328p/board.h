@@ -37,8 +37,24 @@
 #define STOP _BV(PB4)      /* D12, closed to ground when all is well */
 #define LED _BV(PB5)       /* D13 */
 #define RELEASE_PORT PORTB /* SYNC is on it too */
+#define RELEASE_PIN PINB
+#define RELEASE_COUNTER TCNT1 /* PB1 is OC1A, PB2 is OC1B */
+#define RELEASE_MATCH_0 OCR1A
+#define RELEASE_MATCH_1 OCR1B
+#define RELEASE_UNITS TCCR1A
+#define RELEASE_SET_0 (_BV(COM1A1) | _BV(COM1A0))
+#define RELEASE_SET_1 (_BV(COM1B1) | _BV(COM1B0))
+#define RELEASE_CLEAR_0 _BV(COM1A1)
+#define RELEASE_CLEAR_1 _BV(COM1B1)
+#define RELEASE_FORCE TCCR1C
+#define RELEASE_FORCE_BOTH (_BV(FOC1A) | _BV(FOC1B))
 #define STOP_PORT PINB
 #define LED_PORT PORTB
+
+#define SUPPLY_CHANNEL 0x0E /* the ADC's name of its reference voltage */
+#define BOARD_INTERRUPTS (_BV(PCIE1) | _BV(PCIE2))
+
+enum { release_offset = 0 }; /* the timer that stamps ends the release too */
 
 #include "board_avr.h"
 
@@ -69,7 +85,7 @@ static inline void board_watch(uint16_t gates)
     PCMSK2 = (uint8_t)ports;
     PCMSK1 = (uint8_t)(ports >> 8);
     PCIFR = _BV(PCIF1) | _BV(PCIF2); /* what came before does not count */
-    PCICR = gates ? _BV(PCIE1) | _BV(PCIE2) : 0;
+    PCICR = BOARD_INTERRUPTS;
 }
 
 static inline bool board_reference(uint16_t *count)

@@ -108,33 +108,73 @@ static inline uint16_t board_entries_lost(void)
     return lost;
 }
 
-/* The outputs, all on one port, from the board's names of its pins. */
-static inline uint8_t outputs(uint8_t release, bool sync)
+/* Interrupts that the memory's end has switched off. */
+static inline void board_resume(void)
 {
-    uint8_t bits = sync ? SYNC : 0;
-    if (release & 1)
-        bits |= RELEASE_0;
-    if (release & 2)
-        bits |= RELEASE_1;
-    return bits;
+    PCICR = BOARD_INTERRUPTS;
 }
 
-static inline void board_outputs(uint8_t release, bool sync)
+static inline void board_sync(bool on)
 {
-    RELEASE_PORT = (uint8_t)((RELEASE_PORT & (uint8_t)~(RELEASE_0 | RELEASE_1 | SYNC)) |
-                             outputs(release, sync));
+    if (on)
+        RELEASE_PORT |= SYNC;
+    else
+        RELEASE_PORT &= (uint8_t)~SYNC;
 }
 
-static inline uint16_t board_fire(uint8_t release)
+/* The releases are driven by two compare units of one timer; the port's bits stay 0. Connected to
+ * its unit a pin shows the register OCnx: that is 0, but from a forced match of `board_fire` to the
+ * match that ends the pulse, or a forced one. */
+static inline uint8_t units(uint8_t release, uint8_t unit_0, uint8_t unit_1)
 {
-    uint8_t port = (uint8_t)(RELEASE_PORT | outputs(release, true));
+    return (uint8_t)((release & 1 ? unit_0 : 0) | (release & 2 ? unit_1 : 0));
+}
+
+static inline void release_match(uint16_t count)
+{
+    RELEASE_MATCH_0 = RELEASE_MATCH_1 = count;
+}
+
+/* End the pulse when the counter gets there. */
+static inline void board_release_end(uint16_t count)
+{
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        release_match((uint16_t)(count + release_offset - 1)); /* a clock after they are equal */
+    }
+}
+
+static inline uint16_t board_fire(uint8_t release, uint16_t ticks)
+{
+    uint8_t set = units(release, RELEASE_SET_0, RELEASE_SET_1);
+    uint8_t clear = units(release, RELEASE_CLEAR_0, RELEASE_CLEAR_1);
+    uint8_t force = RELEASE_FORCE_BOTH;
     uint16_t count;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
-        RELEASE_PORT = port;
+        release_match((uint16_t)(RELEASE_COUNTER - 1)); /* no match for a whole turn */
+        RELEASE_UNITS = set;
+        __asm__ volatile("" : "+r"(force)); /* in its register, so that these are two instructions */
+        RELEASE_PORT |= SYNC;
+        RELEASE_FORCE = force;
         count = BOARD_COUNTER;
     }
+    RELEASE_UNITS = clear;
+    count = (uint16_t)(count - 2); /* it was read two cycles after the match */
+    board_release_end((uint16_t)(count + ticks));
     return count;
+}
+
+static inline void board_release_off(void)
+{
+    RELEASE_FORCE = RELEASE_FORCE_BOTH;
+    RELEASE_UNITS = 0;
+}
+
+/* The pins themselves. */
+static inline bool board_release_high(void)
+{
+    return RELEASE_PIN & (RELEASE_0 | RELEASE_1);
 }
 
 static inline bool board_stopped(void)
@@ -164,6 +204,24 @@ static inline bool caught(volatile uint8_t *flags, uint8_t flag, volatile uint16
     return true;
 }
 
+/* The reference voltage, measured against the supply, over and over: 0 if there is nothing new. */
+static inline uint16_t board_supply(void)
+{
+    uint16_t measured;
+    if (!(ADCSRA & _BV(ADIF)))
+        return 0;
+    measured = ADC;
+    ADCSRA |= _BV(ADIF);
+    return measured;
+}
+
+#define REFERENCE_MV 1100u /* 1.0 to 1.2 V from one controller to the next */
+
+static inline uint16_t board_supply_mv(uint16_t measured)
+{
+    return measured ? (uint16_t)(REFERENCE_MV * 1024ul / measured) : 0;
+}
+
 /* The line is polled: an interrupt for each byte would be one more that can delay a stamp. */
 static inline bool board_receive(uint8_t *byte)
 {
@@ -188,9 +246,9 @@ static inline void board_kick(void)
     wdt_reset();
 }
 
-/* Eight bytes in EEPROM, where neither reset nor flashing changes them. */
-void board_name(uint8_t name[8]);
-void board_rename(const uint8_t name[8]);
+/* The record of `name.h` in EEPROM, where neither reset nor flashing changes it. */
+void board_name(uint8_t record[]);
+void board_rename(const uint8_t record[]);
 
 /* MCUSR as the reset left it; the boot loader may have cleared it. */
 extern uint8_t reset_cause;

@@ -5,6 +5,7 @@
 
 #include "board.h"
 #include "device.h"
+#include "name.h"
 
 #define LINE_BAUD 500000
 #ifndef BAUD
@@ -16,18 +17,19 @@ _Static_assert(F_CPU % (8 * BAUD) == 0, "this rate cannot be made exactly");
 volatile uint16_t entries_lost;
 uint8_t reset_cause BOARD_KEPT; /* set by start.S */
 
-static uint8_t eeprom_name[8] EEMEM = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
+/* Not at address 0, which a write that fails with the supply hits first. */
+#define NAME_AT ((uint8_t *)0x40)
 
-void board_name(uint8_t name[8])
+void board_name(uint8_t record[NAME_RECORD])
 {
-    eeprom_read_block(name, eeprom_name, sizeof eeprom_name);
+    eeprom_read_block(record, NAME_AT, NAME_RECORD);
 }
 
-void board_rename(const uint8_t name[8])
+void board_rename(const uint8_t record[NAME_RECORD])
 {
     uint8_t n;
-    for (n = 0; n < sizeof eeprom_name; n++) {
-        eeprom_update_byte(eeprom_name + n, name[n]); /* 3.4 ms each */
+    for (n = 0; n < NAME_RECORD; n++) {
+        eeprom_update_byte(NAME_AT + n, record[n]); /* 3.4 ms each */
         wdt_reset();
     }
 }
@@ -40,9 +42,17 @@ static void start_line(void)
     UCSR0B = _BV(RXEN0) | _BV(TXEN0);
 }
 
+static void start_supply(void)
+{
+    ADMUX = _BV(REFS0) | SUPPLY_CHANNEL;
+    ADCSRB = 0; /* free running */
+    ADCSRA = _BV(ADEN) | _BV(ADATE) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0) | _BV(ADSC);
+}
+
 int main(void)
 {
     board_start();
+    start_supply();
     wdt_enable(WDTO_120MS);
     start_line();
     device_start(reset_cause);

@@ -45,7 +45,9 @@
     movw r30, r8
     out  _SFR_IO_ADDR(SREG), r5
     reti
-2:  ; no memory: count it, and stay at 65535
+2:  ; no memory: count it, and stay at 65535. No interrupt before the main loop's next turn, or gates
+    ; that toggle without end would leave it no time for anything.
+    sts  _SFR_MEM_ADDR(PCICR), r6
     lds  r30, entries_lost
     lds  r31, entries_lost + 1
     adiw r30, 1

@@ -6,6 +6,7 @@
 #include "bytes.h"
 #include "drop.h"
 #include "events.h"
+#include "name.h"
 #include "receive.h"
 #include "release.h"
 #include "send.h"
@@ -14,6 +15,8 @@
 
 #define BATCH 16                          /* events in a frame */
 #define COMPANY_TICKS (10 * TICKS_PER_MS) /* an event waits no longer than this for others */
+#define STOP_TICKS (300 * TICKS_PER_US) /* the emergency stop's input is the same for so long */
+#define RESTARTED 128
 #define SELDOM 16                         /* turns between two looks at what has time */
 
 /* What is rare must not put its registers' saving into every turn of the main loop. */
@@ -35,6 +38,17 @@ static struct {
     bool flicker;            /* or some gate did, too short to say which */
 } order;
 
+static struct {
+    bool open;      /* the emergency stop, as it was for at least STOP_TICKS */
+    bool wavers;    /* and reads otherwise since then */
+    uint32_t since;
+} stop;
+
+static struct {
+    uint16_t now, worst; /* measures of the supply, larger when it is lower; 0: none yet */
+} supply;
+
+static uint8_t restarts; /* for the certificate; cleared by IDENTIFY */
 static bool aborted;    /* ABORT came for the drop that is recorded or held */
 static bool closing;    /* the recording is over, but not everything is sent */
 static uint8_t room;    /* events that still belong into the frame being written */
@@ -110,15 +124,17 @@ static uint32_t stir(uint32_t with)
 }
 
 /* A board without a name takes one when it is first asked: when that was, to a tick, nobody can
- * foresee. */
-static void name_board(uint8_t name[8])
+ * foresee, and what its memory held at power-up is no other chip's. */
+static const uint8_t *name_board(uint8_t record[NAME_RECORD])
 {
-    board_name(name);
-    if ((get32(name) & get32(name + 4)) != 0xFFFFFFFFu)
-        return;
-    put32(name, stir(ticks_now()));
-    put32(name + 4, stir(ticks_now()));
-    board_rename(name);
+    board_name(record);
+    if (!name_in(record)) {
+        put32(record + 2, stir(ticks_now()));
+        put32(record + 6, stir(ticks_now() ^ events_crc(BOARD_CAPACITY / 4)));
+        name_seal(record);
+        board_rename(record);
+    }
+    return name_in(record);
 }
 
 /* -- what goes on */
@@ -126,7 +142,6 @@ static void name_board(uint8_t name[8])
 static void disarm(uint8_t reason)
 {
     board_watch(0);
-    release_off();
     phase = PHASE_IDLE;
     send_begin(MSG_DISARMED, 0);
     send32(order.label);
@@ -149,6 +164,9 @@ static RARE void close_recording(void)
     drop.overflows = board_entries_lost();
     drop.glitches = events.glitches;
     drop.late = events.late;
+    drop.pulse_ticks = release_lasted(&drop.pulse_end);
+    drop.restarts = restarts;
+    drop.lowest_mv = board_supply_mv(supply.worst);
     drop_seal();
     closing = false;
     phase = PHASE_HOLDING;
@@ -193,7 +211,7 @@ static void watch_armed(uint32_t now)
     order.moved |= events_moved(&order.flicker);
     if (!send_idle())
         return;
-    if (board_stopped())
+    if (stop.open)
         disarm(DISARM_REASON_STOPPED);
     else if (now - order.since >= order.timeout)
         disarm(DISARM_REASON_TIMEOUT);
@@ -204,8 +222,8 @@ static void watch_armed(uint32_t now)
 static void watch_recording(uint32_t now)
 {
     uint16_t count;
-    if (board_stopped())
-        release_off();
+    if (stop.open)
+        release_off(PULSE_END_STOPPED);
     if (!drop.sensed && board_sensed(&count)) {
         drop.sensed = 1;
         drop.sense_tick = ticks_of(count);
@@ -218,17 +236,19 @@ static void watch_recording(uint32_t now)
 
 static void identify(void)
 {
-    uint8_t name[8], n;
+    uint8_t record[NAME_RECORD], n;
+    const uint8_t *name;
     if (request.payload[IDENTIFY_PROTOCOL_VERSION] != PROTOCOL_VERSION) {
         refuse(REASON_VERSION, PROTOCOL_VERSION);
         return;
     }
-    name_board(name);
+    name = name_board(record);
+    restarts = 0;
     send_begin(MSG_IDENTITY, request.seq);
     send8(PROTOCOL_VERSION);
     send_text(board_type, sizeof board_type - 1);
     send_text(firmware, sizeof firmware - 1);
-    for (n = 0; n < sizeof name; n++)
+    for (n = 0; n < NAME_SIZE; n++)
         send8(name[n]);
     send32(BOARD_HZ);
     send8(BOARD_GATES);
@@ -268,7 +288,7 @@ static void arm(void)
                release >> BOARD_RELEASES || pulse_us > RELEASE_MAX_US ||
                (release == 0) != (pulse_us == 0) || timeout_ms == 0 || record_ms == 0) {
         refuse(REASON_BAD_PARAMETER, 0);
-    } else if (board_stopped()) {
+    } else if (stop.open) {
         refuse(REASON_STOPPED, 0);
     } else if (release && (rest_ms = release_rest_ms(now)) != 0) {
         refuse(REASON_COOLING, rest_ms);
@@ -294,6 +314,13 @@ static void arm(void)
     }
 }
 
+/* Nothing is on outside of a recording. */
+static uint32_t pulse_ticks(void)
+{
+    uint32_t pulse = order.pulse_us * TICKS_PER_US, record = order.record_ms * (uint32_t)TICKS_PER_MS;
+    return pulse < record ? pulse : record;
+}
+
 static void fire(void)
 {
     uint16_t blocked;
@@ -304,7 +331,7 @@ static void fire(void)
     order.moved |= events_moved(&order.flicker);
     if (get32(request.payload + FIRE_TOKEN) != order.token) {
         refuse(REASON_WRONG_TOKEN, 0);
-    } else if (board_stopped()) {
+    } else if (stop.open) {
         refuse(REASON_STOPPED, 0);
     } else if ((blocked = board_gates() & order.gates) != 0) {
         refuse(REASON_GATE_BLOCKED, blocked);
@@ -315,10 +342,12 @@ static void fire(void)
         drop.gates = order.gates;
         drop.sensed = 0;
         drop.sense_tick = 0;
+        drop.supply_mv = board_supply_mv(supply.now);
+        supply.worst = supply.now;
         aborted = closing = false;
         phase = PHASE_RECORDING;
         board_sense_begin();
-        drop.fire_tick = release_fire(order.release, order.pulse_us);
+        drop.fire_tick = release_fire(order.release, pulse_ticks());
         answer(MSG_FIRED, FIRED_SIZE, drop.fire_tick);
     }
 }
@@ -329,7 +358,7 @@ static void abort_all(void)
         board_watch(0);
         phase = PHASE_IDLE;
     }
-    release_off();
+    release_off(PULSE_END_ABORTED);
     aborted = true;
     if (phase == PHASE_RECORDING && !closing)
         end_recording();
@@ -433,9 +462,31 @@ static RARE void execute(void)
 
 /* -- the main loop */
 
+/* A spike on a long wire is no emergency: what counts is what every look has seen for a while. */
+static void watch_stop(void)
+{
+    uint32_t now;
+    if (board_stopped() == stop.open) {
+        stop.wavers = false;
+        return;
+    }
+    now = ticks_roughly();
+    if (!stop.wavers) {
+        stop.wavers = true;
+        stop.since = now;
+    } else if ((int32_t)(now - stop.since) >= (int32_t)STOP_TICKS) {
+        stop.open = !stop.open;
+        stop.wavers = false;
+    }
+}
+
 static RARE void seldom(uint32_t now)
 {
-    uint16_t count;
+    uint16_t count, measured = board_supply();
+    if (measured)
+        supply.now = measured;
+    if (measured > supply.worst)
+        supply.worst = measured;
     board_kick();
     release_pass(now);
     receive_pass();
@@ -469,8 +520,12 @@ void device_pass(void)
     }
     send_pass();
     ticks_pass();
-    if (release_on())
+    if (release_on()) {
         release_pass(ticks_roughly());
+        receive_pass();
+    }
+    watch_stop();
+    board_resume();
     if (++turn % SELDOM == 0) {
         lately = ticks_roughly();
         seldom(lately);
@@ -484,6 +539,9 @@ void device_start(uint8_t cause)
     receive_reset();
     send_reset();
     requested = closing = aborted = false;
+    stop.open = board_stopped();
+    stop.wavers = false;
+    restarts = (uint8_t)(RESTARTED | cause);
     last.seq = 0;
     pulses = 0;
     room = 0;

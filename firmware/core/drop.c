@@ -43,7 +43,7 @@ bool drop_recover(void)
 
 void drop_certify(uint8_t ack)
 {
-    send_begin(MSG_DROP_CERTIFICATE, ack);
+    send_begin(MSG_DROP_CERTIFICATE2, ack);
     send32(drop.label);
     send32(drop.fire_tick);
     send16(drop.gates);
@@ -55,5 +55,10 @@ void drop_certify(uint8_t ack)
     send16(drop.late);
     send8(drop.sensed);
     send32(drop.sense_tick);
+    send32(drop.pulse_ticks);
+    send8(drop.pulse_end);
+    send8(drop.restarts);
+    send16(drop.supply_mv);
+    send16(drop.lowest_mv);
     send_end();
 }

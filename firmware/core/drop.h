@@ -9,7 +9,9 @@ struct drop {
     uint32_t label; /* 0: none */
     uint32_t fire_tick, sense_tick, crc32;
     uint16_t gates, events, overflows, glitches, late;
-    uint8_t sensed;
+    uint8_t sensed, pulse_end, restarts;
+    uint32_t pulse_ticks;
+    uint16_t supply_mv, lowest_mv;
 };
 
 extern struct drop drop;

@@ -136,6 +136,7 @@ uint16_t events_moved(bool *flicker)
 {
     uint16_t moved = 0;
     while (board_has_entry(at.entry)) {
+        ticks_pass(); /* there may be many */
         uint16_t ports = (uint16_t)(get16(at.entry + 4) & board_ports_of(at.gates));
         moved |= board_gates_of((uint8_t)ports, (uint8_t)(ports >> 8));
         *flicker |= ports == 0;

@@ -2,44 +2,93 @@
 
 #include "board.h"
 #include "ticks.h"
+#include "wire.h"
+
+/* As far ahead as the compare unit is set: a turn of its counter, less what a look may be off. */
+#define REACH 0xF800
+/* The end is put off when this much of it is over. */
+#define SOON 0x1000
+/* By now a pulse of so many ticks is over, or was too short for the compare unit. */
+#define SHORT (10 * TICKS_PER_US)
+/* A pulse is on this long after its end: the compare unit failed. */
+#define FAILED 0x400
 
 static struct {
     uint32_t since, length; /* of the pulse, or of the rest after it, in ticks */
+    uint32_t end;           /* when the compare unit ends the pulse, as it is set now */
     bool on, resting, sync;
+    uint32_t lasted;
+    uint8_t ended_by;
 } pulse;
+
+static void ended(uint32_t at, uint8_t by)
+{
+    board_release_off();
+    pulse.on = false;
+    pulse.resting = true;
+    pulse.lasted = at - pulse.since;
+    pulse.ended_by = by;
+    pulse.length = pulse.lasted * RELEASE_REST;
+    pulse.since = at;
+}
+
+static void end_now(uint8_t by)
+{
+    board_release_off();
+    ended(ticks_now(), by);
+}
+
+static uint16_t within_reach(uint32_t left)
+{
+    return (uint16_t)(left < REACH ? left : REACH);
+}
+
+/* The compare unit is set when the pulse begins, and put off for as long as this is called: a main
+ * loop that stands still ends the pulse too early, never too late. */
+static void put_off(uint32_t now)
+{
+    pulse.end = now + within_reach(pulse.since + pulse.length - now);
+    board_release_end((uint16_t)pulse.end);
+}
 
 void release_reset(void)
 {
     pulse.on = pulse.resting = pulse.sync = false;
-    board_outputs(0, false);
+    board_release_off();
+    board_sync(false);
 }
 
-uint32_t release_fire(uint8_t mask, uint32_t pulse_us)
+uint32_t release_fire(uint8_t mask, uint32_t ticks)
 {
-    pulse.length = pulse_us * TICKS_PER_US;
+    uint16_t reach = within_reach(ticks);
+    uint32_t at = ticks_of(board_fire(mask, reach));
     pulse.sync = true;
-    pulse.on = mask != 0;
-    pulse.since = ticks_of(board_fire(mask));
-    return pulse.since;
+    pulse.lasted = 0;
+    pulse.ended_by = PULSE_END_ORDERED;
+    if (mask == 0)
+        return at; /* what had to rest goes on doing so */
+    pulse.since = at;
+    pulse.length = ticks;
+    pulse.end = at + reach;
+    pulse.on = true;
+    if (ticks < SHORT && board_release_high())
+        end_now(PULSE_END_ORDERED);
+    return at;
 }
 
-void release_off(void)
+void release_off(uint8_t by)
 {
-    board_outputs(0, pulse.sync);
-    if (pulse.on) {
-        uint32_t now = ticks_now();
-        pulse.length = (now - pulse.since) * RELEASE_REST;
-        pulse.since = now;
-        pulse.on = false;
-        pulse.resting = true;
-    }
+    if (pulse.on && board_release_high())
+        end_now(by);
+    else if (pulse.on)
+        release_pass(pulse.end);
 }
 
 void release_done(void)
 {
-    release_off();
+    release_off(PULSE_END_ORDERED);
     pulse.sync = false;
-    board_outputs(0, false);
+    board_sync(false);
 }
 
 bool release_on(void)
@@ -47,12 +96,26 @@ bool release_on(void)
     return pulse.on;
 }
 
+uint32_t release_lasted(uint8_t *by)
+{
+    *by = pulse.ended_by;
+    return pulse.lasted;
+}
+
 void release_pass(uint32_t now)
 {
-    if (pulse.on && now - pulse.since >= pulse.length)
-        release_off();
-    else if (pulse.resting && now - pulse.since >= pulse.length)
-        pulse.resting = false;
+    bool whole = pulse.end - pulse.since == pulse.length;
+    if (!pulse.on) {
+        if (pulse.resting && now - pulse.since >= pulse.length)
+            pulse.resting = false;
+    } else if (!board_release_high()) {
+        ended(pulse.end, whole ? PULSE_END_ORDERED : PULSE_END_DEVICE);
+    } else if (!whole) {
+        if (pulse.end - now < REACH - SOON)
+            put_off(now);
+    } else if ((int32_t)(now - pulse.end) > FAILED) {
+        end_now(PULSE_END_DEVICE);
+    }
 }
 
 uint16_t release_rest_ms(uint32_t now)

@@ -1,7 +1,7 @@
 /* The 16-bit counter -> 32-bit time, without an overflow interrupt that could delay a stamp.
  *
- * The main loop counts halves of the counter's range, a quarter of the range late. It may do so
- * another 1.5 ms late (at 16 MHz): every conversion finds by how much the counter is ahead. */
+ * The main loop looks at the counter, at least once in 3.7 ms (at 16 MHz). What the interrupt stamps
+ * is right if it looks once in 1.7 ms. */
 #ifndef TICKS_H
 #define TICKS_H
 
@@ -13,7 +13,7 @@
 /* Begin; the counter's bits stand in for the lower 16 of `time`. */
 void ticks_start(uint32_t time);
 
-/* Count, at least every 1.5 ms. */
+/* Look at the counter. */
 void ticks_pass(void);
 
 /* Now, or up to 16 us later, without holding interrupts off. */

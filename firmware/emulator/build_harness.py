@@ -15,7 +15,8 @@ ffi.set_source(
     "rig_emulator._harness",
     '#include "harness.h"',
     sources=[
-        f"rig_emulator/{name}.c" for name in ("harness", "interrupts", "pins", "line", "queue")
+        f"rig_emulator/{name}.c"
+        for name in ("harness", "interrupts", "pins", "compare", "line", "queue")
     ],
     include_dirs=["rig_emulator", "/usr/include/simavr", "/usr/local/include/simavr"],
     libraries=["simavr"],

@@ -6,11 +6,13 @@
 #include "drop.h"
 #include "events.h"
 #include "host.h"
+#include "name.h"
 #include "ticks.h"
 
 #define CHANGES 8192
 #define LINE 65536
 #define REFERENCES 16
+#define SYNC 0x80 /* in `outputs`, beside the releases */
 
 static uint64_t now, base; /* base: what the 32-bit time is ahead of `now` */
 
@@ -36,11 +38,11 @@ static uint8_t *tail, *stop;
 static uint8_t half;
 static uint8_t outputs;
 static bool stopped, fired;
-static uint64_t fire_at, sense_after;
+static uint64_t fire_at, sense_after, release_end;
 static uint64_t references[REFERENCES];
 static uint8_t reference_first, reference_end;
 static bool sense_waits;
-static uint8_t name[8];
+static uint8_t name[NAME_RECORD];
 
 /* -- the core's side */
 
@@ -105,14 +107,44 @@ uint16_t board_entries_lost(void)
     return lost;
 }
 
-void board_outputs(uint8_t release, bool sync)
+void board_resume(void)
 {
-    outputs = (uint8_t)(release | sync << 7);
 }
 
-uint16_t board_fire(uint8_t release)
+void board_sync(bool on)
 {
-    outputs = (uint8_t)(release | 1 << 7);
+    outputs = (uint8_t)((outputs & ~SYNC) | (on ? SYNC : 0));
+}
+
+void board_release_end(uint16_t count)
+{
+    release_end = now + (uint16_t)(count - board_count());
+}
+
+void board_release_off(void)
+{
+    outputs &= SYNC;
+}
+
+bool board_release_high(void)
+{
+    return outputs & ~SYNC;
+}
+
+uint16_t board_supply(void)
+{
+    return 1;
+}
+
+uint16_t board_supply_mv(uint16_t measured)
+{
+    return (uint16_t)(5000 * measured);
+}
+
+uint16_t board_fire(uint8_t release, uint16_t ticks)
+{
+    outputs = (uint8_t)(release | SYNC);
+    release_end = now + ticks;
     fired = true;
     fire_at = now;
     return board_count();
@@ -185,12 +217,12 @@ void board_kick(void)
 {
 }
 
-void board_name(uint8_t to[8])
+void board_name(uint8_t to[])
 {
     memcpy(to, name, sizeof name);
 }
 
-void board_rename(const uint8_t from[8])
+void board_rename(const uint8_t from[])
 {
     memcpy(name, from, sizeof name);
 }
@@ -265,6 +297,8 @@ uint64_t host_run(uint64_t until)
     fired = false;
     while (now + HOST_TURN <= until && !fired) {
         gates_until(now + HOST_TURN);
+        if (now >= release_end)
+            board_release_off();
         device_pass();
     }
     return now;
@@ -331,7 +365,7 @@ void host_sense(uint64_t after_fire)
 
 uint8_t host_outputs(void)
 {
-    return (uint8_t)(outputs & 0x7F);
+    return (uint8_t)(outputs & ~SYNC);
 }
 
 void host_preset(uint32_t tick)
@@ -342,7 +376,7 @@ void host_preset(uint32_t tick)
 
 bool host_recording(void)
 {
-    return outputs >> 7;
+    return outputs & SYNC;
 }
 
 void host_reset(uint8_t cause)

@@ -62,8 +62,14 @@ void board_entries_start(uint8_t *memory, uint8_t *stop);
 bool board_entries_rewind(const uint8_t *from, uint8_t *to);
 void board_entries_stop(uint8_t *slot);
 uint16_t board_entries_lost(void);
-void board_outputs(uint8_t release, bool sync);
-uint16_t board_fire(uint8_t release);
+void board_resume(void);
+void board_sync(bool on);
+uint16_t board_fire(uint8_t release, uint16_t ticks);
+void board_release_end(uint16_t count);
+void board_release_off(void);
+bool board_release_high(void);
+uint16_t board_supply(void);
+uint16_t board_supply_mv(uint16_t measured);
 bool board_stopped(void);
 bool board_reference(uint16_t *count);
 void board_sense_begin(void);
@@ -73,7 +79,7 @@ bool board_send_ready(void);
 void board_send(uint8_t byte);
 void board_led(bool on);
 void board_kick(void);
-void board_name(uint8_t name[8]);
-void board_rename(const uint8_t name[8]);
+void board_name(uint8_t record[]);
+void board_rename(const uint8_t record[]);
 
 #endif

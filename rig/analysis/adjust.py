@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import normal_equations, scaled
+from rig.analysis.equations import NormalEquations, normal_equations, scaled
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -26,6 +26,10 @@ STEPS = 60
 """Of an adjustment, which a good one never needs."""
 DONE = 1e-3
 """Of a standard uncertainty: a step so short is the last, for the next one is shorter again."""
+PATIENT = 6
+"""Steps after which one back is no part of finding the way: an edge at the very moment of an impact
+has a slope on either side, and steps go to and fro over the best place, which lies between them."""
+_AGAIN = 0.5  # of the last step, taken back by the next one
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 
 
@@ -99,21 +103,51 @@ def adjust(
         How many there are at most.
     """
     sd = model.unknowns.sd
+
+    def equations(at: Array, inflation: float) -> NormalEquations:
+        return normal_equations(model, matches, at, sd, inflation)
+
+    return least_squares(equations, sd, x, centre, done, steps)
+
+
+def least_squares(
+    equations: Callable[[Array, float], NormalEquations],
+    sd: Array,
+    x: Array,
+    centre: Array | None = None,
+    done: float = DONE,
+    steps: int = STEPS,
+) -> Estimate:
+    """Find the unknowns that fit any observations best, given what is known of them beforehand.
+
+    Parameters
+    ----------
+    equations
+        Normal equations about a point, if the observations scatter so many times as assumed.
+    sd
+        Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
+    x, centre, done, steps
+        As in `adjust`.
+    """
     y = scaled(x, sd)
     prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
     identity = np.eye(x.size)
     information = data = identity
     chi2, edges, moved = 0.0, 0, 0.0
-    inflation = 1.0
-    settled = False
+    inflation = damping = 1.0
+    settled, ahead = False, np.zeros_like(y)
     for step in range(steps):
-        found = normal_equations(model, matches, y * sd, sd, inflation)
+        found = equations(y * sd, inflation)
         data = found.matrix
         information = data + identity
         right = data @ y - found.vector + prior
-        before = y
-        y = np.linalg.solve(information, right).astype(np.float64, copy=False)
-        last, moved = moved, length(y - before, information)
+        turned, ahead = ahead, np.linalg.solve(information, right).astype(np.float64) - y
+        # Steps to and fro that get shorter end by themselves, and sooner.
+        taken_back = -(ahead @ information @ turned)
+        if step > PATIENT and taken_back > _AGAIN * length(turned, information) ** 2:
+            damping *= 0.5
+        y = y + damping * ahead
+        last, moved = moved, damping * length(ahead, information)
         previous, chi2, edges = chi2, found.chi2, found.size
         # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
@@ -125,7 +159,7 @@ def adjust(
                 factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
             if factor >= 1.05:
                 inflation *= factor  # the edges scatter more than assumed: weigh them so
-            elif moved < done or moved**2 < done * last:
+            elif moved < done or (damping == 1.0 and moved**2 < done * last):
                 settled = True
                 break
     return Estimate(y * sd, sd, information, data, chi2, edges, inflation, settled)

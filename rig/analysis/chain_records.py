@@ -6,16 +6,18 @@ Beside what each gate reported stands what it should see of the chain that hangs
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rig.analysis.trajectory import ONE
 from rig.errors import DomainError
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.model.rods import rod_impacts
+from rig.predictions import air_shares
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -117,6 +119,11 @@ class ChainRecord:
         that strikes nothing.
     alpha
         Of its impacts as the model expects it; 0 for a chain that strikes nothing.
+    air
+        κ of each leg in units of that of the first chain as a whole, as in
+        `rig.analysis.trajectory.Trajectory`.
+    condition
+        Under which it strikes, in words; drops of the same one have the contact in common.
     """
 
     role: Literal["impact", "free"]
@@ -124,6 +131,8 @@ class ChainRecord:
     trains: tuple[EdgeTrain, ...]
     ratios: Array | None = None
     alpha: float = 0.0
+    air: Array = field(default_factory=lambda: ONE)
+    condition: str = ""
 
     @property
     def expected(self) -> int:
@@ -186,12 +195,17 @@ def _passages(
 def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[ChainRecord]:
     """Collect each chain with the trains of its gates."""
     found = []
+    shares = air_shares(protocol)
     for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop, hz)):
+        air = np.array(shares[chain.name])
         if role == "free":
-            found.append(ChainRecord(role, chain, trains))
+            found.append(ChainRecord(role, chain, trains, air=air[:1]))
         else:
-            ratios = _ratios(protocol, chain.chain)
-            found.append(ChainRecord(role, chain, trains, ratios, _alpha(protocol, chain, run)))
+            ratios, alpha = _ratios(protocol, chain.chain), _alpha(protocol, chain, run)
+            # Behind the last leg nothing falls any more, but edges are asked for all the same.
+            air = np.append(air, air[-1]) if np.ptp(air) else air[:1]
+            where = str(protocol.condition(run))
+            found.append(ChainRecord(role, chain, trains, ratios, alpha, air, where))
     return found
 
 

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.protocol.protocol import Priors
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rig.protocol.protocol import Protocol
+
+_DEFAULT = Priors()
 
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Variance components, all as standard deviations; the defaults are what is stated.
+    """Variance components, all as standard deviations; the defaults are those of `Priors`.
 
     Attributes
     ----------
@@ -20,27 +32,61 @@ class Components:
         Scatter of where a chain hangs from run to run, m.
     beam
         How far off a rod's middle a beam may run, m; times tan(tilt) it shifts edges rod by rod.
+    departure
+        How far off its chain a rod that passes a beam may be once rods have struck, m: strings
+        bounce, rods turn, and none of that is in the equations.
     impulse, impulse_floor
         Scatter of single impulses about α: relative to α, and where α is small.
+    bounce
+        What strings that bounce add to the scatter of the last pull, relative to α. One rod alone
+        goes with what its own string does; where M are left it counts by 1/M.
     gates, rods
         Beam heights and rod places: relative to the protocol's own uncertainties.
     """
 
-    floor: float = 0.1e-3
-    jitter: float = 2e-6
-    hang: float = 0.3e-3
-    beam: float = 1.0e-3
-    impulse: float = 0.05
-    impulse_floor: float = 0.003
+    floor: float = _DEFAULT.edge_floor
+    jitter: float = _DEFAULT.jitter
+    hang: float = _DEFAULT.hang
+    beam: float = _DEFAULT.beam_offset
+    departure: float = _DEFAULT.departure
+    impulse: float = _DEFAULT.impulses
+    impulse_floor: float = _DEFAULT.impulse_floor
+    bounce: float = _DEFAULT.last_impulse
     gates: float = 1.0
     rods: float = 1.0
 
-    def impulses(self, alpha: float) -> float:
-        """Scatter of one impulse's α, for an α."""
-        return math.hypot(self.impulse * alpha, self.impulse_floor)
+    def impulses(self, alpha: float, above: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scatter of each impulse's α, for an α.
+
+        Parameters
+        ----------
+        above
+            Number of rods above the one that strikes; shape ``(rods,)``.
+        """
+        even = math.hypot(self.impulse * alpha, self.impulse_floor)
+        return np.hypot(even, self.bounce * alpha / above)
 
 
-STATED = Components()
+def above(rods: int) -> NDArray[np.float64]:
+    """Count the rods above each one, bottom up; 1 for the top rod, whose impact pulls nothing."""
+    return np.maximum(np.arange(rods)[::-1], 1).astype(float)
+
+
+def stated(protocol: Protocol) -> Components:
+    """How much everything scatters by a protocol's priors."""
+    priors = protocol.priors
+    return Components(
+        priors.edge_floor,
+        priors.jitter,
+        priors.hang,
+        priors.beam_offset,
+        priors.departure,
+        priors.impulses,
+        priors.impulse_floor,
+        priors.last_impulse,
+    )
+
+
 LEAST_SHARE = 0.01
 """Of what is stated, below which nothing is believed: no rod is round to less than a micrometre, no
 stamp better than 20 ns, and a perfect simulation must not make the edges infinitely sure."""

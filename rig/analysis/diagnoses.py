@@ -1,33 +1,28 @@
-"""What is wrong with the rig, by the edges: dead and exchanged gates, chains of other rods.
+"""Which gates see something else than they should, once a drop is adjusted.
 
-It is said and never fitted away: a drop whose gates or chains are not those of the protocol is
-void, with the fault as its reason. An adjusted drop is diagnosed by what the adjustment left over;
-`rig.analysis.explanations` weighs what is suspected against all else that it may be.
+It is said and never fitted away. What it may be is weighed by `rig.analysis.explanations`, which is
+asked where something here, or in the adjustment itself, is odd.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.align import align, possible
-from rig.analysis.chain_records import EdgeTrain
 from rig.analysis.equations import scaled
-from rig.analysis.explanations import exchanged, name_of
+from rig.analysis.faults import name_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.fit import Fit
-    from rig.analysis.trajectory import Trajectory
-    from rig.protocol.protocol import Gate
+    from rig.protocol.protocol import Protocol
 
-    Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
 STRANGE = 0.5
@@ -38,11 +33,13 @@ IMPLAUSIBLE = 6.0
 """Standard uncertainties beyond which a beam is not where the protocol says: by rods all alike and
 evenly spaced, an exchanged gate is fitted well at a wrong height."""
 RIGHT = 0.8
-"""Share that says that it was exchanged with another."""
-_WIDTH = 1e-3  # m: how far off an edge of another gate or rod may be
+_FIRST = 2  # rods that pass a gate before others lie under it
+_WHOLE = 0.9  # share of its edges that says that a gate sees every rod
+_ABOUT = 0.1  # by which a gate may see more rods than one above it
+_ENOUGH = 3  # gates that see every rod
 _SOME = 3  # edges expected of a gate that say too little when they are missing
-_ENOUGH = 3  # gates that must agree on how many rods there are
-_MOST = 3  # rods by which a chain may differ
+_DEAD = "dead or not plugged in"
+_PAIR = 2  # edges of a rod
 
 
 class Diagnosis(NamedTuple):
@@ -52,34 +49,31 @@ class Diagnosis(NamedTuple):
     ----------
     suspects
         Numbers of the gates that see something else than they should.
+    odd
+        Whether edges are missing, or are too many, in a way that is hardly chance.
+    pile
+        Whether that is because rods come to rest above them, and nothing else is to be sought.
     """
 
     void: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     suspects: tuple[int, ...] = ()
+    odd: bool = False
+    pile: bool = False
 
 
 def diagnose(fit: Fit) -> Diagnosis:
-    """Look for gates and chains that are not those of the protocol."""
+    """Look for gates that do not see the chains of the protocol."""
+    model = fit.model
     gates = _gates(fit)
     void: list[str] = []
-    doubts = [
-        f"{name_of(_gate(fit, one.train))} gave no edges: it is dead or not plugged in"
-        for one in gates
-        if one.train.times.size == 0
-    ]
+    doubts = silent(model.protocol, model.records.values())
     alive = [one for one in gates if one.train.times.size]
-    found: set[int] = set()
-    suspect = [gate for gate in alive if gate.odd or gate.off > IMPLAUSIBLE]
-    # Exchanged gates first: each of them alone would look like a gate that sees nonsense.
-    for one, other in combinations(suspect, 2):
-        if not {one.train.gate, other.train.gate} & found and _exchanged(fit, one, other):
-            void.append(exchanged(_gate(fit, one.train), _gate(fit, other.train)))
-            found |= {one.train.gate, other.train.gate}
+    under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
+    if under:
+        return Diagnosis((_pile(model.protocol, under),), tuple(doubts), pile=True)
     for gate in alive:
-        name = name_of(_gate(fit, gate.train))
-        if gate.train.gate in found:
-            continue
+        name = _name(model.protocol, gate.train)
         if gate.strange:
             # Two edges may be missed by chance, and a gate without any bears on nothing.
             (void if gate.match.size > _SOME else doubts).append(
@@ -88,9 +82,30 @@ def diagnose(fit: Fit) -> Diagnosis:
             )
         elif gate.off > IMPLAUSIBLE:
             void.append(f"{name} is off its height by {gate.off:.0f} times its uncertainty")
-    for role in fit.model.records:
-        void += _rods(fit, role, [gate for gate in alive if gate.role == role])
-    return Diagnosis(tuple(void), tuple(doubts), tuple(gate.train.gate for gate in suspect))
+    # An exchanged gate fits what it should not see rods away, or at another height.
+    displaced = [one for one in alive if one.extra >= _PAIR and one.unseen & one.ends]
+    displaced += [one for pair in combinations(alive, 2) if _counts_crossed(*pair) for one in pair]
+    off = [one for one in alive if one.off > IMPLAUSIBLE]
+    suspects = dict.fromkeys(one.train.gate for one in [*displaced, *off])
+    odd = bool(void) or len(displaced) >= _PAIR
+    odd |= any(_other_ends([one for one in alive if one.role == role]) for role in model.records)
+    return Diagnosis(tuple(void), tuple(doubts), tuple(suspects), odd)
+
+
+def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[str]:
+    """Name the gates that gave no edges, while the others gave theirs."""
+    gates = [train for record in records for train in record.trains if train.rods.size]
+    others = [train for train in gates if train.times.size]
+    if sum(one.times.size for one in others) <= STRANGE * sum(one.rods.size for one in others):
+        return []
+    found = []
+    for record in records:
+        dead = [one for one in record.trains if one.rods.size and not one.times.size]
+        if len(dead) == len(record.trains) > 1:
+            found.append(f"the gates of the {record.role} side gave no edges: {_DEAD}")
+        else:
+            found += [f"{_name(protocol, one)} gave no edges: {_DEAD}" for one in dead]
+    return found
 
 
 class _Seen(NamedTuple):
@@ -111,15 +126,35 @@ class _Seen(NamedTuple):
         return self.matched / self.match.size
 
     @property
-    def odd(self) -> bool:
-        """Whether a rod's two edges are missing, or there are two too many."""
-        return self.match.size - self.matched > 1 or self.train.times.size - self.matched > 1
+    def missing(self) -> int:
+        """How many expected edges it did not see."""
+        return self.match.size - self.matched
+
+    @property
+    def extra(self) -> int:
+        """How many of its edges belong to no rod."""
+        return self.train.times.size - self.matched
+
+    @property
+    def unseen(self) -> set[int]:
+        """Rods of which no edge was seen."""
+        rods = self.train.rods
+        return set(rods.tolist()) - set(rods[self.match >= 0].tolist())
+
+    @property
+    def ends(self) -> set[int]:
+        """The first and the last rod that should pass."""
+        return {int(self.train.rods[0]), int(self.train.rods[-1])}
+
+    @property
+    def beyond(self) -> int:
+        """How many edges came after that of the last rod."""
+        return self.train.times.size - 1 - int(self.match.max(initial=-1))
 
     @property
     def strange(self) -> bool:
         """Whether it sees something else than its chain."""
-        missing = self.match.size - self.matched
-        return self.share < STRANGE or (self.share < RIGHT and missing > FEW)
+        return self.share < STRANGE or (self.share < RIGHT and self.missing > FEW)
 
 
 def _gates(fit: Fit) -> list[_Seen]:
@@ -133,111 +168,51 @@ def _gates(fit: Fit) -> list[_Seen]:
     ]
 
 
-def _gate(fit: Fit, train: EdgeTrain) -> Gate:
-    assert fit.model.protocol.gates is not None
-    return fit.model.protocol.gates.gates[train.gate]
+def _name(protocol: Protocol, train: EdgeTrain) -> str:
+    assert protocol.gates is not None
+    return name_of(protocol.gates.gates[train.gate])
 
 
-def _exchanged(fit: Fit, one: _Seen, other: _Seen) -> bool:
-    """Whether each gate's edges are what the other should have seen, and better than its own.
+def _counts_crossed(one: _Seen, other: _Seen) -> bool:
+    """Whether two gates gave as many edges as each other should have, and not as themselves."""
+    came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
+    own = abs(came[0] - due[0]) + abs(came[1] - due[1])
+    crossed = abs(came[0] - due[1]) + abs(came[1] - due[0])
+    return own - crossed >= 2 * _PAIR
 
-    Gates that are a whole number of rods apart see nearly the same: the ends of the chain tell.
+
+def _buried(protocol: Protocol, gates: Sequence[_Seen]) -> list[_Seen]:
+    """Find the lowest gates that do not see every rod, where all above them do.
+
+    The first rods pass them: so they are plugged in right, and it is later that something is there.
     """
-    pairs = ((one, other), (other, one))
-    own = one.matched + other.matched + 1
-    if max(one.off, other.off) > IMPLAUSIBLE:
-        own = 0  # beams at impossible heights fit anything: that they fit their own means nothing
-    if sum(min(a.match.size, b.train.times.size) for a, b in pairs) <= own:
-        return False  # not even if all of them were
-    counts = []
-    for expected, observed in pairs:
-        count = _count_as(fit, expected, observed)
-        if count <= RIGHT * expected.match.size:
-            return False
-        counts.append(count)
-    return sum(counts) > own
+    assert protocol.gates is not None
+    heights = [gate.height for gate in protocol.gates.gates]
+    gates = sorted(gates, key=lambda one: heights[one.train.gate])
+    under = 0
+    while under < len(gates) and gates[under].strange:
+        under += 1
+    above = gates[under:]
+    whole = sum(one.share >= _WHOLE for one in above)
+    passed = all((one.match[: 2 * _FIRST] >= 0).any() for one in gates[:under])
+    fewer = all(a.share <= b.share + _ABOUT for a, b in pairwise(gates[:under]))
+    clear = whole >= _ENOUGH and not any(one.strange for one in above)
+    return gates[:under] if passed and fewer and clear else []
 
 
-def _count_as(fit: Fit, expected: _Seen, observed: _Seen) -> int:
-    """Count the edges of one gate that are what another should have seen; 0 where too few are."""
-    train = replace(
-        expected.train,
-        times=observed.train.times,
-        blocked=observed.train.blocked,
-        burst=observed.train.burst,
-        edge=observed.train.edge,
+def _pile(protocol: Protocol, gates: Sequence[_Seen]) -> str:
+    names = " and ".join(_name(protocol, one.train) for one in gates)
+    verb = "does" if len(gates) == 1 else "do"
+    return (
+        f"rods pile up on the surface: {names} {verb} not see them all pass, while the gates above "
+        "do; the last rods strike those that lie there"
     )
-    path, clock = _motion(fit, expected.role)
-    if possible(train, path, _WIDTH, clock) <= RIGHT * train.rods.size:
-        return 0
-    (match,) = align([train], [train.levels], path, _WIDTH, clock)
-    return int((match >= 0).sum())
 
 
-def _motion(fit: Fit, role: str) -> tuple[Trajectory, float]:
-    """Path of a side as adjusted, and how slow the clock is."""
-    model, x = fit.model, fit.estimate.x
-    return model.trajectory(role, x), float(x[model.unknowns["clock"]][0])
-
-
-def _rods(fit: Fit, role: str, gates: Sequence[_Seen]) -> list[str]:
-    """Compare the number of rods that passed with the chain's."""
-    chain = fit.model.records[role].chain
-    rods = chain.chain.rods
-    # Of a rod's two edges one is enough, and counts once.
-    expected = _counts([gate.train.rods for gate in gates], rods)
-    seen = _counts([gate.train.rods[gate.match >= 0] for gate in gates], rods)
-    there = np.flatnonzero(seen)
-    missing = rods - 1 - int(there[-1]) if there.size else 0
-    if missing and expected[-missing:].min() >= _ENOUGH:
-        return [_count(role, chain.name, rods, rods - missing)]
-    more = _more(fit, role, gates)
-    return [_count(role, chain.name, rods, rods + more)] if more else []
-
-
-def _counts(passed: Sequence[Index], rods: int) -> Index:
-    """How many gates each rod passed, shape ``(rods,)``."""
-    sizes = np.array([one.size for one in passed], dtype=np.intp)
-    gate = np.repeat(np.arange(len(passed)), sizes)
-    places = np.concatenate([*passed, np.zeros(0, dtype=np.intp)]) + gate * rods
-    found: Index = (np.bincount(places, minlength=len(passed) * rods) > 0).reshape(-1, rods).sum(0)
-    return found
-
-
-def _count(role: str, name: str, stated: int, found: int) -> str:
-    return f"chain {name} on the {role} side has {found} rods, not {stated} as the protocol says"
-
-
-def _more(fit: Fit, role: str, gates: Sequence[_Seen]) -> int:
-    """Count the rods above the top one of the protocol that most gates saw."""
-    chain = fit.model.records[role].chain
-    places = chain.chain.heights
-    enough = max(_ENOUGH, len(gates) / 2)
-    # A further rod leaves two edges at each gate, evenly spaced above the top one.
-    left = [gate for gate in gates if gate.train.times.size - gate.matched > 1]
-    if len(places) < 2 or len(left) < enough:
-        return 0
-    pitch, width = places[-1] - places[-2], chain.widths[-1]
-    path, clock = _motion(fit, role)
-    for more in range(1, _MOST + 1):
-        trains = [_above(fit, gate, places[-1] + more * pitch, width) for gate in left]
-        found = align(trains, [train.levels for train in trains], path, _WIDTH, clock)
-        if sum(bool((match >= 0).all()) for match in found) < enough:
-            return more - 1
-    return _MOST
-
-
-def _above(fit: Fit, gate: _Seen, place: float, width: float) -> EdgeTrain:
-    """What is left of a gate's edges, with one rod expected."""
-    left = np.setdiff1d(np.arange(gate.train.times.size), gate.match)
-    level = _gate(fit, gate.train).height - place
-    return EdgeTrain(
-        gate.train.gate,
-        gate.train.times[left],
-        gate.train.blocked[left],
-        gate.train.burst[left],
-        gate.train.edge[left],
-        np.zeros(2, dtype=np.intp),
-        np.array([True, False]),
-        np.array([level + width / 2, level - width / 2]),
-    )
+def _other_ends(gates: list[_Seen]) -> bool:
+    """Whether no gate of a side saw the first or the last rod, or all saw further ones."""
+    if not gates:
+        return False
+    unseen = set.intersection(*(gate.unseen for gate in gates))
+    ends = set.union(*(gate.ends for gate in gates))
+    return bool(unseen & ends) or all(gate.beyond >= _PAIR for gate in gates)

@@ -6,21 +6,22 @@ import math
 from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
-from rig.analysis.components import STATED, Components
+from rig.analysis.components import Components, stated
+from rig.analysis.diagnoses import silent
 from rig.analysis.edge_classes import unmatched_edges
-from rig.analysis.explanations import Explainer, Premise, explained, faults
+from rig.analysis.explanations import Explainer, explained
+from rig.analysis.faults import Premise, faults
 from rig.analysis.identify import identify
+from rig.analysis.last_passages import last_passages
 from rig.analysis.quantities import quantities
 from rig.analysis.result import Audit, DropResult
-from rig.analysis.verdict import judge, pattern_faults
+from rig.analysis.verdict import SUPPORT, judge, pattern_faults
 from rig.threads import one_thread
 
-_FEW_GATES = 6  # that all may be suspected where nothing is known
-_SUSPECTS = 6  # of which any two may be exchanged
-
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.analysis.fit import Fit
-    from rig.analysis.verdict import Judgement
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
@@ -31,7 +32,7 @@ def analyze_drop(
     run: Run,
     drop: Drop,
     scale: TimeScale,
-    components: Components = STATED,
+    components: Components | None = None,
 ) -> DropResult:
     """Find out what a drop says by itself.
 
@@ -46,7 +47,7 @@ def analyze_drop(
     scale
         Calibration of its ticks.
     components
-        How much everything scatters.
+        How much everything scatters; as the protocol states it if not given.
     """
     return fit_drop(protocol, run, drop, scale, components)[0]
 
@@ -57,7 +58,7 @@ def fit_drop(
     run: Run,
     drop: Drop,
     scale: TimeScale,
-    components: Components = STATED,
+    components: Components | None = None,
     *,
     explain: bool = True,
 ) -> tuple[DropResult, Fit | None]:
@@ -66,9 +67,10 @@ def fit_drop(
     Parameters
     ----------
     explain
-        Whether to seek what else than the protocol would explain a drop that is odd: it takes a
-        hundred times as long as all the rest.
+        Whether to seek what else than the protocol would explain a drop that is void as it is: it
+        takes many times as long as all the rest. Of others it is sought where they ask for it.
     """
+    components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
     received = sum(part.times.size for record in records for part in record.trains)
     expected = sum(record.expected for record in records)
@@ -79,21 +81,30 @@ def fit_drop(
     window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
     identified = identify(protocol, records, scale.u, components, window)
     unlike = pattern_faults(identified)
-    early = judge(protocol, drop, dict.fromkeys(unlike.values()), blank, {}, None)
+    said = dict.fromkeys([*unlike.values(), *(silent(protocol, records) if unlike else ())])
+    early = judge(protocol, run, drop, said, blank, {}, None)
     if early.verdict == "void" or identified.fit is None:
         reasons = early.reasons
         if unlike and explain:
-            reasons = (*reasons, *_explained(protocol, run, drop, scale, components, early))
+            poor = {one for one, share in identified.shares.items() if share < SUPPORT}
+            assert protocol.gates is not None
+            strange = [n for n, gate in enumerate(protocol.gates.gates) if gate.side in poor]
+            weigh = _explainer(protocol, run, drop, scale, components, strange)
+            reasons = (*reasons, *explained(weigh.explain(None)))
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
     fit = identified.fit
     audit = blank.after(fit.matched)
     found = quantities(fit.model, fit.estimate)
-    end = judge(protocol, drop, (), audit, found, fit)
+    alone = last_passages(fit)
+    end = judge(protocol, run, drop, (), audit, found, fit, alone)
     verdict, reasons = end.verdict, end.reasons
-    why = _explained(protocol, run, drop, scale, components, end) if end.odd and explain else []
-    if why:
-        verdict = "void"
-        reasons = (*(one for one in reasons if one not in end.accused), *why)
+    if not end.known and (explain or verdict != "void"):
+        weigh = _explainer(protocol, run, drop, scale, components, end.suspects)
+        if end.odd or weigh.asked(fit):
+            whole = [one for one in weigh.explain(fit) if one.whole]
+            if why := explained(whole, end.accused):
+                verdict = "void"
+                reasons = (*(one for one in reasons if one not in end.accused), *why)
     result = DropResult(
         run,
         drop.attempt,
@@ -104,23 +115,19 @@ def fit_drop(
         fit.rods,
         fit.estimate.scatter,
         unmatched=unmatched_edges(fit),
+        last_passages=alone,
     )
     return result, fit
 
 
-def _explained(
+def _explainer(
     protocol: Protocol,
     run: Run,
     drop: Drop,
     scale: TimeScale,
     components: Components,
-    judged: Judgement,
-) -> list[str]:
-    """Say what else than the protocol would explain a drop that is odd; nothing where none does."""
-    assert protocol.gates is not None
-    suspects = judged.suspects
-    if judged.verdict == "void" and not suspects and len(protocol.gates.gates) <= _FEW_GATES:
-        suspects = tuple(range(len(protocol.gates.gates)))
-    explainer = Explainer(Premise(protocol, run, scale.hz), drop, scale.u, components)
-    weighed = explainer.explain(faults(protocol, run, suspects[:_SUSPECTS]))
-    return explained(weighed, judged.accused)
+    suspects: Sequence[int],
+) -> Explainer:
+    """Prepare to ask what else than the protocol would explain a drop."""
+    possible = faults(protocol, run, suspects)
+    return Explainer(Premise(protocol, run, scale.hz), drop, scale.u, components, possible)

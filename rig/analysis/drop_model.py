@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.components import STATED, Components
+from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.trajectory import (
     COMMON,
@@ -20,7 +20,8 @@ from rig.analysis.trajectory import (
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, DRAG_U, SIDE_U, Unknowns
+from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, Unknowns
+from rig.predictions import air_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,11 +34,16 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
 
 
 _ABOVE = 1e-3
 """Where a struck chain hangs at least, m: an adjustment of nonsense tries what is below ground."""
+
+
+_ALIKE = 0.05
+"""Scatter of impulses, relative to α, with which an adjustment begins: more may lead it astray."""
 
 
 class _Local(NamedTuple):
@@ -75,9 +81,9 @@ class DropModel:
     clock_u
         Relative standard uncertainty of the time scale.
     components
-        How much everything scatters.
+        How much everything scatters; as the protocol states it if not given.
     air
-        Whether κ is an unknown; `None` where that depends on whether these chains tell it.
+        Whether κ is an unknown.
     """
 
     def __init__(
@@ -86,23 +92,26 @@ class DropModel:
         records: Sequence[ChainRecord],
         guesses: Mapping[str, Guess],
         clock_u: float,
-        components: Components = STATED,
+        components: Components | None = None,
         *,
-        air: bool | None = None,
+        air: bool = True,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
-        self.air = air_is_told(records) if air is None else air
+        self.air = air
+        self._kappa, self._kappa_u = prior_air(protocol)
         self.records: dict[str, ChainRecord] = {record.role: record for record in records}
         self.guesses = guesses
         self.clock_u = clock_u
-        self.components = components
+        self.components = components or stated(protocol)
         self.expected: dict[str, Expected] = {
-            role: Expected.of(record.trains) for role, record in self.records.items()
+            role: Expected.of(record) for role, record in self.records.items()
         }
         slopes: dict[str, float] = {
             record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
         }
+        posts = protocol.gates.posts
+        self._post = np.array([posts.index(gate.side) for gate in protocol.gates.gates])
         self._steepest = max(slopes.values(), default=0.0)
         # A beam is off by as much for a chain of less tilted rods, which shows less.
         self._tilts: dict[str, float] = {
@@ -125,9 +134,11 @@ class DropModel:
         unknowns.add("gravity", "gravity", ANY_GRAVITY if free_only else protocol.gravity.u)
         unknowns.add("drop", "drop height", protocol.drop.u)
         if len(self.records) > 1:
-            unknowns.add("side", "hanging height", SIDE_U)
+            unknowns.add("side", "side", protocol.priors.side)
         if self.air:
-            unknowns.add("drag", "air", DRAG_U)
+            unknowns.add("drag", "air", self._kappa_u)
+        datums = [protocol.gates.datum_u] * len(protocol.gates.posts)
+        unknowns.add("datum", "datum", datums)
         unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
         if self._steepest:
             unknowns.add("ripple", "beam offsets", [components.beam * self._steepest] * gates)
@@ -141,25 +152,37 @@ class DropModel:
             unknowns.add(f"{role} width", "rod width", chain.width_u)
         if "impact" in self.records:
             rods = self.records["impact"].chain.chain.rods
-            scatter = components.impulses(abs(self.guesses["impact"].alpha))
+            alpha = abs(self.guesses["impact"].alpha)
+            scatter = components.impulses(alpha, above(rods))
             unknowns.add("alpha", "edges", ANYTHING)
-            unknowns.add("impulses", "single impulses", [scatter] * rods)
+            unknowns.add("impulses", "single impulses", scatter)
+            contact = protocol.contact
+            unknowns.add("contact", "contact", contact.level.u)
+            unknowns.add("strike", "contact", contact.strike.u)
+            unknowns.add("top", "top rod", math.sqrt(2.0) * components.departure)
+            # In α, like impulses; the same for all drops of a condition, whatever each one found.
+            pull = math.hypot(
+                protocol.priors.strings * self.records["impact"].alpha,
+                protocol.priors.impulse_floor,
+            )
+            unknowns.add("strings", "strings", pull)
         return unknowns
 
     def _columns(self, role: str) -> _Local:
         """Leave out what the other side alone depends on."""
         others = [f"{name} " for name in self.records if name != role]
         if role == "free":
-            others += ["alpha", "impulses"]
+            others += ["alpha", "impulses", "contact", "strike", "top", "strings"]
         assert self.protocol.gates is not None
         mine = np.ones(len(self.unknowns), dtype=np.bool_)
         for name, block in self.unknowns.blocks.items():
             mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
-        elsewhere = np.ones(len(self.protocol.gates.gates), dtype=np.bool_)
-        elsewhere[[train.gate for train in self.records[role].trains]] = False
+        here = np.zeros(len(self.protocol.gates.gates), dtype=np.bool_)
+        here[[train.gate for train in self.records[role].trains]] = True
         for name in ("beams", "ripple"):
             if name in self.unknowns:
-                mine[self.unknowns[name]] &= ~elsewhere
+                mine[self.unknowns[name]] &= here
+        mine[self.unknowns["datum"]] &= np.array(self.protocol.gates.posts) == role
         parameters = COMMON + (2 * len(self.records[role].chain.widths) if role == "impact" else 0)
         path = self.spread(role, np.eye(parameters))
         moves = mine & path.any(axis=0)
@@ -168,6 +191,19 @@ class DropModel:
         at = np.zeros(mine.size, dtype=np.intp)
         at[columns] = np.arange(columns.size)
         return _Local(columns, at, moving.size, path[:, moving])
+
+    def stiff(self) -> DropModel:
+        """Return the same drop with impulses that are nearly alike, the last one too."""
+        if "strings" not in self.unknowns:
+            return self
+        other = copy(self)
+        tight = replace(self.protocol.priors, strings=0.0)
+        other.protocol = replace(self.protocol, priors=tight)
+        impulse = min(_ALIKE, self.components.impulse)
+        other.components = replace(self.components, impulse=impulse, bounce=0.0)
+        other.unknowns = other._unknowns()
+        other._paths = {}
+        return other
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
         """Return the same drop with other priors, that of impulses relative to the α found.
@@ -186,6 +222,20 @@ class DropModel:
         # Columns and matched edges stay: only priors and where α is counted from are others.
         other = copy(self)
         other.components, other.clock_u, other.guesses = components, clock_u, guesses
+        other.unknowns = other._unknowns()
+        other._paths = {}
+        return other
+
+    def under(self, protocol: Protocol) -> DropModel:
+        """Return the same drop with the priors of another protocol, alike but for these."""
+        other = copy(self)
+        other.protocol, other.components = protocol, stated(protocol)
+        other._kappa, other._kappa_u = prior_air(protocol)
+        # Widths of rods and their places have priors of their own.
+        other.records = {
+            role: replace(record, chain=protocol.chains[record.chain.name])
+            for role, record in self.records.items()
+        }
         other.unknowns = other._unknowns()
         other._paths = {}
         return other
@@ -209,8 +259,14 @@ class DropModel:
         clocks = [guess.clock for guess in self.guesses.values()]
         x[self.unknowns["clock"]] = sum(clocks) / len(clocks)
         if "drag" in self.unknowns:
-            x[self.unknowns["drag"]] = max(guess.kappa for guess in self.guesses.values())
+            kappa = max(guess.kappa for guess in self.guesses.values())
+            x[self.unknowns["drag"]] = kappa - self._kappa
         return x
+
+    def kappa(self, x: Array) -> float:
+        """κ of the first chain as a whole, 1/m."""
+        at = self.unknowns
+        return self._kappa + (float(x[at["drag"]][0]) if "drag" in at else 0.0)
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Path of one side for given unknowns."""
@@ -228,15 +284,21 @@ class DropModel:
         if role == "free" and "side" in at:
             start += float(x[at["side"]][0])
         gravity = self.protocol.gravity.value + float(x[at["gravity"]][0])
-        kappa = float(x[at["drag"]][0]) if "drag" in at else 0.0
+        kappa, record = self.kappa(x), self.records[role]
         if role == "free":
-            return free_trajectory(release, start, gravity, kappa)
-        record = self.records["impact"]
+            return free_trajectory(release, start, gravity, kappa, record.air)
         assert record.ratios is not None
         start = max(start, _ABOVE)
         places = np.array(record.chain.chain.heights) + x[at["impact rods"]]
+        # Results are at the stated level: where the top rod would be if others struck elsewhere.
+        places[:-1] -= x[at["contact"]]
+        places[-1] += x[at["top"]][0]
+        places -= self.protocol.contact.level.value
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        return struck_trajectory(release, start, gravity, gains, record.ratios, places, kappa)
+        gains += x[at["strings"]] * _alone(places.size)
+        return struck_trajectory(
+            release, start, gravity, gains, record.ratios, places, kappa, record.air
+        )
 
     def spread(self, role: str, derivatives: Array) -> Array:
         """Derivatives by a trajectory's parameters → by all unknowns.
@@ -265,7 +327,11 @@ class DropModel:
             by_gain = derivatives[..., COMMON : COMMON + rods]
             found[..., at["alpha"]] = by_gain.sum(axis=-1, keepdims=True)
             found[..., at["impulses"]] = by_gain
-            found[..., at["impact rods"]] = derivatives[..., COMMON + rods :]
+            found[..., at["strings"]] = (by_gain @ _alone(rods))[..., None]
+            by_place = derivatives[..., COMMON + rods :]
+            found[..., at["impact rods"]] = by_place
+            found[..., at["contact"]] = -by_place[..., :-1].sum(axis=-1, keepdims=True)
+            found[..., at["top"]] = by_place[..., -1:]
         return found
 
     def levels(self, role: str, x: Array) -> list[Array]:
@@ -276,10 +342,12 @@ class DropModel:
     def _levels(self, role: str, x: Array, edges: Expected | Seen) -> Array:
         at = self.unknowns
         found: Array = edges.levels - edges.sign * x[at[f"{role} width"]]
-        found += x[at["beams"]][edges.gate]
+        found += (x[at["beams"]] + x[at["datum"]][self._post])[edges.gate]
         found -= x[at[f"{role} rods"]][edges.rods]
         if "ripple" in at:
             found -= self._tilts[role] * edges.turn * x[at["ripple"]][edges.gate]
+        if role == "impact":
+            found -= edges.alone * x[at["top"]][0]
         return found
 
     def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
@@ -295,12 +363,34 @@ class DropModel:
         times = seen.times * (1.0 + x[self.unknowns["clock"]])
         height, speed = self.trajectory(role, x).heights(times)
         values = height - self._levels(role, x, seen)
-        return Residuals(values, self._sigma(seen, speed), speed, seen.burst == 0.0)
+        struck = _loose(self.trajectory(role, x), times, seen)
+        return Residuals(values, self._sigma(seen, speed, struck), speed, seen.burst == 0.0, struck)
 
-    def _sigma(self, seen: Seen, speed: Array) -> Array:
+    def independent(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
+        """Return `residuals` with of each what the one before tells of it taken away."""
+        left, seen = self.residuals(role, x, matches), self._matched(role, matches)
+        self._part(seen, left.struck, left.values, left.sigma)
+        return left
+
+    def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:
+        """Make both sides of a rod independent, in place; return `Equations.told`.
+
+        They are off together at a beam: of the second what the first tells is taken away (Cholesky
+        of two by two).
+        """
+        together = seen.paired[:-1] & struck[:-1] & struck[1:]
+        first, shared = np.flatnonzero(together), self.components.departure**2
+        told = np.zeros(values.size)
+        told[first + 1] = share = shared / sigma[first] ** 2
+        values[first + 1] -= share * values[first]
+        sigma[first + 1] = np.sqrt(sigma[first + 1] ** 2 - share * shared)
+        return told
+
+    def _sigma(self, seen: Seen, speed: Array, struck: Flags) -> Array:
         """Standard deviation of where each edge was seen, m."""
         known = self.components
-        found: Array = np.sqrt(known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2))
+        variance = known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2)
+        found: Array = np.sqrt(variance + struck * known.departure**2)
         return found
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
@@ -315,12 +405,13 @@ class DropModel:
         levels, stamps = self._levels(role, x, seen), seen.times * rate
         height, speed = path.heights(stamps)
         off = height - levels
-        near = np.abs(off) <= STRAY * self._sigma(seen, speed)
+        struck = _loose(path, stamps, seen)
+        near = np.abs(off) <= STRAY * self._sigma(seen, speed, struck)
         late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
         times = stamps + late
         height, speed, moved = path.sights(times, local.path)
         values = height - levels + speed * late
-        left = Residuals(values, self._sigma(seen, speed), speed, seen.burst == 0.0)
+        sigma = self._sigma(seen, speed, struck)
         slopes = np.zeros((times.size, local.columns.size))
         slopes[:, : local.moving] = moved
         row = np.arange(times.size)
@@ -329,12 +420,33 @@ class DropModel:
         slopes[row, local.at[at[f"{role} rods"].start + seen.rods]] += 1.0
         slopes[:, local.at[at[f"{role} width"].start]] += seen.sign
         slopes[row, local.at[at["beams"].start + seen.gate]] -= 1.0
+        slopes[row, local.at[at["datum"].start + self._post[seen.gate]]] -= 1.0
         if "ripple" in at:
             ripple = self._tilts[role] * seen.turn
             slopes[row, local.at[at["ripple"].start + seen.gate]] += ripple
-        return Equations(left, slopes, local.columns, len(at))
+        if role == "impact":
+            slopes[:, local.at[at["top"].start]] += seen.alone
+        told = self._part(seen, struck, values, sigma)
+        second = np.flatnonzero(told)
+        slopes[second] -= told[second, None] * slopes[second - 1]
+        left = Residuals(values, sigma, speed, seen.burst == 0.0, struck)
+        return Equations(left, told, slopes, local.columns, len(at))
 
 
-def air_is_told(records: Sequence[ChainRecord]) -> bool:
-    """Whether κ can be told from what is struck: by a free chain, of rods that are all alike."""
-    return len(records) > 1 and all(record.chain.chain.alike for record in records)
+def _loose(path: Trajectory, times: Array, seen: Seen) -> Flags:
+    """Which edges are of rods that may be off their chain: a rod has struck, others still fall."""
+    found: Flags = path.hit_before(times) & ~seen.alone
+    return found
+
+
+def _alone(rods: int) -> Array:
+    """How far each pull is on one rod alone, shape ``(rods,)``: 1/M² for M rods above."""
+    return above(rods) ** -2.0
+
+
+def prior_air(protocol: Protocol) -> tuple[float, float]:
+    """κ of the first chain as a whole as it is known beforehand, 1/m, and its uncertainty."""
+    if protocol.drag is None:
+        return 0.0, protocol.priors.drag
+    kappa = air_of(protocol, next(iter(protocol.chains)))[0]
+    return kappa, kappa * protocol.drag.relative_u

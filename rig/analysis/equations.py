@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.chain_records import EdgeTrain
+    from rig.analysis.chain_records import ChainRecord
     from rig.analysis.drop_model import DropModel
 
     Array = NDArray[np.float64]
@@ -40,21 +40,27 @@ class Residuals(NamedTuple):
         Of the chain at each edge, m/s.
     clean
         Whether each edge is no part of a flicker.
+    struck
+        Whether a rod had struck before.
     """
 
     values: Array
     sigma: Array
     speed: Array
     clean: Flags
+    struck: Flags
 
 
 class Equations(NamedTuple):
-    """Observation equations of one side, one a matched edge.
+    """Observation equations of one side, one a matched edge, independent of each other.
 
     Attributes
     ----------
     residuals
         Their left sides.
+    told
+        Which share of the equation before was taken away from each, shape ``(edges,)``: both sides
+        of a rod are off together.
     slopes
         Derivatives by the unknowns that this side knows of, shape ``(edges, columns)``.
     columns
@@ -64,6 +70,7 @@ class Equations(NamedTuple):
     """
 
     residuals: Residuals
+    told: Array
     slopes: Array
     columns: Index
     unknowns: int
@@ -77,7 +84,13 @@ class Equations(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """The matched edges of a side, shape ``(edges,)`` each; see `Expected`."""
+    """The matched edges of a side, shape ``(edges,)`` each; see `Expected`.
+
+    Attributes
+    ----------
+    paired
+        Whether the next edge is the other side of the same rod at the same gate.
+    """
 
     times: Array
     burst: Array
@@ -86,6 +99,8 @@ class Seen(NamedTuple):
     levels: Array
     sign: Array
     turn: Array
+    alone: Flags
+    paired: Flags
 
 
 class Expected(NamedTuple):
@@ -101,6 +116,8 @@ class Expected(NamedTuple):
         By how much its height follows the rods' width: −½ where it darkens the beam, else ½.
     turn
         Which way its rod is tilted: +1 for even rods, −1 for odd ones.
+    alone
+        Whether all rods below have struck: only the top rod falls.
     begins, ends
         Number of observed edges before each gate, and of expected ones after each but the last.
     """
@@ -112,23 +129,31 @@ class Expected(NamedTuple):
     levels: Array
     sign: Array
     turn: Array
+    alone: Flags
     begins: Index
     ends: Index
 
     @classmethod
-    def of(cls, trains: Sequence[EdgeTrain]) -> Expected:
+    def of(cls, record: ChainRecord) -> Expected:
         """Join the gates of a side."""
+        trains, places = record.trains, record.chain.chain.heights
         observed = np.array([train.times.size for train in trains])
         expected = [train.rods.size for train in trains]
         rods = np.concatenate([train.rods for train in trains])
+        levels = np.concatenate([train.levels for train in trains])
+        alone = rods == len(places) - 1
+        alone &= levels < (
+            -places[-2] if record.ratios is not None and len(places) > 1 else -np.inf
+        )
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
             rods,
             np.repeat([train.gate for train in trains], expected),
-            np.concatenate([train.levels for train in trains]),
+            levels,
             np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
             np.where(rods % 2, -1.0, 1.0),
+            alone,
             np.cumsum(observed) - observed,
             np.cumsum(expected)[:-1],
         )
@@ -151,7 +176,15 @@ class Expected(NamedTuple):
             self.levels[pick],
             self.sign[pick],
             self.turn[pick],
+            self.alone[pick],
+            self._pairs(pick),
         )
+
+    def _pairs(self, pick: Index) -> Flags:
+        found = np.zeros(pick.size, dtype=np.bool_)
+        rods, gate = self.rods[pick], self.gate[pick]
+        found[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
+        return found
 
 
 def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
@@ -192,6 +225,25 @@ class NormalEquations:
     size: int
 
 
+def plain_equations(residuals: Array, slopes: Array, sd: Array) -> NormalEquations:
+    """Set up the normal equations of observations that are all good.
+
+    Parameters
+    ----------
+    residuals, slopes
+        In standard deviations of each, shapes ``(observations,)`` and ``(observations, unknowns)``.
+    sd
+        As in `normal_equations`.
+    """
+    scaled_slopes = slopes * sd
+    return NormalEquations(
+        scaled_slopes.T @ scaled_slopes,
+        scaled_slopes.T @ residuals,
+        float(residuals @ residuals),
+        residuals.size,
+    )
+
+
 def normal_equations(
     model: DropModel,
     matches: Matches,
@@ -216,7 +268,7 @@ def normal_equations(
     matrix, vector = np.zeros((x.size, x.size)), np.zeros(x.size)
     chi2, size = 0.0, 0
     for role, match in matches.items():
-        (values, sigma, *_), slopes, columns, _ = model.equations(role, x, match)
+        (values, sigma, *_), _, slopes, columns, _ = model.equations(role, x, match)
         sigma = sigma * inflation
         residuals = values / sigma
         weight = np.sqrt(robust_weights(residuals, cut))

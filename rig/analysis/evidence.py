@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import LEAST_SHARE, STATED
+from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rig.analysis.equations import Residuals
 
     Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
 
 STATED_WEIGHT = 1.0
 """Members that a stated uncertainty counts for."""
@@ -42,6 +43,8 @@ class Evidence:
     ----------
     components
         With which the sums are made.
+    stated
+        Those of the protocol.
 
     Attributes
     ----------
@@ -51,13 +54,14 @@ class Evidence:
         Degrees of freedom of each.
     """
 
-    def __init__(self, components: Components) -> None:
+    def __init__(self, components: Components, stated: Components) -> None:
         self.components = components
+        self.stated = stated
         self.degrees: dict[str, float] = {}
         self._squares = dict.fromkeys(("gates", "rods", "beam", "hang"), 0.0)
         self._determined = dict.fromkeys(("gates", "rods", "beam", "hang"), 0.0)
-        self._impulses: list[tuple[float, float, float]] = []
-        self._edges: list[tuple[Array, Array]] = []
+        self._impulses: list[Array] = []
+        self._edges: list[tuple[Array, Array, Flags]] = []
 
     def common(self, name: str, y: Array, v: Array, sd: Array) -> None:
         """Count a block of the session's unknowns.
@@ -82,84 +86,100 @@ class Evidence:
         if "impulses" in at:
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
             # Back to α², for drops of different α have different units.
-            variance = self.components.impulses(alpha) ** 2
-            self._impulses.append(
-                (alpha**2, float(y[block] @ y[block]) * variance, float(np.sum(1.0 - v[block])))
-            )
+            squares = (y[block] * model.unknowns.sd[block]) ** 2
+            size = np.full(squares.size, alpha**2)
+            alone = size / above(squares.size) ** 2
+            self._impulses.append(np.stack([size, alone, squares, 1.0 - v[block]]))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
         """Count what is left over of the edges that are no part of a flicker."""
         for row in residuals:
             good = row.clean & (np.abs(row.values) <= STRAY * row.sigma)
-            self._edges.append((row.values[good] ** 2, row.speed[good] ** 2))
+            self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.struck[good]))
 
     def _count(self, kind: str, y: Array, v: Array) -> None:
         self._squares[kind] += float(y @ y)
         self._determined[kind] += float(np.sum(1.0 - v))
 
-    def settled(self, parameters: float) -> Evidence:
+    def settled(self, parameters: float, struck: float = 0.0) -> Evidence:
         """Estimate the components.
 
         Parameters
         ----------
         parameters
             Number of unknowns that all edges together have determined.
+        struck
+            How many of them only the edges after a first impact can have told.
         """
         old = self.components
         new: dict[str, float] = {}
         for kind, found in self._squares.items():
-            stated = (getattr(STATED, kind) / getattr(old, kind)) ** 2
+            stated = (getattr(self.stated, kind) / getattr(old, kind)) ** 2
             self.degrees[kind] = STATED_WEIGHT + self._determined[kind]
             share = (STATED_WEIGHT * stated + found) / self.degrees[kind]
-            least = LEAST_SHARE * getattr(STATED, kind)
+            least = LEAST_SHARE * getattr(self.stated, kind)
             new[kind] = max(getattr(old, kind) * share**0.5, least)
         if self._impulses:
-            sizes, squares, counts = np.array(self._impulses).T
-            self._pair("impulse", "impulse_floor", (squares, counts, sizes), new)
-        squares, speeds = (np.concatenate(parts) for parts in zip(*self._edges, strict=True))
-        # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
-        free = max(0.5, 1.0 - parameters / max(1, squares.size))
-        # Edges at about the same speed scatter alike: few bins do as well as all of them.
-        counts, edges = np.histogram(speeds, _BINS)
-        sums, _ = np.histogram(speeds, edges, weights=squares)
-        middles = 0.5 * (edges[1:] + edges[:-1])
-        self._pair("jitter", "floor", (sums, free * counts, middles), new)
+            size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
+            kinds = np.stack([size, np.ones_like(size), alone])
+            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
+        self._share(("jitter", "floor", "departure"), *self._binned(parameters, struck), new)
         self.components = replace(old, **new)
         return self
 
-    def _pair(
-        self, name: str, floor: str, sums: tuple[Array, Array, Array], new: dict[str, float]
+    def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
+        """Sort edges by what scatters alike: at about the same speed, before or after an impact.
+
+        Returns
+        -------
+        kinds, squares, counts
+            By how much each component counts in each bin, shape ``(3, bins)``; sums of squares,
+            and their degrees of freedom.
+        """
+        parts = zip(*self._edges, strict=True)
+        squares, speeds, after = (np.concatenate(part) for part in parts)
+        # Few bins do as well as all edges.
+        edges = np.linspace(speeds.min(), speeds.max(), _BINS + 1)[1:-1]
+        place = np.digitize(speeds, edges) + _BINS * after
+        counts: Array = np.bincount(place, minlength=2 * _BINS).astype(np.float64)
+        sums: Array = np.bincount(place, squares, 2 * _BINS).astype(np.float64)
+        middles = np.bincount(place, speeds, 2 * _BINS) / np.maximum(counts, 1)
+        late = np.repeat([0.0, 1.0], _BINS)
+        # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
+        total, behind = max(1, squares.size), max(1, int(after.sum()))
+        taken = (parameters - struck) / total + late * struck / behind
+        full = counts > 0
+        kinds = np.stack([middles, np.ones_like(middles), late])[:, full]
+        degrees: Array = (np.maximum(0.5, 1.0 - taken) * counts)[full]
+        return kinds, sums[full], degrees
+
+    def _share(
+        self,
+        names: Sequence[str],
+        kinds: Array,
+        squares: Array,
+        counts: Array,
+        new: dict[str, float],
     ) -> None:
-        """Estimate two components that make up one variance, see `_two`."""
-        squares, counts, sizes = sums
-        # The stated member is spread over all sizes, so that it pulls neither component alone.
-        stated = sizes * getattr(STATED, name) ** 2 + getattr(STATED, floor) ** 2
-        share = STATED_WEIGHT / sizes.size
-        squares, counts = squares + share * stated, counts + share
-        begin = getattr(self.components, name), getattr(self.components, floor)
-        least = LEAST_SHARE * getattr(STATED, name), LEAST_SHARE * getattr(STATED, floor)
-        new[name], new[floor] = _two(squares, counts, sizes, begin, least)
-        self.degrees[name] = self.degrees[floor] = float(counts.sum())
+        """Estimate components that make up one variance.
 
-
-def _two(
-    squares: Array,
-    counts: Array,
-    sizes: Array,
-    begin: tuple[float, float],
-    least: tuple[float, float],
-) -> tuple[float, float]:
-    """Fit variances sizes·a² + b² to sums of squares with so many degrees of freedom.
-
-    The maximum of the χ² likelihood above the least a and b, by multiplicative steps.
-    """
-    a, b = begin[0] ** 2, begin[1] ** 2
-    for _ in range(_INNER):
-        total = a * sizes + b
-        a = max(a * _explained(squares, counts, total, sizes), least[0] ** 2)
-        total = a * sizes + b
-        b = max(b * _explained(squares, counts, total, np.ones_like(sizes)), least[1] ** 2)
-    return a**0.5, b**0.5
+        Variances Σ kinds·a² are fitted to sums of squares with so many degrees of freedom: the
+        maximum of the χ² likelihood above the least a, by multiplicative steps.
+        """
+        stated = np.array([getattr(self.stated, name) ** 2 for name in names])
+        # The stated member is spread over all sizes, so that it pulls no component alone.
+        share = STATED_WEIGHT / squares.size
+        squares, counts = squares + share * (stated @ kinds), counts + share
+        found = np.array([getattr(self.components, name) ** 2 for name in names])
+        least = LEAST_SHARE**2 * stated
+        for _ in range(_INNER):
+            for n, sizes in enumerate(kinds):
+                found[n] = max(
+                    found[n] * _explained(squares, counts, found @ kinds, sizes), least[n]
+                )
+        for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
+            new[name] = variance**0.5
+            self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
 
 
 def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _COARSE = 2.5e-3  # m: how far off a first guess may put a rod
 _FINE = 0.5e-3  # m: how far off an adjusted trajectory may
 _NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
-_SAME = 1.0  # standard uncertainty: no edge is seen elsewhere
+_SAME = 0.1  # of a standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
 _MEDIAN = 0.6745  # of |normal numbers|, in standard deviations
 _MOST = 1.5  # by which few edges may happen to scatter more
@@ -72,8 +72,12 @@ def settle(
     matches: Matches | None = None,
     rounds: int = _ROUNDS,
     steps: int = STEPS,
+    x: Array | None = None,
 ) -> Fit:
     """Match and adjust in turn until that moves the chain no more.
+
+    It begins with impulses that are nearly alike, and bends only to what fits already: one of the
+    few edges of the last leg may be a stray.
 
     Parameters
     ----------
@@ -81,17 +85,20 @@ def settle(
         To begin with; `None` where nothing is matched yet.
     rounds, steps
         How often at most, and how many steps each adjustment may take.
+    x
+        Unknowns to begin with, if not as the guesses have them.
     """
-    x = model.first()
+    x = model.first() if x is None else x
+    stiff = model.stiff()
     if matches is None:
         matches = match(model, x, _COARSE)
     # Not to the end: the matches are about to change.
-    estimate = adjust(model, matches, x, done=_NEAR, steps=steps)
-    for _ in range(rounds):
+    estimate = adjust(stiff, matches, x, done=_NEAR, steps=steps)
+    for round_ in range(rounds):
         x = estimate.x
         matches = without_strays(model, x, match(model, x), estimate.scatter)
-        estimate = adjust(model, matches, x, steps=steps)
-        if estimate.beyond(x) < _SAME:
+        estimate = adjust(model if round_ else stiff, matches, x, steps=steps)
+        if round_ and estimate.beyond(x) < _SAME:
             break
     return Fit(model, matches, estimate)
 
@@ -129,7 +136,16 @@ def _kept(
     far = np.abs(rows.values) / rows.sigma
     # A few strays enlarge the scatter, and would hide behind it: most edges tell how much it is.
     usual = max(1.0, _MOST * float(np.median(far)) / _MEDIAN) if far.size else 1.0
-    stray = far > STRAY * min(scatter, usual)
+    limit = STRAY * min(scatter, usual)
+    stray = far > limit
+    # Of a rod's two sides that do not go together one is wrong, or both: the one that is further
+    # off, and the other if it is far off too.
+    parted = model.independent(role, x, matches)
+    second = np.flatnonzero(np.abs(parted.values) > limit * parted.sigma)
+    second = second[parted.sigma[second] < rows.sigma[second]]
+    stray[second - (far[second - 1] > far[second])] = True
+    for side in (second, second - 1):
+        stray[side] |= far[side] > 0.5 * limit
     kept, position = [], 0
     for one in matches:
         copy = one.copy()

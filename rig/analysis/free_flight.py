@@ -1,7 +1,7 @@
 """One leg of a fall: uniform acceleration, or that of g − κv² in air, and its derivatives.
 
 The same formulas as in `rig.model.drag`, for arrays, and for κ below zero too: an adjustment tries
-what no air does.
+what no air does. Where an array takes κ, it may differ by element, its sign never.
 """
 
 from __future__ import annotations
@@ -28,23 +28,36 @@ _SERIES = (
 _NEVER = 1.0 - 1e-9  # tanh of a time: nothing falls longer
 
 
-def fall_for(since: Array, speed: Array, gravity: float, kappa: float) -> tuple[Array, Array]:
+def _largest(kappa: float | Array) -> float:
+    """The largest κ, with its sign."""
+    if isinstance(kappa, float):
+        return kappa
+    low, high = float(kappa.min(initial=0.0)), float(kappa.max(initial=0.0))
+    return high if high > -low else low
+
+
+def fall_for(
+    since: Array, speed: Array, gravity: float, kappa: float | Array
+) -> tuple[Array, Array]:
     """Way fallen and speed, a time after the beginning of a leg."""
     way, end, _ = _fall(since, speed, gravity, kappa)
     return way, end
 
 
-def _fall(since: Array, speed: Array, gravity: float, kappa: float) -> tuple[Array, Array, Array]:
+def _fall(
+    since: Array, speed: Array, gravity: float, kappa: float | Array
+) -> tuple[Array, Array, Array]:
     """Way, speed at its end, and the derivative of the way by the speed v at its beginning.
 
     The way is ln(1 + κw)/κ with w = 2g S(t/2)² + v S(t) and S(t) = sinh(√(κg) t)/√(κg), as in
     `rig.model.drag.fallen`; below κ = 0 with the sine.
     """
-    if abs(kappa) < _NONE:
+    largest = _largest(kappa)
+    if abs(largest) < _NONE:
         return (speed + 0.5 * gravity * since) * since, speed + gravity * since, since
-    rate = math.sqrt(abs(kappa) * gravity)
+    rate = np.sqrt(np.abs(kappa) * gravity)
     # An edge long after the fall overflows no sinh, and meets no second period of the sine.
-    sinus, most = (np.sinh, 300.0) if kappa > 0.0 else (np.sin, 1.2)
+    sinus, most = (np.sinh, 300.0) if largest > 0.0 else (np.sin, 1.2)
     half = sinus(np.minimum(0.5 * rate * since, most)) / rate
     square = gravity * half * half
     whole = 2.0 * half * np.sqrt(1.0 + kappa * square)
@@ -56,38 +69,40 @@ def _fall(since: Array, speed: Array, gravity: float, kappa: float) -> tuple[Arr
 
 
 def fall_through(
-    distance: Array, speed: Array, gravity: float, kappa: float
+    distance: Array, speed: Array, gravity: float, kappa: float | Array
 ) -> tuple[Array, Array]:
     """Speed at the end of a leg and how long it takes, as in `rig.model.drag.drag_leg`."""
-    arrival = np.sqrt(squared_after(distance, speed, gravity, kappa))
-    if abs(kappa) < _NONE:
+    # An adjustment may try a rod that strikes above where the one before it did.
+    arrival = np.sqrt(np.maximum(squared_after(distance, speed, gravity, kappa), 0.0))
+    largest = _largest(kappa)
+    if abs(largest) < _NONE:
         return arrival, 2.0 * distance / np.maximum(speed + arrival, np.finfo(float).tiny)
     reach = _reach(distance, kappa)
-    rate = math.sqrt(abs(kappa) * gravity)
+    rate = np.sqrt(np.abs(kappa) * gravity)
     sum_of_speeds = arrival + (1.0 - kappa * reach) * speed
     slow = rate * reach / np.maximum(sum_of_speeds, np.finfo(float).tiny)
-    if kappa > 0.0:
+    if largest > 0.0:
         return arrival, np.arctanh(np.minimum(slow, _NEVER)) / rate
     return arrival, np.arctan(slow) / rate
 
 
-def squared_after(distance: Array, speed: Array, gravity: float, kappa: float) -> Array:
+def squared_after(distance: Array, speed: Array, gravity: float, kappa: float | Array) -> Array:
     """Square of the speed at the end of a leg; before its beginning it may be negative."""
     reach = _reach(distance, kappa)
     found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
     return found
 
 
-def _reach(distance: Array, kappa: float) -> Array:
+def _reach(distance: Array, kappa: float | Array) -> Array:
     """(1 − e^(−2κd))/κ."""
-    if abs(kappa) < _NONE:
+    if abs(_largest(kappa)) < _NONE:
         return 2.0 * distance
     found: Array = -np.expm1(-2.0 * kappa * distance) / kappa
     return found
 
 
 def leg_slopes(
-    since: Array, speed: Array, gravity: float, kappa: float
+    since: Array, speed: Array, gravity: float, kappa: float | Array
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Way z fallen and speed, a time after the beginning of a leg, and derivatives of z.
 
@@ -97,7 +112,7 @@ def leg_slopes(
     """
     way, end, by_speed = _fall(since, speed, gravity, kappa)
     by_gravity = (since * end - speed * by_speed) / (2.0 * gravity)
-    if abs(kappa) < _FAINT:  # else that difference is nothing but rounding
+    if abs(_largest(kappa)) < _FAINT:  # else that difference is nothing but rounding
         return way, end, by_speed, by_gravity, -_slowed(since, speed, gravity)
     by_kappa = (speed * by_speed + gravity * by_gravity - way) / kappa
     return way, end, by_speed, by_gravity, by_kappa
@@ -123,7 +138,7 @@ def one_leg(distance: float, speed: float, gravity: float, kappa: float) -> tupl
     return arrival, (math.atanh(min(slow, _NEVER)) if kappa > 0.0 else math.atan(slow)) / rate
 
 
-def reach_slopes(distance: Array, kappa: float) -> tuple[Array, Array]:
+def reach_slopes(distance: Array, kappa: float | Array) -> tuple[Array, Array]:
     """(1 − e^(−2κd))/κ and its derivative by κ, by their series where these are short."""
     y = 2.0 * kappa * distance
     if np.abs(y).max() < _SHORT:

@@ -2,7 +2,7 @@
 
 This is no result. In g = 2·length/time² an error of the time scale counts twice, so a g that is not
 the place's says that the clock, a beam's height or the protocol's gravity is not what it is said
-to be. It uses none of the adjustment's machinery but its matches of edges to rods. What the air
+to be. It takes the adjustment's matches of edges to rods, and none of its equations. What the air
 takes is fitted beside it: a light chain would read several per cent less.
 """
 
@@ -15,14 +15,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.distributions import coverage_factor
+from rig.analysis.adjust import least_squares
+from rig.analysis.drop_model import prior_air
+from rig.analysis.equations import NormalEquations, plain_equations
 from rig.analysis.free_flight import leg_slopes
-from rig.analysis.result import GOOD, Measured
-from rig.analysis.unknowns import DRAG_U
+from rig.analysis.result import GOOD, Measured, normalized_error
+from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING
+from rig.predictions import air_shares
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from numpy.typing import NDArray
 
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
@@ -30,12 +35,9 @@ if TYPE_CHECKING:
     from rig.records import Drop
     from rig.units import Quantity
 
-_EDGE_M = 0.1e-3  # where on a rod's surface a beam is cut
-_EDGE_S = 5e-6  # comparator and stamp
-_BEAM_M = 1e-3  # how far off a rod's middle a beam may run: tan(tilt) makes a height of it
+    Array = NDArray[np.float64]
+
 _FEWEST = 8  # edges
-_STEPS = 6
-_FIXED = 1e18  # inverse square of a prior uncertainty that leaves nothing free
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +60,8 @@ class GravityCheck:
 
     @property
     def normalized_error(self) -> float:
-        """E_n = (measured − stated)/√(U² + U_s²); within ±1 they agree (ISO 13528)."""
-        width = math.hypot(self.measured.expanded, coverage_factor(math.inf) * self.stated.u)
-        return (self.measured.value - self.stated.value) / width
+        """Of what is measured against what is stated."""
+        return normalized_error(self.measured, self.stated) or 0.0
 
     @property
     def agrees(self) -> bool:
@@ -94,9 +95,9 @@ def check_gravity(
     Returns
     -------
     GravityCheck or None
-        `None` where no free chain passes gates, and in air that slows it.
+        `None` where no free chain passes gates.
     """
-    if protocol.gates is None or protocol.drag is not None:
+    if protocol.gates is None:
         return None
     found = [
         gravity
@@ -127,7 +128,7 @@ def free_gravity(
     pairs = [(edge, rod) for edge, rod in pairs if edge.channel in gates]
     if name is None or protocol.gates is None or len(pairs) < _FEWEST:
         return None
-    chain = protocol.chains[name]
+    chain, priors = protocol.chains[name], protocol.priors
     rods = np.array([rod for _, rod in pairs])
     channel = np.array([edge.channel for edge, _ in pairs])
     side = np.array([0.5 if edge.blocked else -0.5 for edge, _ in pairs])
@@ -137,11 +138,11 @@ def free_gravity(
     height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
     design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
     top, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
-    sigma = np.hypot(_EDGE_M, (speed - fall * time) * _EDGE_S)
+    sigma = np.hypot(priors.edge_floor, (speed - fall * time) * priors.jitter)
     # The parabola's vertex is the release: where and when the speed was zero.
     point = np.array([top + speed**2 / (2.0 * fall), speed / fall, fall, 0.0])  # h, t, g and κ
     turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
-    ripple = _BEAM_M * math.tan(math.radians(chain.tilt_deg))
+    ripple = priors.beam_offset * math.tan(math.radians(chain.tilt_deg))
     # What edges have in common, one column each, in units of its standard uncertainty: with the
     # fit's own unknowns beside it, least squares need no covariance of all edges with all.
     beams = (channel[:, None] == np.array([*gates])).astype(float)
@@ -153,26 +154,24 @@ def free_gravity(
             chain.width_u * side,
         ]
     )
-    air = chain.chain.alike  # else κ is not one number
-    prior = np.concatenate(
-        [[0.0, 0.0, 0.0, DRAG_U**-2 if air else _FIXED], np.ones(common.shape[1])]
-    )
-    # The parabola is near enough for a few steps; a check needs no test of whether they end.
-    for _ in range(_STEPS):
-        at, release, g, kappa = point
+    share = air_shares(protocol)[name][0]
+    air, air_u = (share * one for one in prior_air(protocol))
+    point[3] = air
+    # Height, release and gravity are told by the edges alone.
+    sd = np.concatenate([[ANYTHING, ANYTHING, ANY_GRAVITY, air_u], np.ones(common.shape[1])])
+
+    def equations(x: Array, inflation: float) -> NormalEquations:
+        at, release, g, kappa = point + x[:4]
         since = np.maximum(time - release, 0.0)
-        still = np.zeros_like(since)
-        fallen, end, _, by_gravity, by_kappa = leg_slopes(since, still, g, kappa)
-        design = np.stack([np.ones_like(time), end, -by_gravity, -by_kappa], axis=1)
-        whole = np.column_stack([design, common]) / sigma[:, None]
-        inverse = np.linalg.inv(whole.T @ whole + np.diag(prior))
-        off = np.concatenate([[0.0, 0.0, 0.0, kappa], np.zeros(common.shape[1])])
-        residual = (height - at + fallen) / sigma
-        best = inverse @ (whole.T @ residual - prior * off)
-        point = point + best[:4]
-    left = residual - whole @ best
-    chi2 = float(left @ left + best[4:] @ best[4:])
-    scatter2 = max(1.0, chi2 / (height.size - 3 - air))
-    fitted = math.sqrt(scatter2 * float(inverse[2, 2]))
-    value = float(point[2])
+        fallen, end, _, by_gravity, by_kappa = leg_slopes(since, np.zeros_like(since), g, kappa)
+        slopes = np.stack([-np.ones_like(time), -end, by_gravity, by_kappa], axis=1)
+        off = height - at + fallen - common @ x[4:]
+        weight = 1.0 / (sigma * inflation)
+        return plain_equations(
+            off * weight, np.column_stack([slopes, -common]) * weight[:, None], sd
+        )
+
+    found = least_squares(equations, sd, np.zeros(sd.size))
+    value = float(point[2] + found.x[2])
+    fitted = math.sqrt(found.covariance[2, 2]) * sd[2]
     return Measured(value, math.hypot(fitted, 2.0 * value * scale.u))

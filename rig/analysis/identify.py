@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.adjust import adjust
-from rig.analysis.drop_model import DropModel, air_is_told
+from rig.analysis.drop_model import DropModel, prior_air
 from rig.analysis.equations import HUBER, scaled
 from rig.analysis.fit import Fit, settle
 from rig.analysis.pattern import (
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.pattern import Span
+    from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol
 
 MISSED = 0.02
@@ -50,17 +51,20 @@ _CLEAR = 0.97  # share of all that could be matched with which no other α is tr
 _FAIR = 0.9  # and with which, all α being tried, no other air or clock is
 _LEAST = 0.6  # and of all that is expected
 _CALM = 2.0  # scatter of edges above which a reading is none that ends the search
+_STRAINED = 6.0  # standard uncertainties of any unknown, likewise
 _OTHER = 0.02  # share of a side's edges at another rod that makes a different reading
 _FEW = 2  # edges that make none: a stray in place of a missed edge
 _CLOSE = 30.0  # log odds of one side alone within which both sides are adjusted together
 _PAIRS = 4  # of readings, adjusted together
 _TOGETHER = 30e-3  # s: chains let go at once are not further apart, if it can be helped
-_TRIED = 12  # guesses of a side
+_TRIED = 12  # guesses of a side at a time
+_MOST = 20  # and all in all: what is no fall must not take for ever
 _TENSE = 4.0  # standard uncertainties off its place at which a rod may be held by a stray
 _RELAXED = 3  # rods of a side that are looked at
 _QUICK = 3  # guesses that are looked at
 _INSTANTS = 12  # at which two falls are compared
 _SAME = 1.0  # how far apart they may be, in what a vote may be off
+_TAIL = 8.0  # standard deviations beyond which a normal distribution's tail is its first term
 _ROUNDS, _STEPS = 3, 15  # of matching and of adjusting them
 _CLOCKS = (-2.0, -1.0, 1.0, 2.0)  # standard uncertainties of the clock that are tried
 
@@ -132,13 +136,13 @@ def identify(
     window
         Within which chains were let go, s since the release fired.
     """
-    air = air_is_told(records)
     found: dict[str, list[Reading]] = {}
     shares: dict[str, float] = {}
     # The free chain first: it tells what the air does to both, and when they were let go.
-    near, kappa, clock = window, 0.0, 0.0
+    near, kappa, clock = window, prior_air(protocol)[0], 0.0
+    told = protocol.drag is not None
     for record in reversed(records):
-        side = _Side(protocol, record, clock_u, components, air)
+        side = _Side(protocol, record, clock_u, components, told)
         readings = side.readings(near, kappa, clock)
         if near != window and not _convincing(readings):
             readings = _best([*readings, *side.readings(window, kappa, clock)])
@@ -146,7 +150,7 @@ def identify(
         shares[record.role] = readings[0].share if readings else side.most_votes(window)
         if _convincing(readings):
             sure = adjusted(readings[0].fit, record.role)
-            kappa, clock = sure.kappa, sure.clock
+            kappa, clock, told = sure.kappa, sure.clock, True
             near = _around([adjusted(one.fit, record.role).release for one in readings], window)
     if not all(found.values()):
         return Identification(None, shares)
@@ -157,20 +161,34 @@ def read_side(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> Reading | None:
     """Read one side quickly, near where its edges are if they come one by one as expected."""
-    side = _Side(protocol, record, clock_u, components, air=False)
-    near = around_order(protocol, record)
-    found = side.judged(side.guesses(near, 0.0, 0.0, near_alpha(record))[:_QUICK])
+    side = _Side(protocol, record, clock_u, components)
+    near, kappa = around_order(protocol, record), prior_air(protocol)[0]
+    found = side.judged(side.guesses(near, kappa, 0.0, near_alpha(record))[:_QUICK])
     return found[0] if found else None
 
 
-def around_order(protocol: Protocol, record: ChainRecord) -> Span:
+def read_quickly(
+    protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
+) -> Reading | None:
+    """Read a drop like `identify`, but only where each side's edges come as expected."""
+    found: dict[str, list[Reading]] = {}
+    for record in records:
+        reading = read_side(protocol, record, clock_u, components)
+        if reading is None:
+            return None
+        found[record.role] = [reading]
+    whole = _together(protocol, records, found, clock_u, components)
+    return None if whole.fit is None else weighed(whole.fit)
+
+
+def around_order(protocol: Protocol, record: ChainRecord, window: Span = EVER) -> Span:
     """Return about when a chain was let go if its edges came one by one as expected."""
-    return _around(in_order(record, protocol.drop.value, protocol.gravity.value), EVER)
+    return _around(in_order(record, protocol.drop.value, protocol.gravity.value), window)
 
 
 def well_read(reading: Reading) -> bool:
-    """Whether nearly all that could be matched is, and scatters as it should."""
-    return _convincing([reading])
+    """Whether nearly all that could be is matched, with no more scatter or strain than usual."""
+    return _convincing([reading]) and _strain(reading.fit) < _STRAINED
 
 
 def _convincing(readings: Sequence[Reading], clear: float = _FAIR) -> bool:
@@ -180,6 +198,11 @@ def _convincing(readings: Sequence[Reading], clear: float = _FAIR) -> bool:
     calm = best.fit.estimate.scatter < _CALM
     most = sum(possible(record) for record in best.fit.model.records.values())
     return calm and best.share >= _LEAST and best.fit.matched >= clear * most
+
+
+def _strain(fit: Fit) -> float:
+    """How far the unknown that is farthest off is, in standard uncertainties of its prior."""
+    return float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
 
 
 def possible(record: ChainRecord) -> int:
@@ -201,31 +224,45 @@ def _around(releases: Sequence[float], window: Span) -> Span:
 
 @dataclass(frozen=True, slots=True)
 class _Side:
-    """One chain's edges, to be read by themselves."""
+    """One chain's edges, to be read by themselves.
+
+    Attributes
+    ----------
+    told
+        Whether what the air does is known already.
+    begun
+        Falls that were adjusted, as they were guessed: nothing is adjusted twice.
+    """
 
     protocol: Protocol
     record: ChainRecord
     clock_u: float
     components: Components
-    air: bool
+    told: bool = True
+    begun: list[Trajectory] = field(default_factory=list)
 
     def readings(self, window: Span, kappa: float, clock: float) -> list[Reading]:
         """Judge the guesses within a window, those first that are known to be near."""
         record, found = self.record, list[Reading]()
-        hint = in_order(record, self.protocol.drop.value, self.protocol.gravity.value)
-        hint = _around(hint, window)
+        hint = around_order(self.protocol, record, window)
         searches = [(hint, near_alpha(record)), (hint, ANY_ALPHA), (window, ANY_ALPHA)]
-        for span, alphas in searches[:: 2 if record.ratios is None else 1]:
+        if record.ratios is None:
+            del searches[1]
+        for span, alphas in dict.fromkeys(searches):
             found = _best([*found, *self.judged(self.guesses(span, kappa, clock, alphas))])
-            if _convincing(found, _CLEAR if alphas != ANY_ALPHA else _FAIR):
+            if _convincing(found, _CLEAR if alphas != ANY_ALPHA else _FAIR) and (
+                self.told or _strain(found[0].fit) < _STRAINED
+            ):
                 return found
         if possible(record) < _LEAST * record.expected:
             return found  # whatever the air and the clock are
-        others = [self.guesses(window, one, clock) for one in (AIRS if self.air else ())]
+        near = near_alpha(record)
+        others = [self.guesses(hint, one, clock, near) for one in (() if self.told else AIRS)]
         top = float(np.max(self.record.chain.chain.heights)) + self.protocol.drop.value
         # In a share of its time a chain falls twice that share of its way.
         if 2.0 * self.clock_u * top > slack_of(self.record):
-            others += [self.guesses(window, kappa, clock + self.clock_u * n) for n in _CLOCKS]
+            clocks = [clock + self.clock_u * n for n in _CLOCKS]
+            others += [self.guesses(hint, kappa, one, near) for one in clocks]
         return _best([*found, *self.judged(merged(*others))]) if others else found
 
     def guesses(
@@ -244,6 +281,8 @@ class _Side:
         """Adjust one guess after another while a better one may still come."""
         found: list[Reading] = []
         for one in itertools.islice(tried, _TRIED):
+            if len(self.begun) >= _MOST:
+                break
             enough = [r for r in found if r.fit.estimate.scatter < _CALM]
             if enough and one.votes + _MARGIN < max(reading.fit.matched for reading in enough):
                 break
@@ -255,9 +294,8 @@ class _Side:
                 {self.record.role: one},
                 self.clock_u,
                 self.components,
-                air=self.air,
             )
-            if any(_alike(model, one, reading.fit) for reading in enough):
+            if self._known(model, one, enough):
                 continue
             fit = settle(model, rounds=_ROUNDS, steps=_STEPS)
             evidence = log_evidence(fit) if fit.matched else 0.0
@@ -265,15 +303,19 @@ class _Side:
                 found.append(Reading(fit, evidence))
         return _best(found)
 
-
-def _alike(model: DropModel, guess: Guess, known: Fit) -> bool:
-    """Whether a guess is the fall of an adjusted reading, to a part of the distance of two rods."""
-    (role,) = model.records
-    path, other = model.trajectory(role, model.first()), known.model.trajectory(role, known.x)
-    latest = max(train.times.max(initial=guess.release) for train in model.records[role].trains)
-    times = np.linspace(guess.release, float(latest), _INSTANTS)
-    apart = np.abs(path.heights(times)[0] - other.heights(times)[0])
-    return float(apart.max()) < _SAME * slack_of(model.records[role])
+    def _known(self, model: DropModel, guess: Guess, readings: Iterable[Reading]) -> bool:
+        """Whether a fall is one that was adjusted, before or after, to a part of a rod's way."""
+        (role,) = model.records
+        latest = max(train.times.max(initial=guess.release) for train in self.record.trains)
+        times = np.linspace(guess.release, float(latest), _INSTANTS)
+        heights = model.trajectory(role, model.first()).heights(times)[0]
+        others = [one.fit.model.trajectory(role, one.fit.x) for one in readings]
+        others += self.begun
+        slack = _SAME * slack_of(self.record)
+        if any(float(np.abs(heights - one.heights(times)[0]).max()) < slack for one in others):
+            return True
+        self.begun.append(model.trajectory(role, model.first()))
+        return False
 
 
 def _best(readings: Iterable[Reading]) -> list[Reading]:
@@ -305,7 +347,7 @@ def log_evidence(fit: Fit) -> float:
     estimate, model = fit.estimate, fit.model
     total = 0.0
     for role, matches in fit.matches.items():
-        rows = model.residuals(role, estimate.x, matches)
+        rows = model.independent(role, estimate.x, matches)
         sigma = rows.sigma * estimate.scatter
         far = np.abs(rows.values) / sigma
         loss = np.where(far <= HUBER, 0.5 * far**2, HUBER * far - 0.5 * HUBER**2)
@@ -315,7 +357,21 @@ def log_evidence(fit: Fit) -> float:
         total += far.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS))
     y = scaled(estimate.x, estimate.sd)
     _, volume = np.linalg.slogdet(estimate.information)
-    return total - 0.5 * float(y @ y) - 0.5 * float(volume)
+    return total - 0.5 * float(y @ y) - 0.5 * float(volume) + _held_back(fit)
+
+
+def _held_back(fit: Fit) -> float:
+    """Log of the share of an estimated κ's distribution above zero, twice: air only holds back."""
+    model, estimate = fit.model, fit.estimate
+    at = model.unknowns["drag"].start
+    if not estimate.sd[at]:
+        return 0.0
+    unit = np.eye(estimate.x.size)[at]
+    u = math.sqrt(float(np.linalg.solve(estimate.information, unit)[at])) * float(estimate.sd[at])
+    below = -model.kappa(estimate.x) / u
+    if below < _TAIL:
+        return math.log(math.erfc(below / math.sqrt(2.0)))
+    return -0.5 * below**2 - math.log(below * math.sqrt(math.pi / 2.0))
 
 
 def _relaxed(fit: Fit) -> Fit:
@@ -367,32 +423,40 @@ def _together(
     roles: list[str] = [record.role for record in records]
     pairs = sorted(
         itertools.product(*(found[role] for role in roles)),
-        key=lambda pair: -_likely(protocol, roles, pair),
+        key=lambda pair: -_likely(protocol, pair),
     )
-    most = _likely(protocol, roles, pairs[0])
-    close = [pair for pair in pairs if most - _likely(protocol, roles, pair) < _CLOSE][:_PAIRS]
+    most = _likely(protocol, pairs[0])
+    close = [pair for pair in pairs if most - _likely(protocol, pair) < _CLOSE][:_PAIRS]
     tried: list[Reading] = []
     for pair in close:
         if len(pair) == 1:
             # One side is all there is: the same again, to the end.
-            fit = settle(pair[0].fit.model)
-            tried.append(Reading(fit, log_evidence(fit)))
+            tried.append(weighed(settle(pair[0].fit.model)))
             continue
         begin: dict[str, Guess] = {
             role: adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)
         }
         matches = {role: one.fit.matches[role] for role, one in zip(roles, pair, strict=True)}
-        fit = settle(DropModel(protocol, records, begin, clock_u, components), matches)
-        tried.append(Reading(fit, log_evidence(fit) + _simultaneous(protocol, begin.values())))
+        model = DropModel(protocol, records, begin, clock_u, components)
+        tried.append(weighed(settle(model, matches)))
     best, *rest = _best(tried)
     if not best.evidence > 0.0:
         return Identification(None, _shares(best.fit))
     odds = best.evidence - rest[0].evidence if rest else math.inf
     if len(pairs) > len(close):
-        odds = min(odds, most - _likely(protocol, roles, pairs[len(close)]))
+        odds = min(odds, most - _likely(protocol, pairs[len(close)]))
     fit = _relaxed(best.fit)
     other = rest[0].fit if rest else None
     return Identification(fit, _shares(fit), odds, best.evidence, other)
+
+
+def weighed(fit: Fit) -> Reading:
+    """Weigh a fit of all sides."""
+    return Reading(fit, log_evidence(fit) + _simultaneous(fit.model.protocol, _begins(fit)))
+
+
+def _begins(fit: Fit) -> list[Guess]:
+    return [adjusted(fit, role) for role in fit.model.records]
 
 
 def _shares(fit: Fit) -> dict[str, float]:
@@ -403,8 +467,8 @@ def _shares(fit: Fit) -> dict[str, float]:
     return found
 
 
-def _likely(protocol: Protocol, roles: Sequence[str], pair: Sequence[Reading]) -> float:
-    begins = [adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)]
+def _likely(protocol: Protocol, pair: Sequence[Reading]) -> float:
+    begins = [one for reading in pair for one in _begins(reading.fit)]
     return sum(one.evidence for one in pair) + _simultaneous(protocol, begins)
 
 

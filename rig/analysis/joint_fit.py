@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.components import STATED
+from rig.analysis.adjust import PATIENT
+from rig.analysis.components import stated
 from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
@@ -40,10 +41,9 @@ IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""
 _ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
-_PATIENT = 6  # rounds after which a step back is no part of finding the way
 _DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
-_LEAST = {"floor": 5e-6}  # where others of its kind count for more
+_LEAST = {"floor": 5e-6, "departure": 5e-6}  # where others of its kind count for more
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +109,13 @@ class JointFit:
             marked as not identified.
         """
         variance = np.diag(self.covariance)
+        beforehand = stated(self.drops[0].model.protocol)
         return {
             "runs": len(self.drops),
             "scatter": [
                 {
                     "name": name,
-                    "stated": getattr(STATED, name),
+                    "stated": getattr(beforehand, name),
                     "found": getattr(self.components, name),
                     "degrees": degrees,
                 }
@@ -135,20 +136,21 @@ class JointFit:
 
 
 @one_thread
-def joint_fit(fits: Sequence[Fit]) -> JointFit:
+def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
     """Adjust all drops of a session together.
 
     Parameters
     ----------
     fits
-        Good drops, each adjusted by itself.
+        Good drops, each adjusted by itself, or all of them before.
     """
     shared = SharedUnknowns(fit.model for fit in fits)
     # One clock for all: its error is common, and as large as the least sure calibration allows.
     clock_u = max(fit.model.clock_u for fit in fits)
     drops = [_begin(fit, shared) for fit in fits]
     x = _average(drops, shared)
-    evidence = Evidence(STATED)
+    beforehand = stated(fits[0].model.protocol)
+    evidence = Evidence(beforehand, beforehand)
     settled, moved, damping, previous = False, 0.0, 1.0, np.zeros(len(shared))
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
@@ -165,9 +167,7 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit:
         x = x + damping * step * sd
         ahead = step / np.sqrt(np.diag(covariance))
         last, moved = moved, damping * float(np.abs(ahead).max())
-        # An edge at the very moment of an impact has a slope on either side: steps go to and fro
-        # over the best place, which lies between them.
-        if round_ > _PATIENT and ahead @ previous < 0.0:
+        if round_ > PATIENT and ahead @ previous < 0.0:
             damping *= 0.5
         previous = ahead
         before = evidence.components
@@ -188,10 +188,10 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit:
     )
 
 
-def _begin(fit: Fit, shared: SharedUnknowns) -> DropState:
+def _begin(fit: Fit | JointDrop, shared: SharedUnknowns) -> DropState:
     common, here = shared.places(fit.model)
     own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
-    return DropState(fit.model, fit.matches, fit.estimate.x.copy(), own, common, here)
+    return DropState(fit.model, fit.matches, fit.x.copy(), own, common, here)
 
 
 def _average(drops: Sequence[DropState], shared: SharedUnknowns) -> Array:
@@ -212,11 +212,12 @@ def _weigh(
     drops: Sequence[DropState],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
-    new = Evidence(evidence.components)
+    new = Evidence(evidence.components, evidence.stated)
     remaining = np.diag(covariance)
     for name, block in shared.blocks.items():
         new.common(name, scaled(x, sd)[block], remaining[block], sd[block])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
+    struck = 0.0
     for drop in drops:
         assert drop.reduced is not None
         reduced, model = drop.reduced, drop.model
@@ -224,12 +225,14 @@ def _weigh(
         # The variance of an own unknown: with the common ones known, and what these leave open.
         left = np.diag(reduced.inverse) + np.sum((reduced.gain @ common) * reduced.gain, axis=1)
         own_sd = model.unknowns.sd[drop.own]
-        parameters += float(np.sum((1.0 - left)[own_sd > 0.0]))
         variance = np.zeros(drop.x.size)
         variance[drop.own] = left
+        parameters += float(np.sum((1.0 - left)[own_sd > 0.0]))
+        if "impulses" in model.unknowns:
+            struck += float(np.sum(1.0 - variance[model.unknowns["impulses"]]))
         new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
         new.edges(model.residuals(role, drop.x, match) for role, match in drop.matches.items())
-    return new.settled(parameters)
+    return new.settled(parameters, struck)
 
 
 def _steady(one: Components, other: Components, drops: Sequence[DropState]) -> bool:
@@ -238,12 +241,17 @@ def _steady(one: Components, other: Components, drops: Sequence[DropState]) -> b
     Of impulses it is their scatter in these drops that counts: where all have about the same α, it
     does not tell its two components apart, and nothing depends on them.
     """
-    names = [name for name in one.__slots__ if not name.startswith("impulse")]
+    names = [name for name in one.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
     pairs = [(getattr(one, name), getattr(other, name), _LEAST.get(name, 0.0)) for name in names]
     alphas = {
         abs(drop.model.guesses["impact"].alpha) for drop in drops if "impact" in drop.model.guesses
     }
-    pairs += [(one.impulses(alpha), other.impulses(alpha), 0.0) for alpha in alphas]
+    ends = np.array([1.0, math.inf])
+    pairs += [
+        (a, b, 0.0)
+        for alpha in alphas
+        for a, b in zip(one.impulses(alpha, ends), other.impulses(alpha, ends), strict=True)
+    ]
     return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)
 
 

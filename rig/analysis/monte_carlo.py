@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -81,14 +81,12 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     rng = np.random.default_rng(seed)
     model, at = fit.model, fit.estimate.x
     sd = model.unknowns.sd
-    shifts = _scatter(fit)
     # A restless drop was weighed by its own scatter, so that is what its edges are shaken by.
-    for role in shifts:
-        shifts[role] *= fit.estimate.scatter
+    scatter = _scatters(fit, fit.estimate.scatter)
     found: dict[str, list[float]] = {}
-    expected = _Expected(fit)
+    expected = _Expected(fit, scatter)
     for _ in range(trials):
-        moved = _draw(shifts, rng)
+        moved = {role: one.draw(rng) for role, one in scatter.items()}
         centre = _stated(sd) * rng.normal(size=sd.size)
         shaken = model.shaken(moved)
         # What is linear need not be found step by step; adjusting from there finds the rest.
@@ -111,15 +109,16 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
         For each jointly fitted drop, by JSON name.
     """
     rng = np.random.default_rng(seed)
-    shifts = [_scatter(drop) for drop in joint.drops]
+    scatters = [_scatters(drop) for drop in joint.drops]
     found: list[dict[str, list[float]]] = [{} for _ in joint.drops]
     for _ in range(trials):
         centre = _stated(joint.sd) * rng.normal(size=joint.sd.size)
         states, x = [], joint.x
-        for drop, shift in zip(joint.drops, shifts, strict=True):
+        for drop, scatter in zip(joint.drops, scatters, strict=True):
             sd = drop.model.unknowns.sd[drop.own]
             own = _stated(sd) * rng.normal(size=sd.size)
-            model = drop.model.shaken(_draw(shift, rng))
+            moved = {role: one.draw(rng) for role, one in scatter.items()}
+            model = drop.model.shaken(moved)
             places = drop.own, drop.common, drop.here
             states.append(DropState(model, drop.matches, drop.x.copy(), *places, own))
         for _step in range(_SESSION_STEPS):
@@ -142,33 +141,41 @@ class Agreement:
     d_low, d_high
         How far the ends of the two 95 % intervals are apart.
     tolerance
-        Half a unit of the first digit of u, and twice the standard error of the end of an
-        interval that so many trials give.
+        δ: half a unit of the last digit of u that counts (7.9.2).
+    error
+        Twice the standard error of the end of an interval that so many trials give.
     """
 
     d_low: float
     d_high: float
     tolerance: float
+    error: float
 
     @property
     def agrees(self) -> bool:
         """Whether both ends are within the tolerance."""
         return max(self.d_low, self.d_high) <= self.tolerance
 
+    @property
+    def decided(self) -> bool:
+        """Whether that is more than chance: so few trials may say either."""
+        return abs(max(self.d_low, self.d_high) - self.tolerance) > self.error
+
     def json(self) -> dict[str, Any]:
-        """``{"d_low", "d_high", "tolerance", "agrees"}``."""
+        """``{"d_low", "d_high", "tolerance", "error", "agrees", "decided"}``."""
         found: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__}
-        return found | {"agrees": self.agrees}
+        return found | {"agrees": self.agrees, "decided": self.decided}
 
 
-def agreement(value: float, u: float, drawn: Propagated, trials: int) -> Agreement:
-    """Compare value ± 1.96 u with the interval of the trials."""
+def agreement(value: float, u: float, drawn: Propagated, trials: int, digits: int = 1) -> Agreement:
+    """Compare value ± 1.96 u with the interval of the trials, to so many digits of u."""
     half = coverage_factor(math.inf, PROBABILITY) * u
-    digit = 10.0 ** math.floor(math.log10(u))
+    digit = 10.0 ** (math.floor(math.log10(u)) + 1 - digits)
     return Agreement(
         abs(value - half - drawn.low),
         abs(value + half - drawn.high),
-        0.5 * digit + 2.0 * _END * u / math.sqrt(trials),
+        0.5 * digit,
+        2.0 * _END * u / math.sqrt(trials),
     )
 
 
@@ -177,24 +184,68 @@ def _stated(sd: Array) -> Array:
     return np.where(sd < ANYTHING, sd, 0.0)
 
 
-def _draw(shifts: dict[str, Array], rng: np.random.Generator) -> dict[str, Array]:
-    return {role: one * rng.normal(size=one.size) for role, one in shifts.items()}
+class _Scatter(NamedTuple):
+    """What the edges of one side are shaken by.
+
+    Attributes
+    ----------
+    all
+        Number of observed edges.
+    edges
+        Places of the matched ones; shape ``(matched,)`` as of all that follows.
+    speed
+        Of the chain, m/s: m at the beam are s in the stamp.
+    sigma, told
+        As of `rig.analysis.equations.Equations`.
+    """
+
+    all: int
+    edges: NDArray[np.intp]
+    speed: Array
+    sigma: Array
+    told: Array
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """Draw by how much every observed edge moves, s; what is not matched stays."""
+        off = self.sigma * rng.normal(size=self.sigma.size)
+        off[1:] += self.told[1:] * off[:-1]  # the one before is the first of its pair, or told is 0
+        found = np.zeros(self.all)
+        found[self.edges] = off / self.speed
+        return found
+
+    def apart(self, moved: Array) -> Array:
+        """Return by how much the independent equations' left sides change, m."""
+        off = moved[self.edges] * self.speed
+        off[1:] -= self.told[1:] * off[:-1]
+        return off
+
+
+def _scatters(drop: Fit | JointDrop, scale: float = 1.0) -> dict[str, _Scatter]:
+    found = {}
+    for role, matches in drop.matches.items():
+        rows = drop.model.equations(role, drop.x, matches)
+        expected = drop.model.expected[role]
+        found[role] = _Scatter(
+            expected.times.size,
+            expected.chosen(matches)[1],
+            rows.residuals.speed,
+            rows.residuals.sigma * scale,
+            rows.told,
+        )
+    return found
 
 
 class _Expected:
     """Where the unknowns of a drop go, to first order, when its edges and priors move."""
 
-    def __init__(self, fit: Fit) -> None:
+    def __init__(self, fit: Fit, scatter: dict[str, _Scatter]) -> None:
         self._estimate = estimate = fit.estimate
-        self._seen: dict[str, tuple[NDArray[np.intp], Array]] = {}
+        self._pulls: dict[str, tuple[_Scatter, Array]] = {}
         for role, matches in fit.matches.items():
-            found = fit.model.equations(role, estimate.x, matches)
-            values, sigma, speed, _ = found.residuals
-            sigma = sigma * estimate.scatter
-            weight = robust_weights(values / sigma) / sigma**2
-            # A later stamp sees the chain lower.
-            pull = found.jacobian * (weight * speed)[:, None]
-            self._seen[role] = fit.model.expected[role].chosen(matches)[1], pull * estimate.sd
+            found, sigma = fit.model.equations(role, estimate.x, matches), scatter[role].sigma
+            weight = robust_weights(found.residuals.values / sigma) / sigma**2
+            pull = found.jacobian * weight[:, None]
+            self._pulls[role] = scatter[role], pull * estimate.sd
 
     def shift(self, moved: Mapping[str, Array], centre: Array) -> Array:
         """Return the change of the unknowns, shape ``(unknowns,)``.
@@ -208,19 +259,8 @@ class _Expected:
         """
         sd = self._estimate.sd
         vector = scaled(centre, sd)
-        for role, (edges, pull) in self._seen.items():
-            vector = vector + moved[role][edges] @ pull
+        for role, (scatter, pull) in self._pulls.items():
+            # A later stamp sees the chain lower.
+            vector = vector + scatter.apart(moved[role]) @ pull
         found: Array = sd * (self._estimate.covariance @ vector)
         return found
-
-
-def _scatter(drop: Fit | JointDrop) -> dict[str, Array]:
-    """Standard deviation of every observed edge of each side, s; 0 where it is not matched."""
-    found = {}
-    for role, matches in drop.matches.items():
-        rows = drop.model.residuals(role, drop.x, matches)
-        expected = drop.model.expected[role]
-        _, edges = expected.chosen(matches)
-        found[role] = np.zeros(expected.times.size)
-        found[role][edges] = rows.sigma / rows.speed  # m at the beam are s in the stamp
-    return found

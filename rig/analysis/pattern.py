@@ -178,18 +178,24 @@ def _paths(
     levels = np.concatenate([train.levels for train in record.trains])
     if record.ratios is None:
         times, speeds = _passages(
-            levels, np.zeros((1, 1)), np.array([start]), np.zeros((1, 1)), gravity, kappa
+            levels,
+            np.zeros((1, 1)),
+            np.array([start]),
+            np.zeros((1, 1)),
+            gravity,
+            kappa * record.air,
         )
         return _Paths(np.zeros(1), times, speeds, _end(times))
     places = np.array(record.chain.chain.heights)
     height = np.concatenate([[start], -places])
-    ends = _legs(height, record.ratios, np.array(span), gravity, kappa)
+    kappas = kappa * np.broadcast_to(record.air, height.shape)
+    ends = _legs(height, record.ratios, np.array(span), gravity, kappas)
     # So fine that the chain's top is never off by more than half a vote's width.
     apart = float((ends[0][-1, 0] - ends[0][-1, 1]) * ends[1][-1, 1])
     count = int(np.ceil(max(apart, 0.0) / slack)) + 2
     alphas = np.linspace(*span, count)
-    time, speed = _legs(height, record.ratios, alphas, gravity, kappa)
-    times, speeds = _passages(levels, time, height, speed, gravity, kappa)
+    time, speed = _legs(height, record.ratios, alphas, gravity, kappas)
+    times, speeds = _passages(levels, time, height, speed, gravity, kappas)
     return _Paths(alphas, times, speeds, _end(times))
 
 
@@ -199,24 +205,25 @@ def _end(times: Array) -> Array:
 
 
 def _legs(
-    height: Array, ratios: Array, alphas: Array, gravity: float, kappa: float
+    height: Array, ratios: Array, alphas: Array, gravity: float, kappas: Array
 ) -> tuple[Array, Array]:
     """Times and speeds at the beginning of each leg for every α, shape ``(legs, alphas)``."""
     time, speed = np.zeros((height.size, alphas.size)), np.zeros((height.size, alphas.size))
     for k, ratio in enumerate(ratios):
-        arrival, lasted = fall_through(height[k] - height[k + 1], speed[k], gravity, kappa)
+        distance = height[k] - height[k + 1]
+        arrival, lasted = fall_through(distance, speed[k], gravity, float(kappas[k]))
         time[k + 1] = time[k] + lasted
         speed[k + 1] = arrival * (1.0 + alphas * ratio)
     return time, speed
 
 
 def _passages(
-    levels: Array, time: Array, height: Array, speed: Array, gravity: float, kappa: float
+    levels: Array, time: Array, height: Array, speed: Array, gravity: float, kappas: Array
 ) -> tuple[Array, Array]:
     """When each path comes down to each level, and how fast; NaN above the start."""
     leg = np.maximum(np.searchsorted(-height, -levels, side="right") - 1, 0)
     distance = np.maximum(height[leg] - levels, 0.0)[:, None]
-    arrival, lasted = fall_through(distance, speed[leg], gravity, kappa)
+    arrival, lasted = fall_through(distance, speed[leg], gravity, kappas[leg, None])
     passed = time[leg] + lasted
     passed[levels >= height[0]] = np.nan
     return passed, arrival
@@ -330,11 +337,16 @@ def in_order(record: ChainRecord, start: float, gravity: float) -> Span:
             wanted = wanted[~np.isnan(wanted)]
             size = min(seen.size, wanted.size)
             if size >= _FEW:
-                late += [np.median(seen[:size] - wanted[:size])]
-                late += [np.median(seen[-size:] - wanted[-size:])]
+                late += [_middle(seen[:size] - wanted[:size])]
+                late += [_middle(seen[-size:] - wanted[-size:])]
     if not late:
         return EVER
-    return float(min(late)), float(max(late))
+    return min(late), max(late)
+
+
+def _middle(values: Array) -> float:
+    """Return the upper median; much quicker than that of numpy."""
+    return float(np.sort(values)[values.size // 2])
 
 
 def merged(*several: Sequence[Guess]) -> list[Guess]:

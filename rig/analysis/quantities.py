@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from rig.analysis.adjust import uncertainty
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -19,6 +20,22 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Value = tuple[float, Array]
+
+
+GUESSED = 8.0
+"""Degrees of freedom of a scale that is known to a quarter of itself (GUM G.4.2, E.4.3)."""
+SCALES = frozenset(
+    {
+        "hanging height",
+        "side",
+        "beam offsets",
+        "single impulses",
+        "top rod",
+        "strings",
+        "contact",
+    }
+)
+"""Lines of the budget whose size nobody has measured, unless a joint fit finds it."""
 
 
 def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
@@ -37,7 +54,37 @@ def measurands(model: DropModel, x: Array) -> dict[str, Value]:
 
 def _measured(model: DropModel, estimate: Estimate, value: float, gradient: Array) -> Measured:
     u, budget = uncertainty(estimate, gradient, model.unknowns.groups)
-    return Measured(value, u, max(1.0, estimate.degrees), budget)
+    degrees = effective_degrees(u, budget, {"edges": estimate.degrees})
+    moved = estimate.covariance @ (gradient * estimate.sd)
+    stated = {name: float(moved[place]) for name, place in stated_places(model).items()}
+    return Measured(value, u, degrees, budget, stated=stated)
+
+
+def stated_places(model: DropModel) -> dict[str, int]:
+    """Unknowns that the protocol states a value of which predictions are made from, too."""
+    if "impact" not in model.records:
+        return {}  # gravity is what is measured
+    at = model.unknowns
+    names = ["drop", "gravity", *(["drag"] if model.protocol.drag is not None else [])]
+    return {name: at[name].start for name in names if name in at}
+
+
+def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str, float]) -> float:
+    """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4); at least 1.
+
+    Parameters
+    ----------
+    budget
+        Lines whose squares add up to that of `u`.
+    known
+        Degrees of freedom of lines; those of guessed scales are `GUESSED`, others infinite.
+    """
+    share = sum(
+        (line / u) ** 4 / known.get(name, GUESSED)
+        for name, line in budget.items()
+        if name in known or name in SCALES
+    )
+    return max(1.0, 1.0 / share) if share > 0.0 else math.inf
 
 
 def _gravity(model: DropModel, x: Array) -> Value | None:
@@ -98,6 +145,59 @@ def _separation(model: DropModel, x: Array) -> Value | None:
     return _apart(model, x, hit + skew[0], d_hit + skew[1])
 
 
+def _speed_strike(model: DropModel, x: Array) -> Value | None:
+    """V as the top rod really strikes, on the board or on the rods that lie there."""
+    struck = _strike(model, x)
+    return None if struck is None else struck.speed
+
+
+def _separation_strike(model: DropModel, x: Array) -> Value | None:
+    """Δz as the top rod really strikes, had both chains been let go together."""
+    skew, struck = _release_skew(model, x), _strike(model, x)
+    if skew is None or struck is None:
+        return None
+    value, gradient = _apart(model, x, struck.when[0] + skew[0], struck.when[1] + skew[1])
+    return value - struck.above[0], gradient - struck.above[1]
+
+
+class _Strike(NamedTuple):
+    """How far above the contact level the top rod strikes, when, and how fast it is."""
+
+    above: Value
+    when: Value
+    speed: Value
+
+
+def _strike(model: DropModel, x: Array) -> _Strike | None:
+    """Go back from the level to where the top rod strikes, in one ballistic leg.
+
+    `None` where nothing is struck, or so high that the chain never falls from there to the level.
+    """
+    if "impact" not in model.records:
+        return None
+    path, at = model.trajectory("impact", x), model.unknowns
+    above = model.protocol.contact.strike.value + float(x[at["contact"]][0] + x[at["strike"]][0])
+    d_above = np.zeros(x.size)
+    d_above[at["contact"]] = d_above[at["strike"]] = 1.0
+    speed, d_speed = path.arrival, model.spread("impact", path.d_arrival)
+    pull = path.gravity - path.kappa * speed**2
+    d_pull = -2.0 * path.kappa * speed * d_speed
+    d_pull[at["gravity"]] += 1.0
+    if "drag" in at:
+        d_pull[at["drag"]] -= speed**2
+    squared = speed**2 - 2.0 * pull * above
+    if squared <= 0.0:
+        return None
+    end = math.sqrt(squared)
+    d_end = (speed * d_speed - pull * d_above - above * d_pull) / end
+    both, d_both = speed + end, d_speed + d_end
+    when = float(path.time[-1]) - 2.0 * above / both
+    d_when = (
+        model.spread("impact", path.d_time[-1]) - 2.0 * (d_above - above / both * d_both) / both
+    )
+    return _Strike((above, d_above), (when, d_when), (end, d_end))
+
+
 def _both(model: DropModel) -> bool:
     return {"impact", "free"} <= set(model.records)
 
@@ -115,8 +215,10 @@ def _apart(model: DropModel, x: Array, when: float, d_when: Array) -> Value:
 COMPUTED: dict[str, Callable[[DropModel, Array], Value | None]] = {
     "separation_m": _separation,
     "separation_raw_m": _separation_raw,
+    "separation_strike_m": _separation_strike,
     "release_skew_s": _release_skew,
     "speed_m_s": _speed,
+    "speed_strike_m_s": _speed_strike,
     "fall_time_s": _fall_time,
     "gravity_m_s2": _gravity,
 }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.quantities import measurands
+from rig.analysis.quantities import effective_degrees, measurands, stated_places
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ _DEGREES = {
     "rod places": "rods",
     "hanging height": "hang",
     "single impulses": "impulse",
+    "top rod": "departure",
 }
 """Budget line → the component whose degrees of freedom it has."""
 
@@ -90,17 +91,14 @@ class Budgets:
         lines["edges"] = lines.get("edges", 0.0) + max(0.0, variance - sum(lines.values()))
         budget = {name: math.sqrt(line) for name, line in lines.items() if line > 0.0}
         u = math.sqrt(variance)
-        return Measured(value, u, self._degrees(u, budget), budget, shared)
-
-    def _degrees(self, u: float, budget: dict[str, float]) -> float:
-        """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4)."""
-        degrees = self.joint.degrees  # lines without any are stated, and taken as known exactly
-        share = sum(
-            (line / u) ** 4 / degrees[_DEGREES[name]]
-            for name, line in budget.items()
-            if name in _DEGREES and _DEGREES[name] in degrees
-        )
-        return 1.0 / share if share > 0.0 else math.inf
+        found = self.joint.degrees
+        known = {line: found[kind] for line, kind in _DEGREES.items() if kind in found}
+        place = np.full(gradient.size, -1)
+        place[drop.common] = drop.here
+        stated = {
+            name: float(common[place[one]]) for name, one in stated_places(drop.model).items()
+        }
+        return Measured(value, u, effective_degrees(u, budget, known), budget, shared, stated)
 
 
 def _common(drop: JointDrop) -> Places:

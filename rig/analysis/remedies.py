@@ -12,10 +12,10 @@ _COMPARE = (
     "hold what hangs there against rig check PROTOCOL: chain, drop, incline, gates' heights and "
     "channels"
 )
-_ADD_GATE = "add a gate near the contact point, or move one: rig design PROTOCOL says where"
 _REMEDIES: tuple[tuple[str, str], ...] = (
     ("likeliest, but not clearly", _COMPARE),  # names several things, of which one may be true
     ("in the wrong way round", "exchange the two plugs, or their channels in the protocol"),
+    ("pile up", "incline the surface more, or hang fewer rods"),
     ("upside down", "turn the chain round"),
     ("on each other's side", "exchange the two chains, or hang them as the run asks for"),
     (
@@ -31,7 +31,12 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
     ("chains hang .* (higher|lower)", "measure the drop again and write it into the protocol"),
     ("clock is", "say how well the timer's clock is known, or compare it: rig import --help"),
     ("gravity is", "look up gravity for your latitude and height: site: in the protocol"),
-    ("inclin", "set the board to the run's incline"),
+    ("air speeds up", _COMPARE),
+    (
+        "air holds",
+        "let like chains fall on both sides, which tell what the air does, or take heavier rods",
+    ),
+    ("incline", "set the board to the run's incline, or say how the surface is"),
     ("gave no edges", "plug the gate in, and see that it changes when a hand is in its beam"),
     (
         "sees something else",
@@ -41,7 +46,10 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
         "off its height|gate on channel .* (higher|lower) than",
         "measure the gate's height again and write it into the protocol",
     ),
-    ("ambiguous|fit two falls", _ADD_GATE),
+    (
+        "fit two falls",
+        "put a gate there, or move one: rig check PROTOCOL says how many drops are read then",
+    ),
     ("does not look like", _COMPARE),
     (
         "edges missed",
@@ -51,6 +59,13 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
         "release skew",
         "adjust the releases until both chains leave together, or allow more skew in accept:",
     ),
+    (
+        "pulse was cut.*emergency stop",
+        "drop once more; where nobody opened it, shield the stop's cable and put a capacitor of "
+        "47 nF across it at the board",
+    ),
+    ("pulse was cut.*aborted", "drop once more"),
+    ("pulse was cut", "look for a short circuit at the release's output; rig selftest tries it"),
     ("memory was full", "find the gate that flickers, and shield or unplug it"),
     (
         "certificate|no longer kept|missing, from number|restarted|identified itself",

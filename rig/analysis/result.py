@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.protocol.protocol import Run
+    from rig.units import Quantity
 
+_ROUNDING = 1e-12
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
 """Verdicts that take part in a summary."""
@@ -37,6 +39,9 @@ class Measured:
     shared
         What of `u` is common to all drops of a session, as a vector: those of two drops multiplied
         are their covariance. `None` for a drop by itself.
+    stated
+        By how much the value moves, with its sign, if what a protocol states of the drop, gravity
+        or the air moves by its standard uncertainty: a prediction moves with the same.
     """
 
     value: float
@@ -44,6 +49,7 @@ class Measured:
     degrees: float = math.inf
     budget: Mapping[str, float] = field(default_factory=dict)
     shared: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
+    stated: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def expanded(self) -> float:
@@ -54,6 +60,32 @@ class Measured:
     def json(self) -> dict[str, float]:
         """``{"value", "u", "U95"}``."""
         return {"value": self.value, "u": self.u, "U95": self.expanded}
+
+
+def normalized_error(
+    measured: Measured, expected: Quantity, parts: Mapping[str, float] | None = None
+) -> float | None:
+    """E_n = (x − m)/√(U² + U_m² − 2 k k_m cov(x, m)); within ±1 they agree (ISO 13528).
+
+    Parameters
+    ----------
+    measured, expected
+        x with its coverage factor k, and m, whose uncertainty is taken as known exactly.
+    parts
+        By how much m moves with what the protocol states, as `Measured.stated` has it of x.
+
+    Returns
+    -------
+    float or None
+        `None` where neither has an uncertainty, or they share all of it.
+    """
+    k, k_model = coverage_factor(max(1.0, measured.degrees)), coverage_factor(math.inf)
+    both = sum(part * measured.stated.get(name, 0.0) for name, part in (parts or {}).items())
+    whole = measured.expanded**2 + (k_model * expected.u) ** 2
+    square = whole - 2.0 * k * k_model * both
+    if square <= _ROUNDING * whole:
+        return None
+    return (measured.value - expected.value) / math.sqrt(square)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +140,8 @@ class DropResult:
         Every edge that is missing or belongs to no rod, and why.
     limits
         The verdict that a rejected drop has by its limits.
+    last_passages
+        Some of the quantities by themselves, see `rig.analysis.last_passages`.
     """
 
     run: Run
@@ -121,6 +155,7 @@ class DropResult:
     learned: bool = False
     unmatched: tuple[UnmatchedEdge, ...] = ()
     limits: Verdict | None = None
+    last_passages: Mapping[str, Measured] = field(default_factory=dict)
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
@@ -136,6 +171,8 @@ class DropResult:
             found["causes"] = [edge.json() for edge in self.unmatched]
         if self.scatter is not None:
             found["scatter"] = self.scatter
+        if self.last_passages:
+            found["last_passages"] = {n: one.json() for n, one in self.last_passages.items()}
         found["learned"] = self.learned
         found["verdict"] = self.verdict
         found["reasons"] = list(self.reasons)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.drop import fit_drop
 from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.joint_fit import FEWEST, joint_fit
+from rig.analysis.likeness import likeness
 from rig.analysis.pairs import Effects, effects
 from rig.analysis.refine import Budgets
 from rig.analysis.result import GOOD
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], None]
 
-_EXPLAINED = 6  # void drops of a session, after which no cause is sought for the next ones
+_EXPLAINED = 6  # void drops of a session, after which it is not sought what else the next ones are
 _KEPT = 0.9
 """Share of its edges that a drop must keep among others: without them priors are all it has."""
 _MOVED = "somebody may have moved its gates or chains; it is judged and measured by itself"
@@ -82,6 +83,9 @@ class Analysis:
             found["effects"] = [one.json() for one in self.effects]
         if self.joint is not None:
             found["learned"] = self.joint.json()
+            like = likeness(self.joint)
+            if like is not None:
+                found["likeness"] = like.json()
         return found
 
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rig.analysis.distributions import coverage_factor
-from rig.analysis.result import GOOD, Measured
+from rig.analysis.result import GOOD, Measured, normalized_error
 from rig.measurands import MEASURANDS, averaged
-from rig.predictions import predicted_run
+from rig.predictions import predicted_parts, predicted_run
 from rig.protocol.protocol import Condition
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol, Run
@@ -31,6 +30,8 @@ COMMON = frozenset(
         "air",
         "drop height",
         "beam heights",
+        "datum",
+        "side",
         "beam offsets",
         "rod places",
         "rod width",
@@ -51,6 +52,10 @@ class Incline:
         The model's value of each measurand; missing outside its domain.
     impact_chain
         Which chain struck, where chains are unlike.
+    parts
+        What of each prediction moves with what the measured value moves with.
+    causes
+        What of each mean's uncertainty all runs share, by line of the budget.
     """
 
     incline_deg: float
@@ -59,6 +64,8 @@ class Incline:
     deviations: dict[str, float]
     predicted: dict[str, Quantity]
     impact_chain: str | None = None
+    parts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    causes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def condition(self) -> Condition:
@@ -66,12 +73,10 @@ class Incline:
         return Condition(self.incline_deg, self.impact_chain)
 
     def normalized_error(self, name: str) -> float | None:
-        """E_n = (measured − predicted)/√(U² + U_p²); within ±1 they agree (ISO 13528)."""
+        """Of a measurand, see `rig.analysis.result.normalized_error`."""
         if name not in self.means or name not in self.predicted:
             return None
-        mean, model = self.means[name], self.predicted[name]
-        width = math.hypot(mean.expanded, coverage_factor(math.inf) * model.u)
-        return (mean.value - model.value) / width if width > 0.0 else None
+        return normalized_error(self.means[name], self.predicted[name], self.parts.get(name))
 
     def json(self) -> dict[str, Any]:
         """One member of ``summary``."""
@@ -81,6 +86,11 @@ class Incline:
             if name in self.deviations:
                 found[MEASURANDS[name].key("sd")] = self.deviations[name]
                 found[MEASURANDS[name].key("se")] = self.deviations[name] / math.sqrt(self.n)
+        found["common"] = [
+            {"name": cause, "quantity": name, "u": u}
+            for name, causes in self.causes.items()
+            for cause, u in causes.items()
+        ]
         found["predicted"] = {name: model.value for name, model in self.predicted.items()}
         found["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
         main, *others = self.means
@@ -133,7 +143,17 @@ def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
         },
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
         protocol.condition(run).impact_chain,
+        predicted_parts(protocol, run),
+        {name: _causes(found) for name, found in values.items()},
     )
+
+
+def _causes(runs: Sequence[Measured]) -> dict[str, float]:
+    """Return what of a mean each common line of the budget makes, the largest first."""
+    found = {
+        name: math.sqrt(fmean(run.budget.get(name, 0.0) ** 2 for run in runs)) for name in COMMON
+    }
+    return dict(sorted((each for each in found.items() if each[1]), key=lambda each: -each[1]))
 
 
 def mean(runs: Sequence[Measured]) -> Measured:
@@ -165,6 +185,7 @@ def mean(runs: Sequence[Measured]) -> Measured:
         u,
         u**4 / share if share > 0.0 else math.inf,
         {"runs": single, "common": common},
+        stated={name: fmean(run.stated.get(name, 0.0) for run in runs) for name in runs[0].stated},
     )
 
 

@@ -8,7 +8,7 @@ request.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
 
+ONE = np.ones(1)
 RELEASE, START, GRAVITY, DRAG = 0, 1, 2, 3
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 COMMON = 4
@@ -70,6 +72,8 @@ class Trajectory:
         `None` where nothing is struck.
     kappa
         κ of the air, 1/m; what an adjustment tries may be negative.
+    air
+        κ of each leg in units of `kappa`, shape ``(legs,)``; of one element where all are alike.
     """
 
     time: Array
@@ -78,6 +82,7 @@ class Trajectory:
     gravity: float
     hits: Hits | None = None
     kappa: float = 0.0
+    air: Array = field(default_factory=lambda: ONE)
 
     @property
     def arrival(self) -> float:
@@ -107,7 +112,7 @@ class Trajectory:
     def heights(self, times: Array) -> tuple[Array, Array]:
         """Height of the reference point and its speed (downward positive), shape of `times`."""
         leg, since = self._legs(times)
-        fallen, speed = fall_for(since, self.speed[leg], self.gravity, self.kappa)
+        fallen, speed = fall_for(since, self.speed[leg], self.gravity, self.kappas(leg))
         return self.height[leg] - fallen, speed
 
     def derivatives(self, times: Array, by: Array | None = None) -> Array:
@@ -129,9 +134,10 @@ class Trajectory:
         """What `heights` and `derivatives` say, with every leg gone through once."""
         leg, since = self._legs(times)
         slopes = self._slopes
-        fallen, speed, by_speed, *pull = leg_slopes(
-            since, self.speed[leg], self.gravity, self.kappa
+        fallen, speed, by_speed, by_gravity, by_kappa = leg_slopes(
+            since, self.speed[leg], self.gravity, self.kappas(leg)
         )
+        pull = by_gravity, by_kappa * self.shares(leg)
         pulls = np.zeros((2, slopes.time.shape[1]))  # by gravity and by κ
         pulls[0, GRAVITY] = pulls[1, DRAG] = 1.0
         begin = [slopes.time, slopes.height, slopes.speed]
@@ -154,8 +160,23 @@ class Trajectory:
         leg = np.searchsorted(-self.height, -heights, side="right") - 1
         leg = np.maximum(leg, 0)
         distance = np.maximum(self.height[leg] - heights, 0.0)
-        _, lasted = fall_through(distance, self.speed[leg], self.gravity, self.kappa)
+        _, lasted = fall_through(distance, self.speed[leg], self.gravity, self.kappas(leg))
         found: Array = self.time[leg] + lasted
+        return found
+
+    def kappas(self, leg: Index) -> float | Array:
+        """κ on each of some legs; one number where it is the same on all."""
+        return self.kappa * self.shares(leg)
+
+    def shares(self, leg: Index) -> float | Array:
+        """`air` of some legs, likewise."""
+        return float(self.air[0]) if self.air.size == 1 else self.air[leg]
+
+    def hit_before(self, times: Array) -> NDArray[np.bool_]:
+        """Whether a rod has struck before each time."""
+        if self.hits is None:
+            return np.zeros(times.shape, dtype=np.bool_)
+        found: NDArray[np.bool_] = times > self.time[1]
         return found
 
     def _legs(self, times: Array) -> tuple[NDArray[np.intp], Array]:
@@ -172,9 +193,13 @@ class Trajectory:
         return _struck_slopes(self)
 
 
-def free_trajectory(release: float, start: float, gravity: float, kappa: float = 0.0) -> Trajectory:
-    """Fall from rest of a chain that strikes nothing."""
-    return Trajectory(np.array([release]), np.array([start]), np.zeros(1), gravity, kappa=kappa)
+def free_trajectory(
+    release: float, start: float, gravity: float, kappa: float = 0.0, air: Array = ONE
+) -> Trajectory:
+    """Fall from rest of a chain that strikes nothing; arguments as in `Trajectory`."""
+    return Trajectory(
+        np.array([release]), np.array([start]), np.zeros(1), gravity, kappa=kappa, air=air
+    )
 
 
 def struck_trajectory(
@@ -185,6 +210,7 @@ def struck_trajectory(
     ratios: Array,
     places: Array,
     kappa: float = 0.0,
+    air: Array = ONE,
 ) -> Trajectory:
     """Fall of a chain whose rods strike the surface one after another.
 
@@ -196,8 +222,8 @@ def struck_trajectory(
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, 0 for the top rod; shape ``(rods,)``.
     places
         Height of each rod's middle above the reference point, shape ``(rods,)``.
-    kappa
-        κ of the air, 1/m: one for all legs, as it is where all rods are alike.
+    kappa, air
+        κ of the air, 1/m, and of each leg in its units, as in `Trajectory`.
 
     Returns
     -------
@@ -213,15 +239,17 @@ def struck_trajectory(
     # Each leg needs the speed after the one before: a loop over floats is quicker than numpy here.
     now, speed = release, 0.0
     time, speeds, arrivals = [now], [speed], []
-    for fallen, more in zip(distance.tolist(), gain.tolist(), strict=True):
-        arrival, lasted = one_leg(fallen, speed, gravity, kappa)
+    kappas = (kappa * np.broadcast_to(air, rods + 1)).tolist()[:rods]
+    for fallen, more, held in zip(distance.tolist(), gain.tolist(), kappas, strict=True):
+        arrival, lasted = one_leg(fallen, speed, gravity, held)
         now += lasted
-        speed = arrival * (1.0 + more)
+        # What an adjustment tries may throw the chain back up: no chain does.
+        speed = arrival * max(1.0 + more, 1e-3)
         time.append(now)
         speeds.append(speed)
         arrivals.append(arrival)
     hits = Hits(distance, np.array(arrivals), gain, ratios)
-    return Trajectory(np.array(time), height, np.array(speeds), gravity, hits, kappa)
+    return Trajectory(np.array(time), height, np.array(speeds), gravity, hits, kappa, air)
 
 
 def _struck_slopes(path: Trajectory) -> Slopes:
@@ -231,11 +259,12 @@ def _struck_slopes(path: Trajectory) -> Slopes:
     E_k = q_k·f²_{k−1}·E_{k−1} + g·(1 − q_k)/κ: its derivatives are sums of those of single legs,
     each times the product of q f² from there on.
     """
-    hits, gravity, kappa, speed = path.hits, path.gravity, path.kappa, path.speed
+    hits, gravity, speed = path.hits, path.gravity, path.speed
     assert hits is not None
     rods = hits.distance.size
     size = COMMON + 2 * rods
     row = np.arange(rods)
+    kappa, share = path.kappas(row), path.shares(row)
     places, gain = COMMON + rods + row, COMMON + row
     factor, arrival = 1.0 + hits.gain, hits.arrival
     left = np.exp(-2.0 * kappa * hits.distance)
@@ -248,7 +277,7 @@ def _struck_slopes(path: Trajectory) -> Slopes:
     alone = np.zeros((rods, size))
     alone[0, START] = steeper[0]
     alone[:, GRAVITY], by_kappa = reach_slopes(hits.distance, kappa)
-    alone[:, DRAG] = gravity * by_kappa - 2.0 * hits.distance * left * speed[:-1] ** 2
+    alone[:, DRAG] = share * (gravity * by_kappa - 2.0 * hits.distance * left * speed[:-1] ** 2)
     alone[row, places] = steeper
     alone[row[1:], places[:-1]] = -steeper[1:]
     alone[row[1:], gain[:-1]] = left[1:] * (2.0 * factor * arrival**2 * hits.ratio)[:-1]
@@ -266,6 +295,6 @@ def _struck_slopes(path: Trajectory) -> Slopes:
     legs[0, RELEASE] = 1.0
     legs[1:] = d_height[:-1] - d_height[1:] - by_speed[:, None] * d_speed[:-1]
     legs[1:, GRAVITY] -= by_gravity
-    legs[1:, DRAG] -= by_kappa
+    legs[1:, DRAG] -= share * by_kappa
     legs[1:] /= arrival[:, None]
     return Slopes(np.cumsum(legs, axis=0), d_height, d_speed, d_arrival[-1])

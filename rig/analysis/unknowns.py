@@ -20,16 +20,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
-SIDE_U = 0.5e-3
-"""How much lower one side may hang than the other in every run, m."""
-DRAG_U = 0.05
-"""What the air may take: κv² of the acceleration, 1/m; a tenth of g at 4.5 m/s."""
 ANYTHING = 1.0
 """Prior of release times (s) and α: nothing is known."""
 ANY_GRAVITY = 5.0
 """Prior of gravity where it is what a scene measures, m/s²."""
 
-_RIG = ("clock", "gravity", "drop", "side", "drag", "beams", "ripple")
+_RIG = ("clock", "gravity", "drop", "side", "drag", "datum", "beams", "ripple")
 _CHAIN = ("rods", "width")
 
 
@@ -128,5 +124,8 @@ def _names(model: DropModel) -> dict[str, slice]:
     measured = {"gravity"} if model.protocol.surface is None else set()
     found = {name: at[name] for name in _RIG if name in at and name not in measured}
     for role, record in model.records.items():
+        if role == "impact":
+            for name in ("contact", "strings"):
+                found[f"{name}, {record.condition}"] = at[name]
         found |= {f"{record.chain.name} {what}": at[f"{role} {what}"] for what in _CHAIN}
     return found

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.analysis.deciding import deciding_gate
 from rig.analysis.diagnoses import diagnose
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.identify import MISSED
+from rig.analysis.inclines import other_incline
+from rig.analysis.last_passages import disagreements
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -16,7 +20,7 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
     from rig.analysis.identify import Identification
     from rig.analysis.result import Audit, Measured, Verdict
-    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
 
 SUPPORT = 0.6
@@ -31,6 +35,7 @@ LATE = 0.2
 remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
 
 _SURE = 4.0  # standard uncertainties
+_BEYOND = 3.0  # prior standard uncertainties of κ
 
 GLITCHES = 0.02
 """Pulses too short to be timed, relative to the edges, that a drop may have without remark."""
@@ -42,11 +47,13 @@ class Judgement(NamedTuple):
     Attributes
     ----------
     accused
-        Those of the reasons that blame gates or chains.
+        Those of the reasons that blame gates, chains or clock.
     odd
         Whether it is worth to ask what else than the protocol would explain the edges.
     suspects
         Numbers of the gates to look at for that.
+    known
+        Whether the reason explains all else that is odd, so that no other is to be sought.
     """
 
     verdict: Verdict
@@ -54,44 +61,64 @@ class Judgement(NamedTuple):
     accused: tuple[str, ...] = ()
     odd: bool = False
     suspects: tuple[int, ...] = ()
+    known: bool = False
 
 
 def judge(
     protocol: Protocol,
+    run: Run,
     drop: Drop,
     unlike: Collection[str],
     audit: Audit,
     found: Mapping[str, Measured],
     fit: Fit | None,
+    alone: Mapping[str, Measured] = MappingProxyType({}),
 ) -> Judgement:
-    """Judge a drop; without a `fit`, only whether it can be analysed at all."""
+    """Judge a drop; without a `fit`, only whether it can be analysed at all.
+
+    Parameters
+    ----------
+    alone
+        What its last passages say by themselves.
+    """
     void = [*drop.faults]
     doubts: list[str] = []
     accused: tuple[str, ...] = ()
     suspects: tuple[int, ...] = ()
     odd = False
+    remarks: tuple[str, ...] = ()
     if audit.lost:
         void.append(f"the device lost {audit.lost} edges: its memory was full")
     odd = bool(unlike)
     void += unlike
     if fit is not None:
         faults = diagnose(fit)
+        if faults.pile:  # all else that is odd follows from it
+            return Judgement("void", (*void, *faults.void), known=True)
         accused, suspects = faults.void, faults.suspects
         void += _limits(protocol, audit, found)
         void += accused
+        void += _blown(fit)
         estimate, missed = (
             fit.estimate,
             audit.missed > _most_missed(audit.matched + audit.missed, protocol.accept.missed_edges),
         )
-        odd = bool(accused) or missed or estimate.scatter > RESTLESS or not estimate.settled
         if void:
             void += faults.doubts  # which may be why
         doubts += faults.doubts
         doubts += _doubts(protocol, drop, audit, found, fit.estimate)
-        doubts += _pushed(fit)
+        pushed = _pushed(fit)
+        remarks = other_incline(fit, run)
+        accused += (*pushed, *remarks)
+        doubts += pushed
+        restless = estimate.scatter > RESTLESS or not estimate.settled
+        odd = faults.odd or bool(pushed) or missed or restless
+        doubts += disagreements(found, alone)
     if void:
         return Judgement("void", tuple(void), accused, odd, suspects)
-    return Judgement("marginal" if doubts else "accepted", tuple(doubts), accused, odd, suspects)
+    # A drop is as good where the model's α is not its own: that is what is measured.
+    verdict: Verdict = "marginal" if doubts else "accepted"
+    return Judgement(verdict, (*doubts, *remarks), accused, odd, suspects)
 
 
 def pattern_faults(identified: Identification) -> dict[str, str]:
@@ -110,12 +137,18 @@ def pattern_faults(identified: Identification) -> dict[str, str]:
             else "this does not look like this chain falling: no motion fits its edges",
         )
     if not found and identified.log_odds < LEAD:
-        odds = math.exp(identified.log_odds)
-        return dict.fromkeys(
-            identified.shares,
-            f"these edges fit two falls: the odds of the likelier one are only {odds:.3g} to 1",
-        )
+        return dict.fromkeys(identified.shares, _ambiguous(identified))
     return found
+
+
+def _ambiguous(identified: Identification) -> str:
+    """Say that two falls fit, and with which further gate only one of them would."""
+    odds = math.exp(identified.log_odds)
+    text = f"these edges fit two falls: the odds of the likelier one are only {odds:.3g} to 1"
+    if identified.fit is None or identified.other is None:
+        return text
+    side, height = deciding_gate(identified.fit, identified.other)
+    return f"{text}; a further {side} gate at {height * 1e3:.0f} mm would tell which"
 
 
 def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> list[str]:
@@ -190,17 +223,32 @@ def _doubts(
     return doubts
 
 
-def _pushed(fit: Fit) -> list[str]:
+def _blown(fit: Fit) -> list[str]:
+    """Air that nobody would expect explains much; where edges do not fit even so, it is no fall."""
+    model, estimate = fit.model, fit.estimate
+    if "drag" not in model.unknowns or estimate.scatter <= RESTLESS:
+        return []
+    at = model.unknowns["drag"].start
+    if abs(estimate.x[at]) <= _BEYOND * estimate.sd[at]:
+        return []
+    return [
+        "this does not look like this chain falling: even with what air would have to take "
+        f"(κ = {model.kappa(estimate.x):.2g} per m) edges scatter {estimate.scatter:.1f} times as "
+        "much as assumed"
+    ]
+
+
+def _pushed(fit: Fit) -> tuple[str, ...]:
     """Air only holds back: where it seems to push, something is not as it is said to be."""
     model, estimate = fit.model, fit.estimate
     if "drag" not in model.unknowns:
-        return []
+        return ()
     at = model.unknowns["drag"].start
-    kappa = float(estimate.x[at])
+    kappa = model.kappa(estimate.x)
     u = math.sqrt(estimate.covariance[at, at]) * float(estimate.sd[at])
     if kappa > -_SURE * u:
-        return []
-    return [
+        return ()
+    return (
         f"these are edges of a fall that the air speeds up (κ = {kappa:.2g} ± {2 * u:.1g} per m): "
-        "the clock, the gates' heights or gravity are not as stated"
-    ]
+        "the clock, the gates' heights or gravity are not as stated",
+    )

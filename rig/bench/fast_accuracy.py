@@ -35,6 +35,7 @@ DOUBLED = {
     "rod_sd": "0.6 mm",
     "width_sd": "0.2 mm",
     "gate_sd": "0.4 mm",
+    "datum_sd": "0.4 mm",
     "beam_sd": "1 mm",
     "impulse_sd": "0.04",
     "jitter_sd": "4 us",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import cycle, groupby
 from operator import itemgetter
 from statistics import fmean
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
-    from matplotlib.patches import Patch
 
     from rig.bench.precision import Point
     from rig.bench.resolved import JudgedDrop
@@ -52,10 +50,6 @@ _LONGEST_LABEL = 24
 _VOID_DARKEST = 0.2
 """Share of void drops from which on a layout is drawn as dark as can be."""
 _SHADES = "Oranges"
-_LOOSE_M = 0.5e-3
-"""By which a string is shorter than at rest when it is drawn slack."""
-_BOARD_M = -0.1, 0.4
-"""How far up and down its slope the board is drawn."""
 _WORLD_ERROR_MM = 0.1
 """Of Δz, that the resolved world may make before its falls are chaotic."""
 _STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), ("v", INK))
@@ -301,55 +295,6 @@ def resolved_figure(drops: Sequence[JudgedDrop]) -> str:
     return drawing.svg
 
 
-def film_figure(found: Mapping[str, Any]) -> str:
-    """Draw moments of a resolved fall side by side, from the front and, below, along the rods.
-
-    Parameters
-    ----------
-    found
-        As `rig.bench.resolved.film` gives it.
-
-    Returns
-    -------
-    str
-        SVG.
-    """
-    times = found["times_s"]
-    slope = math.tan(math.radians(found["incline_deg"]))
-    with canvas((3.4, 3.4), 8.0, simulated=True, columns=len(times), sharex=False) as drawing:
-        for number, time in enumerate(times):
-            front, side = drawing.axes[number], drawing.axes[number + len(times)]
-            left, right = found["left"][number], found["right"][number]
-            for ends, lengths in zip((left, right), found["rest_m"], strict=True):
-                for low, high, rest in zip(ends, ends[1:], lengths, strict=False):
-                    loose = math.dist(low, high) < rest - _LOOSE_M
-                    style: Any = {"color": SECOND if loose else MUTED, "linewidth": 0.7,
-                                  "linestyle": ":" if loose else "-"}  # fmt: skip
-                    front.plot((low[0], high[0]), (low[2], high[2]), **style)
-            for one, other, radius in zip(left, right, found["radii_m"], strict=True):
-                front.plot((one[0], other[0]), (one[2], other[2]), color=INK, linewidth=1.6)
-                middle = [(a + b) / 2.0 for a, b in zip(one, other, strict=True)]
-                side.add_patch(_disc(middle[1], middle[2], radius))
-            board = [found["board_m"] - y * slope for y in _BOARD_M]
-            side.plot(_BOARD_M, board, color=MODEL)
-            for axes, reach in ((front, (-0.08, 0.08)), (side, (-0.1, 0.2))):
-                axes.set_xlim(*reach)
-                axes.set_ylim(-0.25, 0.55)
-                axes.set_aspect("equal")
-                axes.set_xticks([])
-                axes.set_yticks([0.0, 0.5] if number == 0 else [])
-            front.set_title(f"{1e3 * time:.0f} ms", fontsize=8.5)
-        drawing.axes[0].set_ylabel("height (m)")
-        drawing.axes[len(times)].set_ylabel("height (m), along the rods")
-    return drawing.svg
-
-
-def _disc(x: float, y: float, radius: float) -> Patch:
-    from matplotlib.patches import Circle  # noqa: PLC0415 - matplotlib comes with the canvas
-
-    return Circle((x, y), radius, facecolor="none", edgecolor=INK, linewidth=0.8)
-
-
 def work_figure(lines: Sequence[Mapping[str, Any]]) -> str:
     """Draw error against run time of the resolved world.
 
@@ -364,13 +309,15 @@ def work_figure(lines: Sequence[Mapping[str, Any]]) -> str:
         SVG.
     """
     kinds = (
-        ("step", "step (s); touches last 0.2 ms", "o", MODEL, "step_s", 1.0),
+        ("step", "leapfrog, by its step (µs)", "o", MODEL, "step_s", 1e6),
+        ("Euler", "semi-implicit Euler", "v", MUTED, "step_s", 1e6),
+        ("Runge and Kutta", "Runge and Kutta", "^", INK, "step_s", 1e6),
         ("touch", "length of touches (ms); step in proportion", "s", SECOND, "touch_s", 1e3),
     )
     with canvas((3.6,), simulated=False) as drawing:
         (panel,) = drawing.axes
         for kind, label, marker, color, field, scale in kinds:
-            some = [one for one in lines if one["changed"] == kind and one["rms_m"] > 0.0]
+            some = [one for one in lines if one["changed"] == kind and one["rms_m"]]
             times, errors = [one["cpu_s"] for one in some], [1e3 * one["rms_m"] for one in some]
             panel.plot(times, errors, color=color, marker=marker, markersize=4.5, label=label)
             for time, error, one in zip(times, errors, some, strict=True):
@@ -378,7 +325,7 @@ def work_figure(lines: Sequence[Mapping[str, Any]]) -> str:
         panel.axhline(_WORLD_ERROR_MM, color=MUTED, linestyle=":", linewidth=1.2)
         panel.set_xscale("log")
         panel.set_yscale("log")
-        panel.set_xlabel("processor time of a fall of three rods, four at once (s)")
+        panel.set_xlabel("processor time of a fall of three rods (s)")
         panel.set_ylabel("rms error of Δz at the strike (mm)")
         panel.legend(loc="best")
     return drawing.svg

@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from rig.errors import InputError
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -32,12 +34,15 @@ class Kind:
         From the bottom rod's middle to the contact point.
     scene
         Two chains, one that strikes, or one that falls freely.
+    other
+        The second chain, where it is not like the first.
     """
 
     name: str
     chain: Mapping[str, Any]
     drop_mm: float = 180.0
     scene: Scene = "two"
+    other: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +76,7 @@ class GateLayout:
         scene: dict[str, Any] = {"protocol": 1, "chains": {"A": dict(self.kind.chain)}}
         accept = dict(ACCEPT)
         if self.kind.scene == "two":
-            scene["chains"]["B"] = {"like": "A"}
+            scene["chains"]["B"] = dict(self.kind.other or {"like": "A"})
             plan["order"] = "ABBA"
         else:
             del accept["release_skew"]
@@ -178,3 +183,19 @@ LAYOUTS = (
     *(under(kind, *shares) for kind in (*KINDS, SINGLE, FENCE) for shares in SHARES),
 )
 """All that the bench tries."""
+
+
+def chosen(layouts: Sequence[GateLayout], text: str | None) -> list[GateLayout]:
+    """Layouts with a text in their names; all if there is none.
+
+    Raises
+    ------
+    InputError
+        No layout is called like that.
+    """
+    names = [f"{one.kind.name}: {one.gates}" for one in layouts]
+    found = [one for one, name in zip(layouts, names, strict=True) if (text or "") in name]
+    if not found:
+        known = ", ".join(dict.fromkeys(names))
+        raise InputError(f"no layout has {text!r} in its name", f"there are {known}")
+    return found

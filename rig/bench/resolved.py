@@ -18,6 +18,7 @@ from rig.bench.accuracy import Errors
 from rig.bench.falls import Asked, falls, time_scale
 from rig.bench.fast_accuracy import with_setting
 from rig.errors import RigError
+from rig.films import Film
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
 from rig.threads import one_thread
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 UNIFORM, GRADED = "inclined-uniform.yaml", "graded-chain.yaml"
-DROPS = 4
-"""At each incline of a session, a block A, B, B, A; three times as many where there is but one."""
+DROPS = 1
+"""At each incline of a session, five minutes of a processor; three where there is but one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +56,6 @@ CASES = (
     WorldCase("graded, air", GRADED, {"drag": "0.03"}),
 )
 """One difference at a time; the first and the seventh are the world's defaults."""
-PICTURES = 6
-"""Of a fall that is drawn."""
 _NUMBER = re.compile(r"[-+−]?\d[\d.,]*(?:e[-+]?\d+)?")
 
 
@@ -215,16 +214,29 @@ def work() -> list[dict[str, Any]]:
     RigError
         The simulation gave up.
     """
-    return [json.loads(line) for line in _told("sim.work_precision").splitlines()]
+    return _lines("sim.work_precision")
 
 
-def film(folder: str, incline_deg: float) -> dict[str, Any]:
+def published() -> list[dict[str, Any]]:
+    """Let the chains of other experiments fall, see `sim.published`.
+
+    Raises
+    ------
+    RigError
+        The simulation gave up.
+    """
+    return _lines("sim.published")
+
+
+def _lines(module: str) -> list[dict[str, Any]]:
+    done = run([sys.executable, "-m", module], stdout=PIPE, text=True, check=False)  # noqa: S603 - our own
+    if done.returncode:
+        raise RigError(f"the simulation ended with exit code {done.returncode}")
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def film(folder: str, incline_deg: float) -> Film:
     """Let the uniform chain fall onto a board once, to be drawn.
-
-    Returns
-    -------
-    dict
-        As `sim.film` prints it.
 
     Raises
     ------
@@ -235,14 +247,6 @@ def film(folder: str, incline_deg: float) -> dict[str, Any]:
     number = next(
         one.number for one in planned(reader.read(path)) if one.incline_deg == incline_deg
     )
-    url = with_setting("sim://?dynamics=resolved", "protocol", str(path.resolve()))
-    found: dict[str, Any] = json.loads(_told("sim.film", url, str(number), str(PICTURES)))
-    return found
-
-
-def _told(module: str, *words: str) -> str:
-    """Return what a module of the simulation prints."""
-    done = run([sys.executable, "-m", module, *words], stdout=PIPE, text=True, check=False)  # noqa: S603 - our own
-    if done.returncode:
-        raise RigError(f"the simulation ended with exit code {done.returncode}")
-    return done.stdout
+    url = with_setting("sim://?dynamics=resolved&film=1", "protocol", str(path.resolve()))
+    (made,) = falls([Asked(url, [1], [[number]])])
+    return Film(**made.truth["film"])

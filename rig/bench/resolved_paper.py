@@ -23,11 +23,13 @@ if TYPE_CHECKING:
 
     Columns = dict[str, list[float]]
 
-DROPS = 8
+DROPS = 16
 """Falls of one ensemble."""
+EACH = 4
+"""Falls of one rig and its chains: rods sit differently from chain to chain, as they do in labs."""
 FRAMES_EARLY = 2
 """Between the last frame that Fig. 4 tracks and the impact."""
-INCLINES = tuple(10.0 * n for n in range(9))
+INCLINES = tuple(5.0 * n for n in range(17))
 _SCENE = """
 protocol: 1
 title: {title}
@@ -158,10 +160,12 @@ def _asked(
     url = with_setting("sim://?dynamics=resolved", "protocol", str(path))
     for dial, value in (_HANGING | dict(settings)).items():
         url = with_setting(url, dial, value)
-    # A rig for each incline: chains differ from one to the next as they do from lab to lab.
-    numbers = range(1, len(inclines) * drops + 1)
-    runs = [[*numbers[first : first + drops]] for first in range(0, len(numbers), drops)]
-    return Asked(url, range(1, len(inclines) + 1), runs)
+    runs = [
+        [*range(first + 1, min(first + EACH, begin + drops) + 1)]
+        for begin in range(0, len(inclines) * drops, drops)
+        for first in range(begin, begin + drops, EACH)
+    ]
+    return Asked(url, range(1, len(runs) + 1), runs)
 
 
 def _ensemble(name: str, made: Sequence[SimulatedDrop]) -> Ensemble:

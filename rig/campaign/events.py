@@ -136,6 +136,10 @@ class Reject(NamedTuple):
     cause: str
 
 
+class Restore(NamedTuple):
+    """The operator takes the rejection back."""
+
+
 class Note(NamedTuple):
     """The operator has something to say about the drop."""
 
@@ -151,7 +155,7 @@ class Again(NamedTuple):
 Event: TypeAlias = (
     Opened | Closed | GoOn | Try | Answered | Judged | EffectFailed | Tick | Stopped | Lost | Warned
     | Found
-    | Reject | Note | Again
+    | Reject | Restore | Note | Again
 )  # fmt: skip
 
 # ---------------------------------------------------------------- effects

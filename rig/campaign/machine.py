@@ -29,6 +29,7 @@ from rig.campaign.events import (
     Note,
     Opened,
     Reject,
+    Restore,
     Stage,
     Stop,
     Stopped,
@@ -59,6 +60,7 @@ _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
 _PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
 """Refusals to arm that end by themselves, or that somebody at the rig can end."""
+_NOTE = "note: "
 _DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
 """Refusals to fire after which the drop can be prepared again."""
 
@@ -79,14 +81,12 @@ class Flow:
         What the device wants to hear with `Fire`.
     countdown_s, left_s
         The countdown, and what is left of it.
-    blind
-        Whether a drop is judged before its numbers are shown.
-    shown
-        Whether the numbers of this drop may be seen.
     logged
         Whether the verdict is in the session file.
     verdict, reasons
         Of this drop, as logged.
+    judged
+        The verdict and reasons that it had before it was rejected.
     trouble
         What went wrong last; empty when it is over.
     home
@@ -106,11 +106,10 @@ class Flow:
     token: int = 0
     countdown_s: float = COUNTDOWN_S
     left_s: float = 0.0
-    blind: bool = False
-    shown: bool = True
     logged: bool = True
     verdict: str = ""
     reasons: tuple[str, ...] = ()
+    judged: tuple[str, tuple[str, ...]] = ("", ())
     trouble: str = ""
     home: Stage = Stage.PREPARE
     not_armed: int = 0
@@ -152,14 +151,24 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return replace(flow.to(Stage.PROTOCOL), job=None, row=()), ()
         case Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
             return replace(flow, job=job).to(Stage.JUDGING), (Judge(job),)
-        case Again(job) if flow.stage in {*_IDLE, *_VERDICT} and flow.shown:
+        case Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
             return _onward(flow, job)
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
-            return _relogged(flow, "rejected", (cause.strip(),), shown=True)
+            if flow.verdict != "rejected":
+                flow = replace(flow, judged=(flow.verdict, flow.reasons))
+            return _relogged(flow, "rejected", (cause.strip(), *_notes(flow)))
+        case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
+            verdict, reasons = flow.judged
+            later = [note for note in _notes(flow) if note not in reasons]
+            return _relogged(flow, verdict, (*reasons, *later))
         case Note(text) if flow.stage is Stage.RESULT and text.strip():
-            noted = (*flow.reasons, f"note: {text.strip()}")
-            return _relogged(flow, flow.verdict, noted, shown=flow.shown)
+            noted = (*flow.reasons, f"{_NOTE}{text.strip()}")
+            return _relogged(flow, flow.verdict, noted)
     return flow, ()
+
+
+def _notes(flow: Flow) -> tuple[str, ...]:
+    return tuple(reason for reason in flow.reasons if reason.startswith(_NOTE))
 
 
 def _stopped(flow: Flow) -> Outcome:
@@ -172,7 +181,10 @@ def _stopped(flow: Flow) -> Outcome:
 
 
 def _lost(flow: Flow, trouble: str) -> Outcome:
-    if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
+    if flow.stage in BEFORE_RELEASE:
+        # Where it is only late, it must not go on with what was armed.
+        return flow.to(flow.home, trouble), (Stop(trouble.partition("\n")[0]),)
+    if flow.stage in {Stage.LIVE, Stage.JUDGING}:
         # A chain that fell is recorded by the daemon, and found when it is back.
         return flow.to(flow.home, trouble), ()
     return flow, ()
@@ -246,7 +258,7 @@ def _judged(flow: Flow, event: Judged) -> Outcome:
         return flow, ()
     job, verdict, reasons = flow.job, event.verdict, event.reasons
     assert job is not None
-    flow = replace(flow, verdict=verdict, reasons=reasons, shown=not flow.blind, logged=False)
+    flow = replace(flow, verdict=verdict, reasons=reasons, logged=False)
     before = flow.row if event.row is None else event.row
     row = after(before, job, verdict, reasons)
     return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
@@ -255,8 +267,6 @@ def _judged(flow: Flow, event: Judged) -> Outcome:
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
         return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (Wait(settle_s),)
-    if flow.stage is Stage.RESULT and not flow.shown:
-        return replace(flow, shown=True), ()  # blind, and nothing against it
     if flow.stage is Stage.RESULT and not flow.logged:
         return flow, ()  # what comes next depends on it
     if flow.stage is Stage.HALTED and flow.job is not None:
@@ -276,11 +286,11 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _relogged(flow: Flow, state: str, reasons: tuple[str, ...], *, shown: bool) -> Outcome:
+def _relogged(flow: Flow, state: str, reasons: tuple[str, ...]) -> Outcome:
     """Log the drop once more."""
     job = flow.job
     assert job is not None
-    flow = replace(flow, verdict=state, reasons=reasons, shown=shown, logged=False)
+    flow = replace(flow, verdict=state, reasons=reasons, logged=False)
     row = after(flow.row, job, state, reasons)
     flow = replace(flow, ticket=flow.ticket + 1, trouble="", row=row)
     return flow, (Log(job, state, reasons),)

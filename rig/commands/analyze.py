@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.commands.output import print_results, progress
 from rig.errors import SessionError
 from rig.report.columns import aligned
-from rig.report.parts import effects_parts, scatter_part
+from rig.report.parts import effects_parts, prior_part, scatter_part
 from rig.results import keep, results
 from rig.session.store import Session
 
@@ -30,16 +30,21 @@ def main(arguments: Namespace) -> int:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - likewise
 
         more["monte_carlo"] = session_trials(found.analysis, arguments.session_trials)
+    if arguments.priors:
+        from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - likewise
+
+        more["prior_sensitivity"] = prior_sensitivity(found.analysis)
     # A session that is being written, or on a read-only disk, is analysed all the same.
     with suppress(SessionError), Session.open(arguments.session) as session:
         if session.extent() == extent:  # else it went on meanwhile, and these are out of date
             keep(session, found)
     code = print_results(found, as_json=arguments.json, more=more)
     if not arguments.json:
-        scatter = [scatter_part(found.analysis.summary)] if arguments.scatter else []
-        for part in (*scatter, *effects_parts(found.analysis.effects)):
+        asked = [scatter_part(found.analysis.summary)] if arguments.scatter else []
+        asked += [prior_part(more["prior_sensitivity"])] if arguments.priors else []
+        for part in (*asked, *effects_parts(found.analysis.effects)):
             print("\n".join(["", part.heading, *aligned(part.columns, part.records)]))
-        if more:
+        if "monte_carlo" in more:
             from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise
 
             print("\n".join(["", *trials_lines(more["monte_carlo"])]))

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.figures import layouts_figure
-from rig.bench.layout_catalogue import LAYOUTS
+from rig.bench.layout_catalogue import LAYOUTS, chosen
 from rig.bench.layouts import DISTURBANCES, DROPS, as_json, study
-from rig.commands.output import print_json, say
-from rig.errors import InputError
-from rig.files import make_folder, write_atomic
+from rig.commands.output import leave_study, say
+from rig.files import make_folder
 from rig.measurands import MEASURANDS
 from rig.report.columns import Column, filled
 from rig.text_table import csv_text, text_table
@@ -23,28 +21,29 @@ if TYPE_CHECKING:
     Record = Mapping[str, Any]
 
 _SHOWN_REASONS = 8
+_HEAD = """\
+# On which layouts of gates drops are read
+
+Written by `rig bench layouts`: falls of the simulated rig without disturbances, with
+the default ones, and with all of them doubled. Every drop is on a rig of its own and
+judged against the hidden truth; drops that truly miss more edges than the protocol
+accepts are left out. Every number is in `layouts.csv` and `layouts.json`.
+
+![Map of layouts](layouts.svg)"""
 
 
 def main(arguments: Namespace) -> int:
     """Drop chains on every layout; keep table, picture and page, and print the table."""
-    wanted = arguments.only or ""
-    chosen = [one for one in LAYOUTS if wanted in f"{one.kind.name}: {one.gates}"]
-    if not chosen:
-        names = ", ".join(dict.fromkeys(f"{one.kind.name}: {one.gates}" for one in LAYOUTS))
-        raise InputError(f"no layout has {wanted!r} in its name", f"there are {names}")
+    layouts = chosen(LAYOUTS, arguments.only)
     folder = make_folder(arguments.output)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
-    found = study(chosen, arguments.drops or DROPS, arguments.jobs, say)
+    found = study(layouts, arguments.drops or DROPS, arguments.jobs, say)
     whole = as_json(found)
-    lines = _lines(whole)
-    write_atomic(folder / "layouts.json", json.dumps(whole, indent=2, ensure_ascii=False) + "\n")
-    write_atomic(folder / "layouts.csv", _csv(whole["layouts"]))
-    write_atomic(folder / "layouts.svg", layouts_figure(whole["layouts"]))
-    write_atomic(folder / "layouts.md", _page(lines))
-    if arguments.json:
-        print_json(whole)
-    else:
-        print("\n".join(["SIMULATED DATA", *lines]))
+    cells = whole["layouts"]
+    leave_study(
+        folder, "layouts", _HEAD, _lines(whole), whole, _csv(cells), layouts_figure(cells),
+        as_json=arguments.json,
+    )  # fmt: skip
     return 0
 
 
@@ -78,27 +77,6 @@ def _table(columns: Sequence[Column[Record]], records: Sequence[Record]) -> list
     kept, rows = filled(columns, records)
     words = {n for n, column in enumerate(kept) if not column.numeric}
     return text_table([[column.heading for column in kept], *rows], left=words, rule=True)
-
-
-def _page(lines: Sequence[str]) -> str:
-    """The same as a page, with the picture."""
-    return "\n".join(
-        [
-            "# On which layouts of gates drops are read",
-            "",
-            "Written by `rig bench layouts`: falls of the simulated rig without disturbances, with",
-            "the default ones, and with all of them doubled. Every drop is on a rig of its own and",
-            "judged against the hidden truth; drops that truly miss more edges than the protocol",
-            "accepts are left out. Every number is in `layouts.csv` and `layouts.json`.",
-            "",
-            "![Map of layouts](layouts.svg)",
-            "",
-            "```text",
-            *lines,
-            "```",
-            "",
-        ]
-    )
 
 
 def _each(text: Callable[[Record], str]) -> Callable[[Record], str]:

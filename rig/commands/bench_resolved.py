@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import film_figure, resolved_figure, work_figure
-from rig.bench.resolved import CASES, DROPS, as_json, film, study, work
-from rig.commands.output import print_json, say
+from rig.bench.figures import resolved_figure, work_figure
+from rig.bench.resolved import CASES, DROPS, as_json, film, published, study, work
+from rig.commands.output import leave_study, print_json, say
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
 from rig.measurands import told
+from rig.report.film import film_figure
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
@@ -24,12 +24,23 @@ if TYPE_CHECKING:
 _SHOWN_REASONS = 16
 _TOLD = ("separation_m", "separation_strike_m", "speed_m_s", "speed_strike_m_s", "release_skew_s",
          "contact_height_m", "turning_rad_s", "slack")  # fmt: skip
+_HEAD = """\
+# Sessions that no model made
+
+Written by `rig bench resolved`: chains of rigid rods fall in the resolved world, one
+rig a case, and the analysis reads them without knowing. Void shares are of the drops
+that are within the limit of skew; errors and 95 % intervals are those of drops that
+were not void, against the hidden truth. Every drop is in `resolved.csv`.
+
+![Errors against inclination](resolved.svg)"""
 
 
 def main(arguments: Namespace) -> int:
     """Read sessions of the resolved world; keep table, picture and page, and print the table."""
     if arguments.work:
         return _work(arguments)
+    if arguments.published:
+        return _published(arguments)
     if arguments.film is not None:
         folder = make_folder(arguments.output)
         drawn = film_figure(film(arguments.protocols, arguments.film))
@@ -44,15 +55,10 @@ def main(arguments: Namespace) -> int:
     folder = make_folder(arguments.output)
     found = study(arguments.protocols, arguments.drops or DROPS, chosen, say)
     whole = as_json(found)
-    lines = _lines(whole)
-    write_atomic(folder / "resolved.json", json.dumps(whole, indent=2, ensure_ascii=False) + "\n")
-    write_atomic(folder / "resolved.csv", _csv(found))
-    write_atomic(folder / "resolved.svg", resolved_figure(found))
-    write_atomic(folder / "resolved.md", _page(lines))
-    if arguments.json:
-        print_json(whole)
-    else:
-        print("\n".join(["SIMULATED DATA", *lines]))
+    leave_study(
+        folder, "resolved", _HEAD, _lines(whole), whole, _csv(found), resolved_figure(found),
+        as_json=arguments.json,
+    )  # fmt: skip
     return 0
 
 
@@ -68,10 +74,29 @@ def _work(arguments: Namespace) -> int:
     rows = [["", "step (µs)", "touch (ms)", "rms error of Δz (mm)", "worst", "time a fall (s)"]]
     rows += [
         [one["changed"], f"{1e6 * one['step_s']:g}", f"{1e3 * one['touch_s']:g}",
-         f"{1e3 * one['rms_m']:.4f}", f"{1e3 * one['worst_m']:.4f}", f"{one['cpu_s']:.2f}"]
+         *("–" if one[name] is None else f"{1e3 * one[name]:.4f}" for name in ("rms_m", "worst_m")),
+         f"{one['cpu_s']:.3g}"]
         for one in lines
     ]  # fmt: skip
     print("\n".join(text_table(rows, left={0}, rule=True)))
+    return 0
+
+
+def _published(arguments: Namespace) -> int:
+    """Keep and print how chains of other experiments fall."""
+    folder = make_folder(arguments.output)
+    lines = published()
+    write_atomic(folder / "resolved-published.csv", csv_text(lines[0], lines))
+    if arguments.json:
+        print_json({"results": lines})
+        return 0
+    rows = [["", "of", "mean", "sd", "falls"]]
+    rows += [
+        [one["what"], one["of"], f"{one['mean']:.4f}",
+         "–" if one["sd"] is None else f"{one['sd']:.4f}", str(one["n"])]
+        for one in lines
+    ]  # fmt: skip
+    print("\n".join(["SIMULATED DATA", *text_table(rows, left={0, 1}, rule=True)]))
     return 0
 
 
@@ -134,24 +159,3 @@ def _table(records: Sequence[Record], name: Any) -> list[str]:
             )
         rows.append(cells)
     return text_table(rows, left={0}, rule=True)
-
-
-def _page(lines: Sequence[str]) -> str:
-    """The same as a page, with the picture."""
-    return "\n".join(
-        [
-            "# Sessions that no model made",
-            "",
-            "Written by `rig bench resolved`: chains of rigid rods fall in the resolved world, one",
-            "rig a case, and the analysis reads them without knowing. Void shares are of the drops",
-            "that are within the limit of skew; errors and 95 % intervals are those of drops that",
-            "were not void, against the hidden truth. Every drop is in `resolved.csv`.",
-            "",
-            "![Errors against inclination](resolved.svg)",
-            "",
-            "```text",
-            *lines,
-            "```",
-            "",
-        ]
-    )

@@ -13,7 +13,7 @@ from rig.analysis.result import Measured
 from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.protocol.plan import runs
-from rig.results import calibration, kept, protocol_of, results
+from rig.results import calibration, check_open, kept, protocol_of, results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
     if drop is None:
         raise InputError(f"run {number} has no drop in this session")
     protocol = protocol_of(session)
+    check_open(session, protocol)
     planned = next(run for run in runs(protocol) if run.number == number)
     alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
@@ -121,6 +122,7 @@ def _table(found: Mapping[str, Any]) -> list[str]:
             f"  by itself u = {alone['u']:.2g}; by {drawn['trials']} trials (seed "
             f"{drawn['seed']}) {trial['u']:.2g}, 95 % in {trial['low']:.6g} … {trial['high']:.6g}: "
             + ("both agree" if trial["agrees"] else "they do not agree")
+            + ("" if trial["decided"] else ", but of so few trials that is chance")
         )
     return lines
 
@@ -137,8 +139,8 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
     -------
     dict
         ``{"trials", "seed", "runs": [{"run", "attempt", "quantities": {name: {"mean", "u", "low",
-        "high", "d_low", "d_high", "tolerance", "agrees", "u_ratio"}}}]}``; `u_ratio` is the trials'
-        u over the budget's.
+        "high", "d_low", "d_high", "tolerance", "error", "agrees", "decided", "u_ratio"}}}]}``;
+        `u_ratio` is the trials' u over the budget's.
 
     Raises
     ------
@@ -178,5 +180,7 @@ def trials_lines(found: Mapping[str, Any]) -> Iterator[str]:
     for name in names:
         ones = [run["quantities"][name] for run in found["runs"]]
         agree = sum(one["agrees"] for one in ones)
+        chance = sum(not one["decided"] for one in ones)
         ratio = fmean(one["u_ratio"] for one in ones)
-        yield f"  {name:<18} u by trials / u by budget {ratio:.3f}, {agree} of {len(ones)} agree"
+        said = f"{agree} of {len(ones)} agree, {chance} undecided"
+        yield f"  {name:<18} u by trials / u by budget {ratio:.3f}, {said}"

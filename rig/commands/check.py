@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.boards import BOARDS
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.measurable import unmeasurable
+from rig.protocol.measurable import check_recordable, unmeasurable
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Describe a protocol."""
     protocol = reader.read(arguments.protocol)
+    if arguments.board:
+        check_recordable(protocol, BOARDS[arguments.board])
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
     return 0
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.components import STATED
+from rig.analysis.components import stated
 from rig.commands.output import print_json, say
 from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import forecast
@@ -40,7 +40,7 @@ def main(arguments: Namespace) -> int:
     there = beams_of(protocol)
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
-    components = STATED if arguments.learned is None else _learned(arguments.learned)
+    components = stated(protocol) if arguments.learned is None else _learned(arguments.learned)
     limits = room(
         protocol,
         _length("--lowest", arguments.lowest),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rig.analysis.likeness import likeness
 from rig.commands.output import print_json, progress, say
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
@@ -20,12 +21,17 @@ def main(arguments: Namespace) -> int:
     """Estimate the parameters of the impacts from a session."""
     with Session.open(arguments.session, readonly=True) as session:
         analysis, _ = detailed(session, progress("analysing run"))
-        found = {"simulated": session.simulated}
+        found: dict[str, Any] = {"simulated": session.simulated}
         found |= estimate(protocol_of(session), analysis)
+    like = None if analysis.joint is None else likeness(analysis.joint)
+    if like is not None:
+        found["likeness"] = like.json()
     sections = Sections()
     if arguments.json:
         print_json(found)
     else:
+        if like is not None and not like.like:
+            print(like.sentence)
         print(estimate_text(found, sections))
     if arguments.output is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here

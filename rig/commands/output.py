@@ -8,8 +8,11 @@ from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from rig.files import write_atomic
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
     from rig.results import SessionResults
 
@@ -31,6 +34,34 @@ def progress(what: str) -> Callable[[int, int], None]:
             print(f"\r{what} {done}/{of}", end=end, file=sys.stderr, flush=True)
 
     return show
+
+
+def leave_study(
+    folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
+    table: str, picture: str | None = None, *, as_json: bool,
+) -> None:  # fmt: skip
+    """Keep a study of simulated drops, and print it.
+
+    Parameters
+    ----------
+    folder, name
+        Where its files go, and how they begin: .json, .csv, .svg and .md.
+    head, lines
+        Of its page: what stands above, in Markdown, and its tables as text.
+    whole, table, picture
+        All that was found; every line of it as CSV; as SVG, where there is a picture.
+    as_json
+        Print the first and not the lines.
+    """
+    page = "\n".join([head, "", "```text", *lines, "```", ""])
+    json_text = json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
+    for kind, text in {"json": json_text, "csv": table, "svg": picture, "md": page}.items():
+        if text is not None:
+            write_atomic(folder / f"{name}.{kind}", text)
+    if as_json:
+        print_json(whole)
+    else:
+        print("\n".join(["SIMULATED DATA", *lines]))
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -64,6 +95,8 @@ def print_results(
     else:
         if found.simulated:
             print("SIMULATED DATA")
+        if found.blind:
+            print("BLIND: what was measured is kept back until rig unblind SESSION")
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
         from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 

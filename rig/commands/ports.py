@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -29,6 +30,9 @@ def main(arguments: Namespace) -> int:
         return 0
     for port in _all(ports, asked):
         print(_line(port, asked.get(port.path)))
+    ids = Counter(who["identity"]["unique_id"] for who in asked.values() if who["identity"])
+    for shared in (one for one, count in ids.items() if count > 1):
+        say(f"several boards have the id {shared}: erase the EEPROM of all but one")
     if not any(port.candidate for port in ports):
         say("no board found: is its cable plugged in, and one that carries data?")
     return 0

@@ -10,6 +10,7 @@ from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
+from rig.films import read_films
 from rig.report.estimate import page_parts
 from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
@@ -43,6 +44,7 @@ def main(arguments: Namespace) -> int:
             skew_limit_s=protocol.accept.release_skew,
             site_m_s2=protocol.gravity.value,
             bars=arguments.bars,
+            films=read_films(session.path) if session.simulated else None,
             sections=sections,
         )
         effects = found.analysis.effects

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from typing import TYPE_CHECKING, Any, Self
 
 from rig.daemon import rpc
@@ -11,12 +12,36 @@ from rig.daemon.socket_path import reach
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import Callable
     from pathlib import Path
 
 
 _CHUNK = 1 << 16
 _HUNG_UP = "it hung up"
+
+
+async def _reached(path: Path) -> tuple[socket.socket, str]:
+    """Connect in a thread; who is cancelled meanwhile leaves no open socket behind."""
+    given_up = threading.Event()
+    found: list[tuple[socket.socket, str]] = []
+
+    def hang_up() -> None:
+        for line, _ in found:
+            line.close()
+
+    def connect() -> tuple[socket.socket, str]:
+        found.append(reach(path))
+        if given_up.is_set():
+            hang_up()
+        return found[0]
+
+    try:
+        return await asyncio.to_thread(connect)
+    except asyncio.CancelledError:
+        given_up.set()
+        hang_up()
+        raise
 
 
 class AsyncClient:
@@ -64,7 +89,7 @@ class AsyncClient:
         VersionError
             It speaks another version.
         """
-        line, token = await asyncio.to_thread(reach, path)
+        line, token = await _reached(path)
         line.setblocking(False)
         client = cls(*await asyncio.open_connection(sock=line))
         try:
@@ -94,10 +119,6 @@ class AsyncClient:
         """Follow the state."""
         # The answer is taken in `_listen`: changes may be in the same packet behind it.
         await self.call("subscribe")
-
-    def renew(self) -> None:
-        """Give a sign of life: every half second while in control."""
-        self._writer.write(rpc.request("renew", {}, None))
 
     async def close(self) -> None:
         """Hang up."""

@@ -46,7 +46,7 @@ class Connection:
         self._writer = writer
         self._do = do
         self._heard = heard
-        self._stops: set[asyncio.Task[None]] = set()
+        self._urgent: set[asyncio.Task[None]] = set()
 
     def send(self, line: bytes) -> None:
         """Send one message, some time."""
@@ -75,7 +75,7 @@ class Connection:
             pass  # gone, or a line without an end
         finally:
             answering.cancel()
-            for task in self._stops:
+            for task in self._urgent:
                 task.cancel()
 
     async def _read(self, lines: asyncio.Queue[rpc.Request | rpc.RpcError]) -> None:
@@ -86,11 +86,13 @@ class Connection:
             except rpc.RpcError as error:
                 await lines.put(error)
                 continue
-            if request.method == "stop" and self.name and len(self._stops) < 8:
+            if request.method == "renew" and request.id is None:
+                continue
+            if request.method in {"stop", "renew"} and self.name and len(self._urgent) < 8:
                 task = asyncio.get_running_loop().create_task(self._answer(request))
-                self._stops.add(task)
-                task.add_done_callback(self._stops.discard)
-            elif request.method != "renew" or request.id is not None:
+                self._urgent.add(task)
+                task.add_done_callback(self._urgent.discard)
+            else:
                 await lines.put(request)
 
     async def _answer_all(self, lines: asyncio.Queue[rpc.Request | rpc.RpcError]) -> None:

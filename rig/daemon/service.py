@@ -66,6 +66,7 @@ class Service:
             "collect": self._collect,
             "test_release": self._test_release,
             "log_state": self._log_state,
+            "unblind": self._unblind,
         }
 
     async def do(self, client: Connection, request: rpc.Request) -> Any:
@@ -143,7 +144,7 @@ class Service:
         return {}
 
     async def _renew(self, _who: Connection, /) -> dict[str, Any]:
-        return {}  # every line is a sign of life
+        return {"disk_s": self._worker.disk_s()}  # every line is a sign of life
 
     async def _stop(self, who: Connection, /, reason: object = "") -> dict[str, Any]:
         said = _text(reason, "reason")[:200] or f"stopped by {who.name}"
@@ -201,6 +202,9 @@ class Service:
         except ValueError:
             raise rpc.RpcError(rpc.BAD_PARAMS, f"state: {state} is none") from None
         return await self._ask(who, lambda controller: controller.log_state(*which, new, why))
+
+    async def _unblind(self, who: Connection, /) -> dict[str, Any]:
+        return await self._ask(who, lambda controller: controller.unblind())
 
     async def _ask(
         self, who: Connection, work: Callable[[Controller], Any], *, writes: bool = True

@@ -124,6 +124,12 @@ class Worker:
         """Note that the client in control is gone: look at once whether a drop is armed."""
         self._jobs.put(None)
 
+    def disk_s(self) -> float:
+        """How long the disk has been at the write under way, s; 0 for none."""
+        with suppress(SessionError):
+            return self.controller.session.write_s
+        return 0.0
+
     def at_rest(self) -> Future[bool]:
         """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
         outcome: Future[bool] = Future()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.chain_records import chain_records
-from rig.analysis.drop_model import DropModel
+from rig.analysis.drop_model import DropModel, prior_air
 from rig.analysis.pattern import Guess
 from rig.analysis.quantities import measurands
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
@@ -17,7 +17,7 @@ from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.model.rods import rod_impacts
 from rig.protocol.plan import runs
-from rig.protocol.protocol import Gate, Gates, Run
+from rig.protocol.protocol import Gate, Run
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -130,7 +130,7 @@ def with_beams(protocol: Protocol, beams: Sequence[tuple[Role, float]]) -> Proto
     """The protocol with these beams instead of its own."""
     assert protocol.gates is not None
     gates = tuple(Gate(n, height, side) for n, (side, height) in enumerate(beams))
-    return replace(protocol, gates=Gates(gates, protocol.gates.height_u))
+    return replace(protocol, gates=replace(protocol.gates, gates=gates))
 
 
 @one_thread
@@ -189,14 +189,17 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
     """
     found = []
     start, gravity = protocol.drop.value - lower, protocol.gravity.value
+    kappa = prior_air(protocol)[0]
     for record in chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
-        path, alphas = free_trajectory(RELEASE_S, start, gravity), np.zeros(0)
+        path, alphas = free_trajectory(RELEASE_S, start, gravity, kappa, record.air), np.zeros(0)
         if record.ratios is not None:
             assert protocol.surface is not None
             impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
             alphas = np.array([one.alpha for one in impacts])
             places = np.array(record.chain.chain.heights)
-            path = struck_trajectory(RELEASE_S, start, gravity, alphas, record.ratios, places)
+            path = struck_trajectory(
+                RELEASE_S, start, gravity, alphas, record.ratios, places, kappa, record.air
+            )
         trains = tuple(_seen(train, path.times(train.levels)) for train in record.trains)
         found.append((replace(record, trains=trains), alphas))
     return found

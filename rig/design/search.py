@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import STATED
+from rig.analysis.components import stated
 from rig.analysis.identify import identify
 from rig.analysis.verdict import LEAD
 from rig.design.cases import CLOCK_U, cases, perfect, with_beams
@@ -200,7 +200,7 @@ def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
     for incline in {min(ends), max(ends)}:
         for off in (-_OFF, _OFF):
             records = [one for one, _ in perfect(protocol, ends[incline], off * protocol.drop.u)]
-            found = identify(protocol, records, CLOCK_U, STATED)
+            found = identify(protocol, records, CLOCK_U, stated(protocol))
             all_seen: dict[str, list[Index]] = {
                 one.role: [np.arange(train.rods.size) for train in one.trains] for one in records
             }

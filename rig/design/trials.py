@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.chain_records import chain_records
-from rig.analysis.components import STATED
+from rig.analysis.components import above, stated
 from rig.analysis.deciding import deciding_gate
+from rig.analysis.drop_model import prior_air
 from rig.analysis.identify import MISSED, identify
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.verdict import pattern_faults
@@ -80,7 +81,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     for run in islice(cycle(kinds.values()), drops):
         start = protocol.drop.value + protocol.drop.u * rng.standard_normal()
         fallen = [_fallen(protocol, one, run, start, rng) for one in _blank(protocol, run)]
-        found = identify(protocol, [one for one, _ in fallen], CLOCK_U, STATED, _WINDOW)
+        found = identify(protocol, [one for one, _ in fallen], CLOCK_U, stated(protocol), _WINDOW)
         wrong = misread(found, {record.role: truth for record, truth in fallen})
         if not wrong:
             read += 1
@@ -104,12 +105,14 @@ def _fallen(
     rods = chain.position_u * rng.standard_normal(chain.chain.rods)
     wider = chain.width_u * rng.standard_normal()
     path = _path(protocol, record, run, start, rods, rng)
+    datum = protocol.gates.datum_u * rng.standard_normal()
     trains, truth = [], []
     for train in record.trains:
-        levels = train.levels + protocol.gates.height_u * rng.standard_normal() - rods[train.rods]
+        beam = datum + protocol.gates.height_u * rng.standard_normal()
+        levels = train.levels + beam - rods[train.rods]
         levels -= np.where(train.blocks, -0.5, 0.5) * wider
         seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
-        times = path.times(levels[seen]) + STATED.jitter * rng.standard_normal(seen.size)
+        times = path.times(levels[seen]) + protocol.priors.jitter * rng.standard_normal(seen.size)
         order = np.argsort(times, kind="stable")
         seen = seen[order]
         edges = np.full(levels.size, -1)
@@ -130,17 +133,20 @@ def _path(
     rng: np.random.Generator,
 ) -> Trajectory:
     """Where a chain is that hangs and is let go a little off, with impulses that scatter."""
-    start += STATED.hang * rng.standard_normal()
+    start += protocol.priors.hang * rng.standard_normal()
     release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
-    gravity = protocol.gravity.value
+    gravity, kappa = protocol.gravity.value, prior_air(protocol)[0]
     if record.ratios is None:
-        return free_trajectory(release, start, gravity)
+        return free_trajectory(release, start, gravity, kappa, record.air)
     assert protocol.surface is not None
     impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
     alphas = np.array([one.alpha for one in impacts])
-    alphas += STATED.impulses(float(alphas.mean())) * rng.standard_normal(alphas.size)
+    scatter = stated(protocol).impulses(float(alphas.mean()), above(alphas.size))
+    alphas += scatter * rng.standard_normal(alphas.size)
     places = np.array(record.chain.chain.heights) + rods
-    return struck_trajectory(release, start, gravity, alphas, record.ratios, places)
+    return struck_trajectory(
+        release, start, gravity, alphas, record.ratios, places, kappa, record.air
+    )
 
 
 def misread(found: Identification, truth: Mapping[str, Sequence[Index]]) -> list[str]:

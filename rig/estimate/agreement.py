@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.distributions import chi2_tail, coverage_factor
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, normalized_error
 from rig.analysis.summary import by_case, mean
 from rig.measurands import averaged
-from rig.predictions import predicted_run
+from rig.predictions import predicted_parts, predicted_run
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -76,8 +76,11 @@ def _compared(
     off = np.array([one.value for one in means]) - predicted
     chi2 = float(off @ np.linalg.solve(covariance, off))
     u = np.sqrt(np.diag(covariance))
-    models = known * np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
-    widths = [np.hypot(one.expanded, model) for one, model in zip(means, models, strict=True)]
+    models = np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
+    errors = [
+        normalized_error(one, Quantity(*model), predicted_parts(protocol, runs[0].run).get(name))
+        for one, model, runs in zip(means, zip(predicted, models, strict=True), cases, strict=True)
+    ]
     return {
         "quantity": name,
         "chi2": chi2,
@@ -89,7 +92,7 @@ def _compared(
                 "n": len(runs),
                 "difference": float(off[n]),
                 "u": float(u[n]),
-                "normalized_error": float(off[n] / widths[n]),
+                "normalized_error": errors[n],
                 "chi2": float((off[n] / u[n]) ** 2),
                 "p": chi2_tail(float((off[n] / u[n]) ** 2), 1),
             }

@@ -75,17 +75,26 @@ def _squares(model: DropModel, x: Array, heights: Array) -> Array:
     """V² of the impact chain when its top rod is at a height."""
     path = model.trajectory("impact", x)
     level = heights - _places(model, x, "impact")[-1]
+    level -= _alone(model, x, level)
     leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
-    return squared_after(path.height[leg] - level, path.speed[leg], path.gravity, path.kappa)
+    return squared_after(path.height[leg] - level, path.speed[leg], path.gravity, path.kappas(leg))
 
 
 def _separations(model: DropModel, x: Array, times: Array) -> Array:
     """How far the free chain's top rod is above the other's, each so long after its release."""
     struck, free = model.trajectory("impact", x), model.trajectory("free", x)
+    level = struck.heights(struck.time[0] + times)[0]
     apart = _places(model, x, "free")[-1] - _places(model, x, "impact")[-1]
-    found: Array = (
-        free.heights(free.time[0] + times)[0] - struck.heights(struck.time[0] + times)[0] + apart
-    )
+    apart = apart - _alone(model, x, level)
+    found: Array = free.heights(free.time[0] + times)[0] - level + apart
+    return found
+
+
+def _alone(model: DropModel, x: Array, level: Array) -> Array:
+    """How far the top rod is off its chain once it is all that falls, by the reference's height."""
+    rods = model.records["impact"].chain.chain.rods
+    last = level < model.trajectory("impact", x).height[rods - 1]
+    found: Array = np.where(last, x[model.unknowns["top"]], 0.0)
     return found
 
 

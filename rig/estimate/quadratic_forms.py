@@ -53,8 +53,6 @@ class QuadraticForm:
     matrix, vector, constant
         M, v and c, n = shared + rods + `EXTRA` of them. Shared unknowns are in units of their prior
         uncertainties, the others in SI.
-    scatter
-        Standard deviation of single impulses' α about their mean.
     alphas
         α of each rod at which the form was made.
     arrivals
@@ -70,7 +68,6 @@ class QuadraticForm:
     matrix: Array
     vector: Array
     constant: float
-    scatter: float
     alphas: Array
     arrivals: Array
     edges: int
@@ -119,7 +116,6 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
         normal[np.ix_(kept, kept)] * np.outer(scale[kept], scale[kept]) - cross.T @ gain[:, :-1],
         vector[kept] * scale[kept] - cross.T @ gain[:, -1],
         constant - float(vector[own] * sd[own] @ gain[:, -1]),
-        float(at.sd[impulses[0]]),  # one prior for all of them
         alphas,
         path.speed[1:] / (1.0 + alphas * record.ratios),
         edges,
@@ -139,15 +135,16 @@ def _normal(
     point = np.concatenate([x, np.zeros(len(EXTRA))])
     point[at["impulses"]], point[at["alpha"]] = alphas, 0.0
     if "drag" in at:  # κ stands behind the rods here, free of what is known of it beforehand
-        point[-1], point[at["drag"]] = x[at["drag"]][0], 0.0
+        point[-1], point[at["drag"]] = model.kappa(x), 0.0
     matrix, vector, constant, edges = np.zeros((size, size)), np.zeros(size), 0.0, 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
         expected = model.expected[role]
         times = expected.times[expected.chosen(matches)[1]] * (1.0 + x[at["clock"]])
-        extra = _extra(model, role, model.trajectory(role, x), times)
+        extra = np.column_stack(_extra(model, role, model.trajectory(role, x), times))
+        extra[1:] -= rows.told[1:, None] * extra[:-1]
         place = np.append(rows.columns, np.arange(len(at), size))
-        slopes = np.column_stack([rows.slopes, *extra])
+        slopes = np.column_stack([rows.slopes, extra])
         if "drag" in at:
             slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
         sigma = rows.residuals.sigma * inflation

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.distributions import chi2_tail
-from rig.analysis.result import Measured
+from rig.analysis.result import Measured, normalized_error
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
 from rig.estimate.hypothesis_fit import fit
+from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -100,7 +101,7 @@ def _group(span: tuple[int, int], gains: Array, covariance: Array, model: Array)
         "rods": [*span],
         "gain_m_s": measured.json(),
         "eq9_m_s": predicted,
-        "normalized_error": (measured.value - predicted) / measured.expanded,
+        "normalized_error": normalized_error(measured, Quantity(predicted)),
     }
 
 

@@ -6,7 +6,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from rig.boards import GATES
-from rig.link.messages import EVENTS_PER_FRAME, unpack_label
+from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, PulseEnd, unpack_label
 from rig.link.wiretypes import EVENTS
 from rig.records import Certificate, Drop, Edge
 
@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 
 ALL_GATES = (1 << GATES) - 1
 _WRAP = 1 << 32
+_CUT = {
+    PulseEnd.STOPPED: "the emergency stop was opened",
+    PulseEnd.ABORTED: "it was aborted",
+    PulseEnd.DEVICE: "the device found its release out of order and switched it off",
+}
 _HALF = _WRAP // 2
 
 
@@ -187,12 +192,19 @@ class Assembly:
             faults.append("the events do not match the certificate's CRC-32")
         if seen.overflows:
             faults.append(f"{seen.overflows} events lost: the device's memory was full")
+        if isinstance(seen, DropCertificate2) and seen.pulse_end in _CUT and tick_hz:
+            lasted = f"{1e3 * seen.pulse_ticks / tick_hz:.3g} ms"
+            faults.append(f"the release pulse was cut after {lasted}: {_CUT[seen.pulse_end]}")
         return tuple(faults)
 
 
 def _account(seen: DropCertificate) -> Certificate:
     sense = ticks_since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
-    return Certificate(seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
+    counts = (seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
+    if not isinstance(seen, DropCertificate2):
+        return Certificate(*counts)
+    supply = (seen.supply_mv, seen.lowest_mv)
+    return Certificate(*counts, seen.pulse_ticks, seen.pulse_end, seen.restarts, *supply)
 
 
 def edges(

@@ -41,7 +41,7 @@ def header() -> str:
         _define("FRAME_LIMIT", frames.FRAME_LIMIT),
         _define("HOST_SILENCE_MS", wire.HOST_SILENCE_MS),
     ]
-    for values in (wire.Phase, wire.Reason, wire.DisarmReason):
+    for values in (wire.Phase, wire.Reason, wire.DisarmReason, wire.PulseEnd):
         lines += ["", *_enum(values)]
     for code, message in wire.TABLE.items():
         lines += ["", *_message(code, message.__name__, wire.FIELDS[message])]

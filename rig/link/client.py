@@ -25,12 +25,18 @@ if TYPE_CHECKING:
 
 BOOT_WAIT_S = 2.0
 """The Mega's boot loader listens this long before it starts the firmware."""
+LOADER_WAIT_S = 6.0
+"""A boot loader that has heard anything waits 5 s for more, and each byte more holds it again."""
 _LATE_S = 0.25  # how much later than announced a certificate may come before the host asks
 _SMALLEST_READ = 4
 _FIRE_WAIT_S = 0.05
 """Two FIREs may be lost before an armed device takes the host for gone."""
 _ABORT_WAIT_S = 0.03
 """Five ABORTs leave within the 250 ms after which everything shall be off."""
+
+
+def _is_boot(got: Received) -> bool:
+    return isinstance(got.message, wire.Boot)
 
 
 class Device:
@@ -107,10 +113,16 @@ class Device:
         """
         line = self._line
         line.expect_boot = True
+        line.fired_ns = None
         try:
             line.write(DELIMITER)  # ends whatever junk the line has seen so far
-            line.wait(boot_wait_s, lambda got: isinstance(got.message, wire.Boot))
-            identity = line.request(wire.Identify(), wire.Identity)
+            booted = line.wait(boot_wait_s, _is_boot)
+            try:
+                identity = line.request(wire.Identify(), wire.Identity)
+            except DeviceTimeoutError:
+                if booted is not None or line.wait(LOADER_WAIT_S, _is_boot) is None:
+                    raise
+                identity = line.request(wire.Identify(), wire.Identity)
         finally:
             line.expect_boot = False
         if identity.protocol_version != wire.PROTOCOL_VERSION:
@@ -208,11 +220,13 @@ class Device:
             was released.
         """
         try:
-            return self._line.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
+            tick = self._line.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
         except DeviceRefusedError as refused:
             if refused.reason is not wire.Reason.NOT_ARMED:
                 raise
             raise DeviceRefusedError(refused.reason, refused.detail, self._disarmed) from None
+        self._line.fired_ns = self._line.clock.now_ns()
+        return tick
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""
@@ -280,6 +294,7 @@ class Device:
                         "the device records and never ends", "abort the drop; rig selftest"
                     )
                 ask = now() + round(_LATE_S * 1e9)
+        self._line.fired_ns = None
         return self.fetch(label)
 
     def fetch(self, label: int) -> Drop:

@@ -53,6 +53,8 @@ class Exchange:
         How many were sent, and how often one was sent again.
     rx_bytes, tx_bytes
         How much went over the line.
+    fired_ns
+        When the drop that is being recorded was fired; `None` when none is.
     give_way
         Called all the time while an answer is waited for; what it raises ends the waiting.
     """
@@ -66,6 +68,7 @@ class Exchange:
         self.expect_boot = False
         self.requests = self.repeats = 0
         self.rx_bytes = self.tx_bytes = 0
+        self.fired_ns: int | None = None
         self.give_way: Callable[[], None] = lambda: None
         self._port = port
         self._tap = tap
@@ -178,12 +181,20 @@ class Exchange:
         records = self._take() if ended else []
         boots = (r for r in records if isinstance(r, Received) and isinstance(r.message, wire.Boot))
         if not self.expect_boot and any(boots):
-            raise DeviceError(
-                "the board restarted",
-                "check its power supply and the release's wiring (a coil without a diode resets "
-                "boards), then connect again",
-            )
+            raise self._restarted()
         return records
+
+    def _restarted(self) -> DeviceError:
+        wiring = "the release's wiring (a coil without a diode resets boards)"
+        if self.fired_ns is None:
+            hint = f"check its power supply and {wiring}, then connect again"
+            return DeviceError("the board restarted", hint)
+        back = (self.clock.now_ns() - self.fired_ns) * 1e-9
+        return DeviceError(
+            f"the board restarted in the drop: it is back {back:.2f} s after FIRE",
+            "is its supply shared with the magnets? Give them one of their own, and check "
+            f"{wiring}",
+        )
 
     def write(self, data: bytes) -> None:
         """Send bytes.

@@ -61,6 +61,7 @@ __all__ = [
     "Disarmed",
     "Done",
     "DropCertificate",
+    "DropCertificate2",
     "Event",
     "EventsFrame",
     "Fire",
@@ -73,6 +74,7 @@ __all__ = [
     "Phase",
     "Ping",
     "Pong",
+    "PulseEnd",
     "Read",
     "Reason",
     "Reference",
@@ -86,7 +88,7 @@ __all__ = [
     "unpack_label",
 ]
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
 """Six-byte events that fit behind an EVENTS frame's label and index."""
 HOST_SILENCE_MS = 250
@@ -129,6 +131,15 @@ class DisarmReason(IntEnum):
     TIMEOUT = 1
     HOST_SILENT = 2
     STOPPED = 3
+
+
+class PulseEnd(IntEnum):
+    """What ended the release's pulse."""
+
+    ORDERED = 0  # its own length, or the recording's end: as ARM said
+    STOPPED = 1
+    ABORTED = 2
+    DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,7 +316,7 @@ class EventsFrame:
 
 @dataclass(frozen=True, slots=True)
 class DropCertificate:
-    """The device's own account of a drop.
+    """The device's own account of a drop, as version 1 sent it.
 
     Attributes
     ----------
@@ -330,6 +341,29 @@ class DropCertificate:
     late: U16
     sensed: U8
     sense_tick: U32
+
+
+@dataclass(frozen=True, slots=True)
+class DropCertificate2(DropCertificate):
+    """The device's own account of a drop.
+
+    Attributes
+    ----------
+    pulse_ticks
+        How long the release was on; 0 without one.
+    pulse_end
+        What ended it.
+    restarts
+        0, or 128 and the cause of the latest restart since IDENTIFY.
+    supply_mv, lowest_mv
+        The board's supply at FIRE, and its lowest while recording; 0 where it is not measured.
+    """
+
+    pulse_ticks: U32
+    pulse_end: Annotated[PulseEnd, BYTE_ENUM]
+    restarts: U8
+    supply_mv: U16
+    lowest_mv: U16
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,6 +408,7 @@ DeviceMessage: TypeAlias = (
     | Disarmed
     | Boot
     | ReferencePulse
+    | DropCertificate2
 )
 Message: TypeAlias = HostMessage | DeviceMessage
 
@@ -399,6 +434,7 @@ TABLE: dict[int, type[Message]] = {
     0x8A: Disarmed,
     0x8B: Boot,
     0x8C: ReferencePulse,
+    0x8D: DropCertificate2,
 }
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}

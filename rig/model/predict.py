@@ -165,28 +165,44 @@ def _ways_down(
 _Step = tuple[_Inputs, _Inputs, float]
 
 
+def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quantity:
+    """α of all rods together, with what the uncertainties of chain and surface make of it.
+
+    Raises
+    ------
+    DomainError
+        Where Eq. 13 has no finite solution, or none within the uncertainty of μ.
+    """
+    impact = impact_on(surface, chain, incline_deg)
+    steps = _moved_alphas(chain, surface, impact, incline_deg)
+    return Quantity(impact.alpha, math.hypot(*((b - a) * weight for a, b, weight in steps)))
+
+
 def _moved_impacts(
     chain: Chain, surface: Surface, impact: Impact, incline_deg: float, inputs: _Inputs
 ) -> Iterator[_Step]:
     """Inputs with what α rests on moved down and up, and u over the distance between them."""
+    for low, high, weight in _moved_alphas(chain, surface, impact, incline_deg):
+        yield inputs._replace(alpha=low), inputs._replace(alpha=high), weight
 
-    def moved(low: float, high: float, weight: float) -> _Step:
-        return inputs._replace(alpha=low), inputs._replace(alpha=high), weight
 
+def _moved_alphas(
+    chain: Chain, surface: Surface, impact: Impact, incline_deg: float
+) -> Iterator[tuple[float, float, float]]:
+    """α with each of what it rests on moved down and up, and the weight."""
     if chain.alpha is not None:
-        for step in _steps(chain.alpha):
-            yield moved(*step)
+        yield from _steps(chain.alpha)
         return
     struck = surface.pile if impact.basis == "pile" and surface.pile else surface
     for *ends, weight in _steps(struck.restitution):
         low, high = (
             impact_on(surface, chain, incline_deg, restitution=beta).alpha for beta in ends
         )
-        yield moved(low, high, weight)
+        yield low, high, weight
     if impact.basis == "surface":
         for *ends, weight in _steps(surface.friction, least=0.0):
             low, high = (impact_on(surface, chain, incline_deg, friction=mu).alpha for mu in ends)
-            yield moved(low, high, weight)
+            yield low, high, weight
 
 
 def _moved(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.boards import BOARDS
 from rig.protocol.measurable import lacking, longest_fall, record_ms, too_long, unmeasurable
 from rig.protocol.plan import runs
-from rig.protocol.protocol import AT_REST, SIDES
+from rig.protocol.protocol import AT_REST, SIDES, Priors
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
@@ -34,12 +34,13 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     Returns
     -------
     str
-        Title and sections ``Scene``, ``Gates``, ``What follows`` and ``Left out``; empty sections
-        do not appear. Ends without a newline.
+        Title and sections ``Scene``, ``Gates``, ``Known beforehand``, ``What follows`` and
+        ``Left out``; empty sections do not appear. Ends without a newline.
     """
     sections = {
         "Scene": _scene(protocol),
         "Gates": _gates(protocol),
+        "Known beforehand": _priors(protocol),
         "What follows": [*_consequences(protocol), *(f"note: {note}" for note in notes)],
         "Left out": _left_out(protocol),
     }
@@ -134,6 +135,42 @@ def _gates(protocol: Protocol) -> list[str]:
             rods.append(f"{name} {total - number + 1}–{total}")
         place = f"{gate.side:6}  channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm"
         lines.append(f"{place}  rods {', '.join(rods)}")
+    if protocol.gates is not None and lines:
+        height, datum = (
+            _number(u, "mm") for u in (protocol.gates.height_u, protocol.gates.datum_u)
+        )
+        lines.append(f"heights ± {height} each, and ± {datum} of each post's zero")
+    return lines
+
+
+_STRUCK = {"departure", "impulses", "impulse_floor", "last_impulse", "strings"}
+"""Priors of a chain that strikes something."""
+
+
+def _priors(protocol: Protocol) -> list[str]:
+    """List what is taken as known of what nobody measured, one standard deviation each."""
+    if protocol.gates is None:
+        return []
+    from rig.protocol.priors import PRIORS  # noqa: PLC0415 - only where something is measured
+
+    usual = Priors()
+    unused = set() if protocol.two_chains else {"side"}
+    unused |= _STRUCK if protocol.surface is None else set()
+    unused |= set() if protocol.drag is None else {"drag"}
+    lines = []
+    for name, row in PRIORS.items():
+        if name in unused:
+            continue
+        value = getattr(protocol.priors, name)
+        text = _number(value, row.accepted.unit)
+        stated = "" if value == getattr(usual, name) else " (stated)"
+        lines.append(f"{name:14} {text:>8}{stated}  {row.words}")
+    if protocol.surface is not None:
+        level, strike = (
+            format_quantity(one, "mm") for one in (protocol.contact.level, protocol.contact.strike)
+        )
+        lines.append(f"rods touch at {level} above the gates' zero")
+        lines.append(f"the top rod strikes {strike} above that, on rods that lie there")
     return lines
 
 
@@ -155,6 +192,8 @@ def _consequences(protocol: Protocol) -> list[str]:
             )
     if protocol.gates is None:
         return lines
+    if protocol.blind:
+        lines.append("blind: what is measured is kept back until rig unblind SESSION")
     lines += [f"note: only predicted, not run: {reason}" for reason in unmeasurable(protocol)]
     if (problem := too_long(protocol)) is not None:
         lines.append(f"note: not run: {problem}")
@@ -215,5 +254,7 @@ def _left_out(protocol: Protocol) -> list[str]:
     if protocol.gates is None:
         lines.append("no gates: nothing is measured, the scene is only predicted")
     if protocol.drag is None:
-        lines.append("no drag: the air is left out")
+        lines.append(
+            "no drag: predictions leave the air out; edges tell it, or its prior allows for it"
+        )
     return lines

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.boards import GATES
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
-from rig.protocol.protocol import SIDES, Gate, Gates, RodChain, Side
+from rig.protocol.protocol import DATUM_U, SIDES, Gate, Gates, RodChain, Side
 from rig.units import Dimension
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def read_gates(
     outer = fields.mapping(node, "gates", faults)
     if outer is None:
         return None
-    section = Section(outer, "gates", faults, (*SIDES, "height_uncertainty"))
+    section = Section(outer, "gates", faults, (*SIDES, "height_uncertainty", "datum_uncertainty"))
     if "impact" in section and not surface:
         message = "the scene has no surface, so nothing strikes; put the gates under free"
         section.fault("impact", message, at_key=True)
@@ -70,9 +70,10 @@ def read_gates(
             if gate is not None:
                 located.append(gate)
     height_u = section.take("height_uncertainty", fields.exact(HEIGHT_UNCERTAINTY), 0.0003)
-    if height_u is None:
+    datum_u = section.take("datum_uncertainty", fields.exact(HEIGHT_UNCERTAINTY), DATUM_U)
+    if height_u is None or datum_u is None:
         return None
-    return Gates(tuple(gate for gate, _, _ in located), height_u), located
+    return Gates(tuple(gate for gate, _, _ in located), height_u, datum_u), located
 
 
 def _gate(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rig.boards import LONGEST_RECORD_MS
+from rig.boards import BOARDS, LONGEST_RECORD_MS
 from rig.errors import InputError, Problem
 from rig.protocol.protocol import AT_REST, SIDES
 from rig.protocol.yamltree import load, place_of
@@ -35,7 +35,7 @@ def longest_fall(protocol: Protocol) -> float:
     reach = max(
         rods.chain.length + max(rods.widths) / 2.0 + _SURE * rods.position_u for rods in chains
     )
-    u = math.hypot(protocol.drop.u, gates.height_u if gates else 0.0)
+    u = math.hypot(protocol.drop.u, *((gates.height_u, gates.datum_u) if gates else ()))
     weakest = max(gravity.value - _SURE * gravity.u, gravity.value / 2.0)
     return math.sqrt(2.0 * (protocol.drop.value + reach + _SURE * u - lowest) / weakest)
 
@@ -43,8 +43,8 @@ def longest_fall(protocol: Protocol) -> float:
 def record_ms(protocol: Protocol) -> int:
     """How long after the release a drop is recorded, ms; at least `LEAST_RECORD_MS`.
 
-    The chain may hang until the pulse ends, and the air, which a protocol that is measured leaves
-    out, makes the fall longer. More than `LONGEST_RECORD_MS` is too much for any board.
+    The chain may hang until the pulse ends, and the air makes the fall longer. More than
+    `LONGEST_RECORD_MS` is too much for any board.
     """
     wanted_s = (
         _AIR * longest_fall(protocol)
@@ -60,8 +60,6 @@ def unmeasurable(protocol: Protocol) -> list[str]:
     found = []
     if protocol.initial_speed != AT_REST:
         found.append("initial_speed: the rig lets its chains go from rest")
-    if protocol.drag is not None:
-        found.append("drag: what the air takes is found from the edges")
     return found
 
 
@@ -98,25 +96,28 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     """Say what a protocol wants of a board that it does not have, in the order of the file."""
     found = []
 
-    def note(what: str, has: str, *path: str | int) -> None:
+    def want(kind: str, least: float, what: str, has: str, *path: str | int) -> None:
+        if getattr(board, kind) >= least:
+            return
         place = place_of(load(protocol.text, protocol.source), *path)
         key = ""
         for step in path:
             key += f"[{step}]" if isinstance(step, int) else f".{step}" if key else step
-        message = f"found {what}; the board ({board.name}) has {has}: change it, or take another"
+        others = [other.name for other in BOARDS.values() if getattr(other, kind) >= least]
+        other = f", or take an {' or '.join(others)}" if others else ""
+        message = f"found {what}; the board ({board.name}) has {has}: change it{other}"
         found.append(Problem(protocol.source, place.line, place.column, key, message))
 
     release = protocol.release
-    if release.channel >= board.releases:
-        note(str(release.channel), f"releases 0 to {board.releases - 1}", "release", "channel")
-    if release.pulse > board.longest_pulse:
-        most = f"pulses of at most {board.longest_pulse * 1e3:g} ms"
-        note(f"{release.pulse * 1e3:g} ms", most, "release", "pulse")
+    has = f"releases 0 to {board.releases - 1}"
+    want("releases", release.channel + 1, str(release.channel), has, "release", "channel")
+    has = f"pulses of at most {board.longest_pulse * 1e3:g} ms"
+    want("longest_pulse", release.pulse, f"{release.pulse * 1e3:g} ms", has, "release", "pulse")
+    has = f"gates 0 to {board.gates - 1}"
     for side in SIDES:
         for n, gate in enumerate(protocol.gates.on(side) if protocol.gates else ()):
-            if gate.channel >= board.gates:
-                has = f"gates 0 to {board.gates - 1}"
-                note(str(gate.channel), has, "gates", side, n, "channel")
+            path = ("gates", side, n, "channel")
+            want("gates", gate.channel + 1, str(gate.channel), has, *path)
     return sorted(found)
 
 

@@ -21,6 +21,12 @@ Order = Literal["ABBA", "alternate", "fixed"]
 AT_REST = Quantity(0.0)
 PPS_U = 1e-7
 """Of a GPS receiver's pulse per second, relative: modules state 0.1 ppm or better with a fix."""
+DATUM_U = 0.3e-3
+"""Of a post's zero, m: read off a ruler to the nearest mm, ±0.5 mm evenly likely (GUM 4.3.7)."""
+LEVEL = Quantity(0.0, 1e-3)
+STRIKE = Quantity(0.0, 10e-3)
+"""Of a contact where nothing is said: gates are set to a millimetre above where a rod touches, and
+the last rods of 25 strike up to 20 mm above it on a board at 40° and more, on those before them."""
 SIDES: tuple[Side, ...] = ("impact", "free")
 
 
@@ -79,20 +85,46 @@ class Gates:
     gates
         All gates, impact side first, in the order of the file.
     height_u
-        Standard uncertainty of each beam height, m.
+        Standard uncertainty of each beam height above its post's zero, m.
+    datum_u
+        Standard uncertainty of each post's zero above the contact point, m: all beams of one side
+        share it.
     """
 
     gates: tuple[Gate, ...]
     height_u: float
+    datum_u: float = DATUM_U
 
     def on(self, side: Side) -> tuple[Gate, ...]:
         """Gates of one side, in file order."""
         return tuple(gate for gate in self.gates if gate.side == side)
 
     @property
+    def posts(self) -> tuple[Side, ...]:
+        """Sides that have gates."""
+        return tuple(dict.fromkeys(gate.side for gate in self.gates))
+
+    @property
     def mask(self) -> int:
         """Bit mask of the channels in use."""
         return sum(1 << gate.channel for gate in self.gates)
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Where rods strike.
+
+    Attributes
+    ----------
+    level
+        Height at which an undisturbed rod's middle touches the surface, above the zero of the gate
+        heights, m.
+    strike
+        How far above it the top rod strikes: on the rods that lie there, m.
+    """
+
+    level: Quantity = LEVEL
+    strike: Quantity = STRIKE
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +182,26 @@ class Accept:
 
 
 @dataclass(frozen=True, slots=True)
+class Priors:
+    """What is known beforehand of what nobody measures, as standard deviations in SI units.
+
+    `rig.protocol.priors.PRIORS` says of each what it is, and where it comes from.
+    """
+
+    edge_floor: float = 0.1e-3
+    jitter: float = 2e-6
+    hang: float = 0.3e-3
+    side: float = 0.5e-3
+    beam_offset: float = 1.0e-3
+    departure: float = 0.25e-3
+    impulses: float = 0.2
+    impulse_floor: float = 0.003
+    last_impulse: float = 0.3
+    strings: float = 0.5
+    drag: float = 0.05
+
+
+@dataclass(frozen=True, slots=True)
 class Protocol:
     """One protocol file, checked.
 
@@ -168,8 +220,12 @@ class Protocol:
         `None` where the air is left out.
     reference_u
         Relative standard uncertainty of the 1 Hz reference, where one is wired.
+    priors
+        Of what the edges are made of, besides.
     gates
         `None` for a scene that is only predicted.
+    blind
+        Whether numbers are kept back until the session is unblinded.
     text
         The file as read, kept word for word in the session.
     """
@@ -185,7 +241,10 @@ class Protocol:
     accept: Accept = field(default_factory=Accept)
     initial_speed: Quantity = AT_REST
     drag: Drag | None = None
+    contact: Contact = field(default_factory=Contact)
     reference_u: float = PPS_U
+    priors: Priors = field(default_factory=Priors)
+    blind: bool = False
     text: str = ""
     source: str = ""
 

@@ -12,7 +12,16 @@ from rig.errors import InputError
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
 from rig.protocol.fields import FieldFaults, Range, Section
-from rig.protocol.protocol import AT_REST, PPS_U, Accept, Plan, Protocol, ReleasePulse
+from rig.protocol.protocol import (
+    AT_REST,
+    PPS_U,
+    Accept,
+    Contact,
+    Plan,
+    Priors,
+    Protocol,
+    ReleasePulse,
+)
 from rig.protocol.yamltree import Mapping, Place, ScalarNode, load
 from rig.units import Dimension, Quantity
 
@@ -27,10 +36,11 @@ if TYPE_CHECKING:
 MAX_BYTES = 1_000_000
 KEYS = (
     "protocol", "title", "chains", "surface", "drop", "initial_speed", "gravity", "site", "drag",
-    "gates", "reference", "release", "plan", "accept", "notes",
+    "contact", "gates", "priors", "reference", "release", "plan", "accept", "blind", "notes",
 )  # fmt: skip
 DROP = Range(Dimension.LENGTH, 0.0, 100.0, "m")
 INITIAL_SPEED = Range(Dimension.SPEED, 0.0, 1000.0, "m/s")
+CONTACT = Range(Dimension.LENGTH, -0.1, 0.1, "mm")
 GRAVITY = Range(Dimension.ACCELERATION, 1e-3, 1000.0, "m/s^2")
 LATITUDE = Range(Dimension.ANGLE, -90.0, 90.0, "deg")
 HEIGHT = Range(Dimension.LENGTH, -500.0, 9000.0, "m")
@@ -134,12 +144,17 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     drop = top.take("drop", fields.quantity(DROP), Quantity(0.0), required=example)
     start = top.take("initial_speed", fields.quantity(INITIAL_SPEED), AT_REST)
     drag = _drag(top, chains) if "drag" in top else None
+    contact = top.take("contact", _contact(struck=has_surface), Contact())
     reference = top.take("reference", fields.exact(REFERENCE), PPS_U)
     release, plan, accept = _settings(top, turns=kept or count > 1)
+    blind = top.take("blind", fields.choice("true", "false"), "false")
     gates = _gates(top, chains, drop) if has_gates else None
+    priors = top.take("priors", _priors, Priors())
     if title is None or chains is None or gravity is None or drop is None:
         return None
     if release is None or plan is None or accept is None or start is None or reference is None:
+        return None
+    if priors is None or contact is None:
         return None
     return Protocol(
         title=title,
@@ -153,7 +168,10 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
         accept=accept,
         initial_speed=start,
         drag=drag,
+        contact=contact,
         reference_u=reference,
+        priors=priors,
+        blind=blind == "true",
         text=text,
         source=faults.source,
     )
@@ -178,6 +196,12 @@ def _settings(
     return read_settings(top, turns=turns)
 
 
+def _priors(node: Node, key: str, faults: FieldFaults) -> Priors | None:
+    from rig.protocol.priors import read_priors  # noqa: PLC0415 - see above
+
+    return read_priors(node, key, faults)
+
+
 def _surface(top: Section, chains: dict[str, RodChain] | None) -> Surface | None:
     from rig.protocol.surface import read_surface  # noqa: PLC0415 - see above
 
@@ -190,6 +214,26 @@ def _drag(top: Section, chains: dict[str, RodChain] | None) -> Drag | None:
     from rig.protocol.drag import read_drag  # noqa: PLC0415 - see above
 
     return read_drag(top.values["drag"], chains.values() if chains else (), top.faults)
+
+
+def _contact(*, struck: bool) -> Converter[Contact]:
+    """Return the converter to where rods strike."""
+
+    def convert(node: Node, key: str, faults: FieldFaults) -> Contact | None:
+        inner = fields.mapping(node, key, faults)
+        if inner is None:
+            return None
+        if not struck:
+            message = "the scene has no surface, so nothing strikes; leave it out"
+            faults.add(node.place, key, message)
+            return None
+        section = Section(inner, key, faults, ("level", "strike"))
+        usual = Contact()
+        level = section.take("level", fields.quantity(CONTACT), usual.level)
+        strike = section.take("strike", fields.quantity(CONTACT), usual.strike)
+        return None if level is None or strike is None else Contact(level, strike)
+
+    return convert
 
 
 def _gates(top: Section, chains: dict[str, RodChain] | None, drop: Quantity | None) -> Gates | None:

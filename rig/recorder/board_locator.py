@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,8 @@ from rig.usb.listing import path_of, serial_number_at, serial_ports
 
 if TYPE_CHECKING:
     from rig.link.messages import Identity
+
+log = logging.getLogger(__name__)
 
 SERIAL_NUMBER = "usb_serial_number"
 """In a session's record of who was there."""
@@ -94,9 +97,17 @@ class BoardLocator:
             raise _stranger(
                 f"id {identity.unique_id.hex()}, not {(self._unique_id or b'').hex()}", self.now
             )
+        before, same = self.serial_number, self._unique_id == identity.unique_id
         self._unique_id = identity.unique_id
         if "://" not in self.now:
             self.serial_number = serial_number_at(self.now)
+        if same and None not in {before, self.serial_number} and before != self.serial_number:
+            log.warning(
+                "two boards have the id %s (USB serial numbers %s and %s): erase the EEPROM of one",
+                identity.unique_id.hex(),
+                before,
+                self.serial_number,
+            )
         return {} if self.serial_number is None else {SERIAL_NUMBER: self.serial_number}
 
 

@@ -160,7 +160,23 @@ class Controller:
         log.info("session: %s", path)
         self.published.plan(plan)
         self.published.set(session=about, drop=None, release_test=None)
+        if about["blind"]:
+            self.published.replace_edges(())  # of a drop that was fetched
         return fetched
+
+    def unblind(self) -> None:
+        """Record that the session's numbers may be seen from now on.
+
+        Raises
+        ------
+        SessionError
+            None is open, that was recorded before, or the disk fails.
+        """
+        session, protocol = self.session, self._protocol
+        assert protocol is not None
+        with self.interrupts.held():
+            session.unblind()
+        self.published.set(session=shown(session, protocol)[0])
 
     def close_session(self) -> None:
         """Make safe and close the file, whole; nothing when none is open."""

@@ -16,9 +16,11 @@ from rig.link.wiretypes import EVENTS
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.link.transcript import Record
     from rig.recorder.published import PublishedState
-    from rig.records import Drop
+    from rig.records import Drop, Edge
 
 _PHASES = {
     wire.Phase.IDLE: "idle",
@@ -89,10 +91,17 @@ class StateFeed:
         self._label = wire.pack_label(drop.run, drop.attempt)
         self._fire_tick = drop.fire_tick
         self._next = drop.certificate.events if drop.certificate else len(drop.edges)
-        self._published.replace_edges((e.tick, e.channel, int(e.blocked)) for e in drop.edges)
+        shown: Sequence[Edge] = () if self._blind else drop.edges
+        self._published.replace_edges((e.tick, e.channel, int(e.blocked)) for e in shown)
         self._drop("recorded")
         self._published.set(phase="idle")
         self._label = 0
+
+    @property
+    def _blind(self) -> bool:
+        """Whether nobody shall see from the edges what is measured."""
+        session = self._published.get("session")
+        return session is not None and bool(session["blind"])
 
     def _drop(self, state: str) -> None:
         run, attempt = wire.unpack_label(self._label)
@@ -117,6 +126,9 @@ class StateFeed:
         found = edges(events, state, ALL_GATES, self._fire_tick)
         self._state = events[-1][1] if events else state
         self._next = frame.first + len(events)
-        self._published.edges([(tick, channel, int(blocked)) for tick, channel, blocked in found])
+        if not self._blind:
+            self._published.edges(
+                [(tick, channel, int(blocked)) for tick, channel, blocked in found]
+            )
         self._published.set(gates={"blocked": self._state})
         self._drop("fired")

@@ -78,5 +78,6 @@ def shown(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[dic
         "created": session.meta["created"],
         "simulated": session.simulated,
         "planned": len(plan),
+        "blind": protocol.blind and not session.unblinded,
     }
     return about, plan

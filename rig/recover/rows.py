@@ -93,7 +93,7 @@ def _sort(rows: Rows, cell: PageCell) -> None:
 
 
 def _is_drop(values: Row, run: int, attempt: int, hz: int) -> bool:
-    if len(values) not in {14, 15} or run < 1 or attempt < 1 or hz < 1:
+    if len(values) not in {14, 15, 20} or run < 1 or attempt < 1 or hz < 1:
         return False
     numbers = [*values[4:11], values[12], *values[14:]]
     return (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.measurands import averaged, told
+from rig.measurands import MEASURANDS, averaged, told
 from rig.report.bars import LABELS, bar
 from rig.report.columns import Column, degrees, summary_incline
 from rig.report.numbers import fixed, plus_minus
@@ -98,6 +98,37 @@ def scatter_part(summary: Sequence[Incline]) -> Part:
         _SCATTER,
         [*_scatters(summary)],
     )
+
+
+_MOVES: tuple[Column[Mapping[str, Any]], ...] = (
+    Column("prior", lambda row: str(row["prior"]), numeric=False),
+    Column("incline (°)", lambda row: degrees(row["incline_deg"])),
+    Column("strikes", lambda row: str(row.get("impact_chain", ""))),
+    Column("quantity", lambda row: _fine(row)[0], numeric=False),
+    Column("3× wider", lambda row: _fine(row)[1]),
+    Column("3× narrower", lambda row: _fine(row)[2]),
+    Column("U wider", lambda row: f"× {row['U95_ratio_wider']:.2f}"),
+    Column("U narrower", lambda row: f"× {row['U95_ratio_narrower']:.2f}"),
+)
+
+
+def prior_part(moves: Sequence[Mapping[str, Any]]) -> Part:
+    """Make the table of what means move by with each prior, see `rig analyze --priors`."""
+    return Part(
+        "What means move by with each prior",
+        ["Everything was adjusted again with one prior three times as wide, and as narrow."],
+        _MOVES,
+        [*moves],
+    )
+
+
+def _fine(row: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Quantity with its unit, and both moves in it."""
+    one = MEASURANDS[row["quantity"]]
+    wider, narrower = (
+        fixed(row[word] * one.fine_scale, one.fine_decimals) for word in ("wider", "narrower")
+    )
+    return f"{one.symbol} ({one.fine})", wider, narrower
 
 
 def _scatters(summary: Sequence[Incline]) -> Iterator[Mapping[str, str]]:

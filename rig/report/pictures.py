@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.result import GOOD
 from rig.measurands import GRAVITY, SEPARATION, SPEED
 from rig.report.embed import PageFigure
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
+from rig.report.film import film_figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.analysis.session import Analysis
+    from rig.films import Film
     from rig.report.bars import Bars
     from rig.sections import Sections
 
@@ -24,6 +28,7 @@ def pictures(
     skew_limit_s: float | None = None,
     site_m_s2: float | None = None,
     bars: Bars = "U95",
+    films: Mapping[tuple[int, int], Film] | None = None,
     sections: Sections,
 ) -> list[PageFigure]:
     """Draw the figures of a report.
@@ -40,6 +45,8 @@ def pictures(
         Expected gravity, for scenes without a surface.
     bars
         What the bars on means of several runs stand for.
+    films
+        Of simulated drops, by run and attempt; the first that counts is shown.
     sections
         Where a figure that cannot be drawn is noted.
     """
@@ -74,6 +81,18 @@ def pictures(
                 "Acceleration in free fall, run by run. Bars are expanded uncertainties (95 %).",
             )
         )
+    for one in analysis.runs:
+        film = (films or {}).get((one.run.number, one.attempt))
+        if film is not None and one.verdict in GOOD:
+            drawn.append(
+                (
+                    partial(film_figure, film),
+                    f"How run {one.run.number} fell",
+                    f"Run {one.run.number} as the simulation let it fall: the striking chain from "
+                    "the front and, below, along its rods. Slack strings are dotted.",
+                )
+            )
+            break
     found = []
     for draw, alt, caption in drawn:
         svg = sections.make(f'The figure "{alt}"', draw)

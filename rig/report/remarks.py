@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.likeness import likeness
 from rig.analysis.remedies import remedies
 from rig.analysis.result import Measured
+from rig.measurands import averaged
 from rig.report.columns import run_incline
 from rig.report.numbers import decimals_for, fixed, plus_minus
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rig.analysis.joint_fit import JointFit
     from rig.analysis.session import Analysis
+    from rig.analysis.summary import Incline
     from rig.results import SessionResults
 
 _CLOCK_COVERAGE = 2.0  # about 95 %
@@ -22,8 +25,39 @@ _FOUND = 4.0  # standard uncertainties beyond which κ is worth a remark
 
 
 def remarks(found: SessionResults) -> list[str]:
-    """Make the remarks on a session's clock and air."""
-    return [*clock_lines(found.calibration), *air_lines(found.analysis.joint)]
+    """Make the remarks on a session's falls, clock and air."""
+    fitted = joint = found.analysis.joint
+    if joint is not None and joint.drops[0].model.protocol.drag is not None:
+        joint = None  # predictions are made in this air
+    return [
+        *model_lines(fitted),
+        *common_lines(found.analysis.summary),
+        *clock_lines(found.calibration),
+        *air_lines(joint),
+    ]
+
+
+def common_lines(summary: Sequence[Incline]) -> list[str]:
+    """Say what all means share, so that their errors, and Eₙ, go up and down together."""
+    told = []
+    for row in averaged():
+        lines = [line.causes[row.name] for line in summary if line.causes.get(row.name)]
+        if lines:
+            most = {name: max(one.get(name, 0.0) for one in lines) for name in lines[0]}
+            first = [name for name, u in most.items() if u > 0.5 * max(most.values())]
+            told.append(f"{row.symbol} by {' and '.join(sorted(first, key=lambda n: -most[n]))}")
+    if not told:
+        return []
+    return [
+        "means share errors that no number of runs averages, and their Eₙ go up and down together: "
+        f"{'; '.join(told)}"
+    ]
+
+
+def model_lines(joint: JointFit | None) -> list[str]:
+    """Say whether the falls look like the model, where that can be told."""
+    found = None if joint is None else likeness(joint)
+    return [] if found is None else [found.sentence]
 
 
 def void_lines(analysis: Analysis) -> list[str]:

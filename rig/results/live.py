@@ -6,7 +6,7 @@ Whoever judges a drop asks here, with a screen or without one.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import median
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,6 +20,7 @@ from rig.analysis.session import gather, overruled, sum_up
 from rig.clock.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
+from rig.results.blind import kept_back, veiled, veiled_drop
 from rig.results.whole import protocol_of, rejected
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -61,6 +62,10 @@ class SessionView:
         Whether a joint fit would say more than is in `analysis`.
     curves
         The model against inclination, as `rig.analysis.curves.model_curves` gives it.
+    blind
+        Whether what was measured is kept back.
+    unblinded
+        When that of a blind session was shown; empty before.
     pace_s
         Usual time from drop to drop; `None` before the third.
     """
@@ -82,6 +87,8 @@ class SessionView:
     clock: Calibration
     states: tuple[StateEntry, ...]
     pace_s: float | None
+    blind: bool = False
+    unblinded: str = ""
 
     @property
     def jobs(self) -> tuple[Job, ...]:
@@ -151,7 +158,8 @@ class LiveAnalysis:
             Recorded in it.
         """
         protocol, plan = self._planned(session)
-        return fit_drop(protocol, plan[drop.run], drop, self.clock(session).scale(drop))[0]
+        found = fit_drop(protocol, plan[drop.run], drop, self.clock(session).scale(drop))[0]
+        return veiled_drop(found) if kept_back(session, protocol) else found
 
     def read(self) -> SessionView:
         """Read the file as it is now; safe in any thread, one at a time.
@@ -178,7 +186,8 @@ class LiveAnalysis:
             self._readings += 1
             enough = sum(result.verdict in GOOD for result in results.values()) >= FEWEST
             joint = self._joint_fit if enough else None
-            return SessionView(
+            blind = kept_back(session, protocol)
+            view = SessionView(
                 path=self.path,
                 reading=self._readings,
                 protocol=protocol,
@@ -196,7 +205,10 @@ class LiveAnalysis:
                 clock=clock,
                 states=states,
                 pace_s=_pace(states),
+                blind=blind,
+                unblinded=session.unblinded,
             )
+            return _veiled_view(view) if blind else view
 
     def fit_jointly(self, view: SessionView) -> None:
         """Fit all drops together, as ``rig analyze`` does; the next reading has it.
@@ -236,6 +248,16 @@ class LiveAnalysis:
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)
         self.done = len(self._known)
+
+
+def _veiled_view(view: SessionView) -> SessionView:
+    """Leave out what was measured, and the edges from which it could be drawn."""
+    drops = {job: replace(drop, edges=()) for job, drop in view.drops.items()}
+    results = {job: veiled_drop(result) for job, result in view.results.items()}
+    told = veiled(view.analysis)
+    return replace(
+        view, drops=drops, results=results, analysis=told, gravity={}, fitted=0, lagging=False
+    )
 
 
 def _pace(states: Sequence[StateEntry]) -> float | None:

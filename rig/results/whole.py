@@ -10,6 +10,7 @@ from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
 from rig.clock.calibration import Calibrator
 from rig.protocol import reader
+from rig.results.blind import check_open, kept_back, veiled
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class SessionResults:
         What the free chain says of it; `None` where there is none that can be asked.
     time_scales
         The calibration that each drop has, by run and attempt.
+    blind
+        Whether what was measured is kept back.
     """
 
     simulated: bool
@@ -47,6 +50,7 @@ class SessionResults:
     clock: Calibration
     gravity: GravityCheck | None
     time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
+    blind: bool = False
 
     @property
     def calibration(self) -> dict[str, Any]:
@@ -64,6 +68,7 @@ class SessionResults:
         for run in (*said["runs"], *said.get("superseded", [])):
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
+        head |= {"blind": True} if self.blind else {}
         return head | {"calibration": self.calibration} | said
 
 
@@ -113,12 +118,15 @@ def results(session: Reader, progress: Progress | None = None) -> SessionResults
     found, clock, drops = _analysed(session, protocol, progress)
     by_key = {(drop.run, drop.attempt): drop for drop in drops}
     cases = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
+    blind = kept_back(session, protocol)
+    checked = [] if blind else [(run, drop, clock.scale(drop)) for run, drop in cases]
     return SessionResults(
         session.simulated,
-        found,
+        veiled(found) if blind else found,
         clock,
-        check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in cases]),
+        check_gravity(protocol, checked),
         {key: clock.used(drop) for key, drop in by_key.items()},
+        blind,
     )
 
 
@@ -137,8 +145,16 @@ def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
 
 
 def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
-    """Analyse a session and keep everything, each edge's rod too."""
-    return _analysed(session, protocol_of(session), progress)[:2]
+    """Analyse a session and keep everything, each edge's rod too.
+
+    Raises
+    ------
+    SessionError
+        The session is blind.
+    """
+    protocol = protocol_of(session)
+    check_open(session, protocol)
+    return _analysed(session, protocol, progress)[:2]
 
 
 def _analysed(

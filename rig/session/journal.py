@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import contextmanager
+from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import SessionError
 from rig.session.faults import as_session_error
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 
@@ -52,10 +54,25 @@ class Journal:
         self._pending: list[tuple[Statement, ...]] = []
         self._applied = 0  # how many of the pending the open transaction holds
         self._failed = False
+        self._begun_s: float | None = None
 
     def __len__(self) -> int:
         """Count the records not yet on the disk."""
         return len(self._pending)
+
+    @property
+    def write_s(self) -> float:
+        """How long the disk has been at the write under way; 0 for none. For other threads too."""
+        begun = self._begun_s
+        return 0.0 if begun is None else monotonic() - begun
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        self._begun_s = monotonic()
+        try:
+            yield
+        finally:
+            self._begun_s = None
 
     def add(self, *statements: Statement) -> None:
         """Put statements into the open transaction, all or none of them.
@@ -69,7 +86,8 @@ class Journal:
         # After a failure wait for commit(): trying the whole backlog at every row would be
         # quadratic, and the caller already knows.
         if not self._failed:
-            self._run()
+            with self._writing():
+                self._run()
 
     def commit(self) -> None:
         """Make everything added so far durable.
@@ -79,8 +97,11 @@ class Journal:
         SessionError
             If the disk fails; nothing is forgotten and a later call tries again.
         """
-        if not self._pending:
-            return
+        if self._pending:
+            with self._writing():
+                self._commit()
+
+    def _commit(self) -> None:
         refusal: SessionError | None = None
         try:
             self._run()

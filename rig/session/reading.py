@@ -20,6 +20,8 @@ Direction = Literal["rx", "tx"]
 """``rx``: from the device to the host; ``tx``: from the host to the device."""
 
 
+UNBLINDED = "unblinded"
+"""The one fact that may be added later."""
 # Names that are put into SQL are these only.
 _GROWING = ("identity", "drop", "run_state", "ping", "reference", "host_break")
 
@@ -69,6 +71,11 @@ class Reader:
     def simulated(self) -> bool:
         """Whether the data come from a simulation."""
         return self._meta["simulated"] == "true"
+
+    @property
+    def unblinded(self) -> str:
+        """When the numbers of a blind session were shown; empty before."""
+        return self._meta.get(UNBLINDED, "")
 
     @property
     def protocol_text(self) -> str:

@@ -7,7 +7,7 @@ from enum import StrEnum
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """In SQLite's ``user_version``; a program refuses files with a higher one."""
 
 
@@ -43,6 +43,11 @@ CREATE TABLE host_break (
     stepped_ns INTEGER NOT NULL
 ) STRICT;
 """
+
+_ACCOUNT = tuple(
+    f"{name} INTEGER" for name in ("pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv")
+)
+"""What a certificate of the wire's version 2 says besides."""
 
 _TABLES = f"""
 CREATE TABLE meta (
@@ -92,6 +97,7 @@ CREATE TABLE "drop" (
     host_ns INTEGER,
     provenance TEXT NOT NULL,
     release_sense INTEGER,
+    {", ".join(_ACCOUNT)},
     UNIQUE (run, attempt)
 ) STRICT;
 
@@ -154,6 +160,7 @@ UPGRADES = {
     1: 'ALTER TABLE "drop" ADD COLUMN release_sense INTEGER',
     2: _CLOCK_TABLES
     + "".join(_guards(table, _IDENTICAL[table]) for table in ("reference", "host_break")),
+    3: "; ".join(f'ALTER TABLE "drop" ADD COLUMN {column}' for column in _ACCOUNT),
 }
 """What makes a file of one version one of the next."""
 

@@ -10,6 +10,7 @@ import sqlite3
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from rig import __version__
@@ -17,7 +18,7 @@ from rig.errors import SessionError
 from rig.session.database import build, check_free, check_place, connect
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
-from rig.session.reading import Direction, Reader
+from rig.session.reading import UNBLINDED, Direction, Reader
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -131,6 +132,11 @@ class Session(Reader):
         """Number of records that no `commit` has made durable yet."""
         return len(self._journal)
 
+    @property
+    def write_s(self) -> float:
+        """How long the disk has been at the write under way; 0 for none. For other threads too."""
+        return self._journal.write_s
+
     def commit(self) -> None:
         """Return when everything added so far is on the disk.
 
@@ -238,12 +244,24 @@ class Session(Reader):
             )
         )
         head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
-        sense = None if certificate is None else certificate.release_sense
-        tail = (json.dumps(drop.faults, ensure_ascii=False), host_ns, provenance, sense)
+        faults = json.dumps(drop.faults, ensure_ascii=False)
+        tail = (
+            (None,) * 6
+            if certificate is None
+            else (
+                certificate.release_sense,
+                certificate.pulse_ticks,
+                certificate.pulse_end,
+                certificate.restarts,
+                certificate.supply_mv,
+                certificate.lowest_mv,
+            )
+        )
         journal.add(
             Statement(
-                'INSERT INTO "drop" VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)',
-                [(*head, *fields, *tail)],
+                'INSERT INTO "drop" VALUES '
+                "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [(*head, *fields, faults, host_ns, provenance, *tail)],
             ),
             Statement(
                 "INSERT INTO edge VALUES (?, ?, ?, ?, ?)",
@@ -262,6 +280,20 @@ class Session(Reader):
             "INSERT INTO run_state (run, attempt, state, reasons, host_ns) VALUES (?, ?, ?, ?, ?)",
             (run, attempt, str(state), json.dumps(list(reasons), ensure_ascii=False), host_ns),
         )
+
+    def unblind(self) -> None:
+        """Record, once and on the disk, that from now on the numbers may be seen.
+
+        Raises
+        ------
+        SessionError
+            That was recorded before, or the disk fails.
+        """
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        self._add("INSERT INTO meta VALUES (?, ?)", (UNBLINDED, now))
+        self.put_results([], __version__)  # of less than is told now
+        self.commit()
+        self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
 
     def put_results(self, results: Iterable[Mapping[str, Any]], analysis_version: str) -> None:
         """Replace all derived results in the open transaction.

@@ -50,15 +50,16 @@ class Action(NamedTuple):
 
 ACTIONS: tuple[Action, ...] = (
     Action("stop", "f9", "STOP", "Stop: everything off, nothing falls", "Ctrl-C in rig run"),
-    Action("go_on", "enter,space", "go on", "Go on: arm, acknowledge, next run",
+    Action("go_on", "enter", "go on", "Go on: acknowledge, next run; on the run page, arm",
            "rig run PROTOCOL --port URL --session FILE",
            ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True),
-    Action("reject", "x", "reject", "Reject this drop, with a cause", "", _JUDGED, driving=True),
+    Action("reject", "x", "reject", "Reject this drop for a reason, or take that back", "",
+           _JUDGED, driving=True),
     Action("note", "n", "note", "Add a note to this drop", "", _JUDGED, driving=True),
     Action("again", "a", "again", "Another attempt at this run", "",
            frozenset({Stage.RESULT, Stage.HALTED, Stage.DONE}), driving=True),
-    Action("blind", "b", "blind", "Blind mode: judge a drop before its numbers are shown", "",
-           ANY - _JUDGED),
+    Action("unblind", "b", "unblind", "Show a blind session's numbers from now on; once",
+           "rig unblind SESSION", _AT_REST, driving=True),
     Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
     Action("close", "z", "close", "Close the session; another protocol can be chosen", "",
            frozenset({Stage.DEVICE, Stage.PREPARE, Stage.HALTED, Stage.DONE}), driving=True),
@@ -99,20 +100,36 @@ BY_NAME = {action.name: action for action in ACTIONS}
 OFFLINE = tuple(
     action.name
     for action in ACTIONS
-    if not action.driving and action.name not in {"stop", "control", "blind", "wave"}
+    if not action.driving and action.name not in {"stop", "control", "wave"}
 )
 """What can be done with a file and no rig."""
 
 
-def possible(
+_NOT = {
+    Stage.PROTOCOL: "before a session is open",
+    Stage.DEVICE: "before the first run",
+    Stage.TESTING: "during the test of the release",
+    Stage.PREPARE: "before the drop",
+    Stage.LIVE: "while chains fall",
+    Stage.JUDGING: "while the drop is analysed",
+    Stage.RESULT: "before this drop is acknowledged",
+    Stage.HALTED: "while the plan stands still",
+    Stage.DONE: "when the plan is done",
+}
+
+
+def hindrance(
     action: Action, stage: Stage, *, driving: bool, two_chains: bool | None = None
-) -> bool:
-    """Whether an action makes sense now; which scene it is may not be known yet."""
-    return (
-        stage in action.stages
-        and (driving or not action.driving)
-        and (two_chains is not False or not action.two_chains)
-    )
+) -> str:
+    """Say why an action makes no sense now; empty where it does.
+
+    Which scene it is may not be known yet.
+    """
+    if stage not in action.stages:
+        return f"not {_NOT.get(stage, 'with the release armed')}"
+    if action.driving and not driving:
+        return "this screen only watches"
+    return "this scene has one chain" if action.two_chains and two_chains is False else ""
 
 
 def shown_key(keys: str) -> str:

@@ -8,40 +8,43 @@ from time import monotonic, process_time
 from typing import TYPE_CHECKING, Any, cast
 
 from textual import events
-from textual.app import App, ComposeResult, SystemCommand
+from textual.app import App, ComposeResult
 from textual.css.query import NoMatches
 from textual.theme import Theme
 from textual.widgets import ContentSwitcher, Input
 
-from rig.campaign.events import EffectFailed, Stage, Stopped, Tick
+from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands, selectors
-from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, Action, possible, shown_key
+from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, Action, hindrance, shown_key
 from rig.tui.client import ReconnectingClient
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
-from rig.tui.screens.ask import Ask, Confirm, Pick
+from rig.tui.screens.ask import Ask, AskReason, Confirm, Pick
 from rig.tui.screens.help import Help
+from rig.tui.screens.palette import Choice, Palette
 from rig.tui.screens.protocol import ProtocolPage
+from rig.tui.stillness import Stillness
 from rig.tui.widgets.status import StatusBar
-from rig.tui.widgets.stopbar import StopBar
+from rig.tui.widgets.stopbar import StopBar, StopLine
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterable, Mapping
+    from collections.abc import Callable, Coroutine, Hashable, Mapping
 
-    from textual.screen import ModalScreen, Screen
+    from textual.screen import Screen
 
     from rig.results.live import SessionView
     from rig.tui.context import Options
     from rig.tui.indicators import Indicators
     from rig.tui.model import Model
+    from rig.tui.screens.dialog import Dialog
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.state import DaemonState
 
 TICK_S = 0.1
-_REPEAT_S = 0.7
-"""A key that is held down repeats itself: that is no wish to stop."""
+_COUNTED_S = 0.3
+"""Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
 _SHARE = 0.17  # of a core, that this may take on a slow machine
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
@@ -51,6 +54,11 @@ _PAGE_OF = {
     Stage.DONE: "session",
 }
 
+
+_NOT_MEANT = (
+    "not armed: Enter came too soon after another key\n"
+    "take the hand away for half a second, then press Enter once"
+)
 
 THEMES = (
     Theme(
@@ -110,7 +118,7 @@ def _page(name: str) -> type[Page]:
     return kind
 
 
-class RigApp(App[None]):
+class RigApp(App[None], inherit_bindings=False):
     """The lab session.
 
     Parameters
@@ -124,6 +132,7 @@ class RigApp(App[None]):
     """
 
     TITLE = "chainrig"
+    ENABLE_COMMAND_PALETTE = False  # there is one that knows what can be done now
     CSS = """
     #pages { height: 1fr; }
     .-high #pages { padding: 1 1 0 1; }
@@ -149,6 +158,8 @@ class RigApp(App[None]):
         self.protocols = ProtocolPage(options.files, options.session)
         self.pages: dict[str, Page] = {ProtocolPage.NAME: self.protocols}
         self._turning = asyncio.Lock()
+        self._turned_to = ""
+        self._stillness = Stillness(options.still_s)
         self._last = monotonic()
         self._spent = process_time()
         self._followed = ""
@@ -168,7 +179,7 @@ class RigApp(App[None]):
             self.run_worker(self.client.keep(), group="client")
         elif self.options.session is not None:
             self.follower.look_at(self.options.session)
-        await self._follow()
+        self._follow()
         self.set_timer(TICK_S, self._tick)
         self.draw()
         self.call_after_refresh(lambda: self.begin(self._load_pages()))
@@ -187,7 +198,7 @@ class RigApp(App[None]):
         now = monotonic()
         passed, self._last = now - self._last, now
         if self.flow.stage is Stage.COUNTDOWN:
-            self.driver.take(Tick(passed))
+            self.driver.take(Tick(min(passed, _COUNTED_S)))
         if "history" in self.pages:
             self.history.tick(passed)
         if self.client is not None and self.client.changed:
@@ -195,7 +206,10 @@ class RigApp(App[None]):
             reopens = self.driver.asked is not None
             for event in self.follower.absorb(self.flow.stage, now, reopens=reopens):
                 self.driver.take(event)
-        await self._follow()
+        if self.model.hot:
+            while len(self.screen_stack) > 1:
+                self.screen.dismiss(None)
+        self._follow()
         self.draw()
 
     def _open(self) -> bool:
@@ -213,9 +227,20 @@ class RigApp(App[None]):
             return  # on its way in, or out
         base.query_one(StatusBar).show(model, self.page, self.keys, size)
         base.query_one(StopBar).show(model, self.page, self.keys, size.width)
+        for screen in self.screen_stack:
+            for line in screen.query(StopLine):
+                line.show(model, self.keys)
         page = self.pages.get(self.page)
         if page is not None and page.is_mounted:
             page.show(model)
+        # What is drawn is seen when it is painted.
+        self.call_after_refresh(self._stillness.shown, self._face)
+
+    @property
+    def _face(self) -> Hashable:
+        """What the operator looks at, as far as a key depends on it."""
+        flow = self.flow
+        return self.page, flow.stage, flow.job, self.driving, id(self.screen)
 
     # ------------------------------------------------------------------ what is known
 
@@ -247,7 +272,8 @@ class RigApp(App[None]):
     @property
     def model(self) -> Model:
         """What the pages are drawn from, now."""
-        return selectors.model(self.client, self.follower, self.flow, self.page)
+        driver = self.driver
+        return selectors.model(self.client, self.follower, driver.flow, driver.stop, self.page)
 
     # ------------------------------------------------------------------ flow and pages
 
@@ -257,7 +283,7 @@ class RigApp(App[None]):
         if self.driver.asked and self.client.driving and not self.client.state.section("session"):
             await self.driver.open_session(*self.driver.asked, self.options.seed)
 
-    async def _follow(self) -> None:
+    def _follow(self) -> None:
         """Show the page of the stage when the stage has changed."""
         stage = self.model.stage
         wanted = _PAGE_OF.get(stage, "run")
@@ -265,7 +291,7 @@ class RigApp(App[None]):
             wanted = "history"
         if wanted != self._followed and stage is not Stage.TESTING:
             self._followed = wanted
-            await self.go(wanted)
+            self.turn(wanted)
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""
@@ -280,9 +306,17 @@ class RigApp(App[None]):
             self.pages["history"] = _page("history")()
         return cast("HistoryPage", self.pages["history"])
 
-    async def go(self, page: str) -> None:
-        """Show a page."""
-        async with self._turning:  # the flow and a key may want a page at the same time
+    def turn(self, page: str) -> None:
+        """Show a page: at once where it was shown before."""
+        self._turned_to = page
+        if page in self.pages and self.pages[page].is_mounted:
+            self._show(page)
+        else:
+            self.begin(self._make(page))
+
+    async def _make(self, page: str) -> None:
+        """Make a page and show it, if it is still wanted then."""
+        async with self._turning:  # it may have been asked for twice
             if page not in self.pages:
                 self.pages[page] = (await asyncio.to_thread(_page, page))()
             if not self._open():
@@ -290,17 +324,19 @@ class RigApp(App[None]):
             switcher = self.screen_stack[0].query_one("#pages", ContentSwitcher)
             if not self.pages[page].is_mounted:
                 await switcher.add_content(self.pages[page], id=page)
-            if not self._open():
-                return
-            switcher.current = page
-            self.page = page
+        if self._open() and page == self._turned_to:
+            self._show(page)
+
+    def _show(self, page: str) -> None:
+        self.screen_stack[0].query_one("#pages", ContentSwitcher).current = page
+        self.page = page
         self.draw()
 
-    def ask(
-        self, question: ModalScreen[Any], answered: Callable[[Any], None] | None = None
-    ) -> None:
-        """Ask the operator."""
-        self.push_screen(question, answered)
+    def ask(self, question: Dialog[Any], answered: Callable[[Any], None] | None = None) -> None:
+        """Ask the operator, unless something may fall: nothing opens over that."""
+        if not self.model.hot:
+            self.push_screen(question, answered)
+            self.draw()
 
     def next_theme(self) -> None:
         """Change the colours."""
@@ -312,74 +348,109 @@ class RigApp(App[None]):
 
     async def on_event(self, event: events.Event) -> None:
         """Take keys before anybody else: STOP must work with focus anywhere."""
-        key = event.key if isinstance(event, events.Key) and not event.is_forwarded else None
-        if key is not None and self._takes(key):
+        taken = False
+        if isinstance(event, events.InputEvent) and not event.is_forwarded:
+            if isinstance(event, events.Key):
+                taken = self._takes(event.key, event.time)
+            elif isinstance(event, events.Paste):
+                taken = self._ends_countdown()
+            if isinstance(event, (events.Key, events.Paste, events.MouseDown)):
+                self._stillness.touched(event.time)
+        if taken:
             event.stop()
-            return
-        await super().on_event(event)
+        else:
+            await super().on_event(event)
 
-    def _takes(self, key: str) -> bool:
-        """Do what a key means now, STOP first; say whether it meant anything."""
+    def _takes(self, key: str, at_s: float) -> bool:
+        """Do what a key means now, STOP first; say whether it meant anything.
+
+        All of it at once, in the order of keys: what waits is begun and not waited for.
+        """
         name, screen = self.action_of.get(key), self.screen
         if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
             self.action_do("stop")
             if isinstance(screen, (Help, Confirm, Pick)):
                 screen.dismiss(None)
             return True
-        if self.flow.stage in BEFORE_RELEASE:
-            held = name == "go_on" and monotonic() - self.driver.since < _REPEAT_S
-            if not held:
-                self.driver.take(Stopped())
+        if self._ends_countdown():
             return True
-        if isinstance(screen, Ask) and key == "escape":
-            screen.dismiss(None)
-            return True
-        if isinstance(screen, Pick) and key == "backspace":
-            screen.dismiss(None)
-            return True
-        if isinstance(screen, Confirm):
-            screen.dismiss(key == "enter")
-            return True
-        if isinstance(screen, Help):
-            if name in {"previous", "next"}:
-                screen.move(1 if name == "next" else -1)
-            else:
-                screen.dismiss(None)
-            return True
-        if len(self.screen_stack) > 1 or name is None:
+        if len(self.screen_stack) > 1:
+            return self._answers(screen, key, at_s)
+        if key == "enter" and self.page == "run" and self.flow.stage is Stage.PREPARE:
+            self._arm(at_s)
+        elif name is not None:
+            self.action_do(name)
+        return name is not None
+
+    def _ends_countdown(self) -> bool:
+        """Stop what is on its way to a release; say whether anything was."""
+        if self.flow.stage not in BEFORE_RELEASE:
             return False
-        self.action_do(name)
+        self.driver.take(Stopped())
         return True
 
-    def action_do(self, name: str) -> None:
-        """Do one action of the table, if it makes sense now."""
-        action = BY_NAME[name]
-        if self.client is None and name not in OFFLINE:
-            return
-        if not self._possible(action):
-            if action.driving and not self.driving:
-                self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
-                                   "c takes control when it is free"))  # fmt: skip
-            return
-        self.begin(commands.do(self, name))
+    def _answers(self, screen: Screen[Any], key: str, at_s: float) -> bool:
+        """Let a key answer a dialog; say whether it did."""
+        by = {"up": -1, "down": 1}.get(key, 0)
+        match screen:
+            case Confirm() if key != "enter":
+                screen.dismiss(False)
+            case Confirm():
+                if self._stillness.meant(self._face, at_s):
+                    screen.dismiss(True)
+            case Help() | Palette() | AskReason() if by:
+                screen.move(by)
+            case Help():
+                screen.dismiss(None)
+            case Ask() | Palette() | AskReason() if key == "escape":
+                screen.dismiss(None)
+            case Ask() | Palette() | AskReason() if key == "enter":
+                return not self._stillness.read(self._face, at_s)  # pasted with what opened it
+            case Pick() if key == "backspace":
+                screen.dismiss(None)
+            case _:
+                return False
+        return True
 
-    def _possible(self, action: Action) -> bool:
+    def _arm(self, at_s: float) -> None:
+        """Arm the release: the one place from which that is done.
+
+        Only for an Enter by itself: the run page stood still, and nothing was typed.
+        """
+        if not self.driving:
+            self.action_do("go_on")  # which says so
+        elif self._stillness.meant(self._face, at_s):
+            model = self.model
+            self.driver.take(GoOn(selectors.next_job(model), model.settle_s))
+        else:
+            self.driver.take(Warned(_NOT_MEANT))
+
+    def action_do(self, name: str | None) -> None:
+        """Do one action of the table, if it makes sense now."""
+        if name is None or (self.client is None and name not in OFFLINE):
+            return
+        action = BY_NAME[name]
+        if not self._hindrance(action):
+            commands.do(self, name)
+        elif action.driving and not self.driving:
+            self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
+                               "c takes control when it is free"))  # fmt: skip
+
+    def _hindrance(self, action: Action) -> str:
+        if self.client is None and action.name not in OFFLINE:
+            return "only a file is looked at"
         two = self.model.two_chains
-        return possible(action, self.flow.stage, driving=self.driving, two_chains=two)
+        return hindrance(action, self.flow.stage, driving=self.driving, two_chains=two)
+
+    def choices(self) -> list[Choice]:
+        """Name every action, and what stands in its way now."""
+        return [
+            Choice(one.name, one.text, shown_key(self.keys[one.name]), self._hindrance(one))
+            for one in ACTIONS
+            if one.name != "palette"
+        ]
 
     def action_choose(self, page: str, at: int) -> None:
         """Choose a line of a page's list by mouse."""
         self.pages[page].choose(at)
         self.draw()
-
-    def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Name every action that makes sense now."""
-        del screen
-        for action in ACTIONS:
-            if self.client is None and action.name not in OFFLINE:
-                continue
-            if action.name != "palette" and self._possible(action):
-                told = f"{shown_key(self.keys[action.name])}  {action.command}".rstrip()
-                yield SystemCommand(
-                    action.text, told, lambda name=action.name: self.action_do(name)
-                )

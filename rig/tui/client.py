@@ -7,10 +7,10 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon.aclient import AsyncClient
-from rig.daemon.lease import LEASE_S
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
 from rig.tui.state import DaemonState, typed
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _AGAIN_S = 0.5
+_BEAT_S = 0.15  # between two signs of life
+_LATE_S = 0.02
+_SILENT_S = 0.5  # without an answer to one: all of this within a second
 _START_S = 5.0  # a daemon that was started has this long before another one is
 _IDLE_S = 300.0  # nobody asked for that daemon by name, so it ends when it is left alone
 
@@ -42,6 +45,10 @@ class ReconnectingClient:
         Why the daemon is not heard; empty while it is.
     daemon
         The one that was started from here, if any.
+    disk_s
+        How long the daemon's disk has been at one write; 0 for none.
+    patience_s
+        How long the daemon may take to answer a sign of life.
     """
 
     def __init__(
@@ -52,6 +59,9 @@ class ReconnectingClient:
         self.name = f"rig tui {os.getpid()}"
         self.silence = "looking for it"
         self.changed = True
+        self.disk_s = 0.0
+        self.patience_s = _SILENT_S
+        self._hangs = False
         self._connected = connected
         self._client: AsyncClient | None = None
         self.daemon: subprocess.Popen[bytes] | None = None
@@ -63,7 +73,7 @@ class ReconnectingClient:
     @property
     def up(self) -> bool:
         """Whether the daemon is heard."""
-        return self._client is not None and not self._client.lost.is_set()
+        return self._client is not None and not (self._client.lost.is_set() or self._hangs)
 
     @property
     def port(self) -> str:
@@ -152,15 +162,39 @@ class ReconnectingClient:
             # Beside the signs of life: to open a session may take longer than control lasts.
             reached = asyncio.get_running_loop().create_task(self._going_on())
             while not client.lost.is_set():
-                client.renew()
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(client.lost.wait(), LEASE_S / 4)
-            self.silence = "it is gone"
+                await self._beat(client)
+            self.silence = "it is gone\nan armed board has switched itself off"
         finally:
+            self._hangs, self.disk_s = False, 0.0
             if reached is not None:
                 reached.cancel()
             self._had_control = False
             await client.close()
+
+    async def _beat(self, client: AsyncClient) -> None:
+        """Give a sign of life, and see that it is answered."""
+        begun = monotonic()
+        answer = asyncio.ensure_future(client.call("renew"))
+        while not answer.done():
+            try:
+                await asyncio.wait([answer], timeout=self.patience_s)
+                await asyncio.sleep(_LATE_S)  # what waits here may be the answer
+            except asyncio.CancelledError:
+                answer.cancel()
+                raise
+            if not answer.done():
+                self._hangs = self.changed = True
+                self.silence = (
+                    f"it hangs, without a word for {monotonic() - begun:.0f} s\n"
+                    "an armed board has switched itself off, and a drop that fell waits in it; "
+                    f"if it does not go on: kill -9 {client.replica.state['daemon']['pid']}"
+                )
+        if answer.exception() is None:
+            self.changed |= self._hangs or self.disk_s > 0.0
+            self._hangs, self.silence = False, ""
+            self.disk_s = float(answer.result()["disk_s"])
+            with suppress(TimeoutError):
+                await asyncio.wait_for(client.lost.wait(), _BEAT_S)
 
     async def _going_on(self) -> None:
         await self._connected()

@@ -6,19 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.campaign.machine import COUNTDOWN_S
+from rig.tui.stillness import STILL_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Mapping
     from pathlib import Path
 
-    from textual.screen import ModalScreen
-
     from rig.tui.client import ReconnectingClient
     from rig.tui.driver import Driver
     from rig.tui.follow import Follower
     from rig.tui.model import Model
+    from rig.tui.screens.dialog import Dialog
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
+    from rig.tui.screens.palette import Choice
     from rig.tui.screens.protocol import ProtocolPage
 
 
@@ -36,6 +37,8 @@ class Options:
         The file to be made or continued.
     offline
         Only look at `session`: no daemon is asked for.
+    still_s
+        How long the screen stands still before Enter can arm.
     """
 
     files: tuple[Path, ...] = ()
@@ -45,6 +48,7 @@ class Options:
     socket: Path | None = None
     offline: bool = False
     countdown_s: float = COUNTDOWN_S
+    still_s: float = STILL_S
 
 
 class CommandContext(Protocol):
@@ -65,16 +69,18 @@ class CommandContext(Protocol):
     @property
     def history(self) -> HistoryPage: ...
 
-    async def go(self, page: str) -> None: ...
+    def turn(self, page: str) -> None: ...
 
     def begin(self, work: Coroutine[Any, Any, None]) -> object: ...
 
     def ask(
-        self, question: ModalScreen[Any], answered: Callable[[Any], None] | None = None
+        self, question: Dialog[Any], answered: Callable[[Any], None] | None = None
     ) -> object: ...
 
-    def next_theme(self) -> None: ...
+    def choices(self) -> list[Choice]: ...
 
-    def action_command_palette(self) -> None: ...
+    def action_do(self, name: str | None) -> None: ...
+
+    def next_theme(self) -> None: ...
 
     def exit(self) -> None: ...

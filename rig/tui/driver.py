@@ -22,6 +22,7 @@ from rig.campaign.events import (
 )
 from rig.campaign.machine import step
 from rig.errors import RigError
+from rig.tui.model import StopAnswer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
@@ -50,8 +51,8 @@ class Driver:
     ----------
     flow
         Where the campaign is.
-    since
-        When it came there, by a clock that only goes on, s.
+    stop
+        What became of the latest STOP; `None` before the first.
     asked
         Protocol and session that were opened from here; `None` when they were closed.
     """
@@ -64,7 +65,7 @@ class Driver:
         begin: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
         self.flow = flow
-        self.since = 0.0
+        self.stop: StopAnswer | None = None
         self.asked: tuple[str, str] | None = None
         self._client = client
         self._follower = follower
@@ -72,13 +73,12 @@ class Driver:
 
     def take(self, event: Event) -> None:
         """Take an event, and have its effects carried out."""
-        before = self.flow.stage
         self.flow, wanted = step(self.flow, event)
-        if self.flow.stage is not before:
-            self.since = monotonic()
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
         for effect in wanted:
+            if isinstance(effect, Stop):
+                self.stop = StopAnswer(monotonic())
             self._begin(self._carry_out(effect, self.flow.ticket))
 
     def refuse(self, error: RigError) -> None:
@@ -105,7 +105,10 @@ class Driver:
                 case GiveUp():
                     return  # what is wrong is shown, and the operator goes on from there
                 case Stop(reason):
-                    await client.call("stop", reason=reason)
+                    asked = self.stop
+                    heard = await _heard(client, reason)
+                    if asked is not None and asked is self.stop:
+                        self.stop = asked._replace(heard=heard)
                     return
                 case Wait(seconds):
                     await client.call("wait", seconds=seconds)
@@ -132,3 +135,12 @@ class Driver:
             self.take(effect_failed(ticket, error))
         else:
             self.take(Answered(ticket, token))
+
+
+async def _heard(client: ReconnectingClient, reason: str) -> bool:
+    """Have everything switched off; whether anybody did."""
+    try:
+        await client.call("stop", reason=reason)
+    except RigError:
+        return False
+    return True

@@ -22,6 +22,14 @@ if TYPE_CHECKING:
     from rig.results.live import LiveAnalysis, SessionView
     from rig.tui.client import ReconnectingClient
 
+_UNHEARD = (
+    "the daemon was lost before the release: nothing fell\n"
+    "a board that is not heard of switches itself off; arm again when all is well"
+)
+_UNSEEN = (
+    "the daemon was lost while chains fell\n"
+    "the drop is kept by daemon or board, and judged when it is found"
+)
 _CLOCK_S = 3.0
 """Clock samples come between drops too, so the file is read again so often."""
 
@@ -104,7 +112,7 @@ class Follower:
         self.state = state
         self._look_at_gates(state, now)
         if not client.up:
-            return [Lost(f"the line to the daemon broke\n{client.silence}")]
+            return [Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
         events: list[Event] = [*self._back(state), *_broken(stage, state)]
         session = state.section("session")
         if session:

@@ -17,7 +17,8 @@ from rig.tui.actions import ACTIONS, BY_NAME
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-STOP_KEY = "f9"
+ALWAYS = {"stop": "f9", "go_on": "enter"}
+"""Keys that stay, whatever others an action is given: who knows only one key knows these."""
 _HOW = 'one line an action: reject = "r"'
 RESERVED = ("escape",)
 """Keys whose meaning is fixed."""
@@ -87,7 +88,7 @@ def combined(
     faults = []
     places = {name: f"{source}:{line}" for name, line in (lines or {}).items()}
     chosen: dict[str, list[str]] = {}
-    owner: dict[str, str] = {STOP_KEY: "stop"}
+    owner = {key: name for name, key in ALWAYS.items()}
     for name, value in given.items():
         at = places.get(name, source)
         if name not in BY_NAME:
@@ -102,8 +103,8 @@ def combined(
             for key in keys
             if not _is_key(key)
         ]
-        if name == "stop" and STOP_KEY not in keys:
-            keys.append(STOP_KEY)  # whoever knows only one key knows this one
+        if name in ALWAYS and ALWAYS[name] not in keys:
+            keys.append(ALWAYS[name])
         for key in keys:
             if key in RESERVED:
                 faults.append(f"{at}: {name}: {key} always means STOP")

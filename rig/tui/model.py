@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.analysis.result import GOOD
 from rig.campaign.events import Stage
+from rig.campaign.machine import BEFORE_RELEASE
 from rig.campaign.voids import Voids
 
 if TYPE_CHECKING:
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
     from rig.tui.indicators import Indicators
     from rig.tui.state import DaemonState
 
+SLOW_DISK_S = 0.5
+"""A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
+HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""
 
@@ -25,6 +30,13 @@ class Alarm(NamedTuple):
 
     message: str
     hint: str = ""
+
+
+class StopAnswer(NamedTuple):
+    """What became of the latest STOP: sent at a time (monotonic, s), `heard` once that is known."""
+
+    at_s: float
+    heard: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +63,10 @@ class Model:
         Why the session file cannot be read.
     read
         How many of its drops were analysed so far.
+    stop
+        What became of the latest STOP.
+    disk_s
+        How long the disk has been at one write.
     """
 
     state: DaemonState
@@ -69,6 +85,8 @@ class Model:
     offline: bool = False
     unreadable: str = ""
     read: int = 0
+    stop: StopAnswer | None = None
+    disk_s: float = 0.0
 
     @property
     def stage(self) -> Stage:
@@ -77,6 +95,11 @@ class Model:
             return self.flow.stage
         seen = WATCHED.get(str(self.state.section("drop").get("state")))
         return self.flow.stage if seen is None else seen
+
+    @property
+    def hot(self) -> bool:
+        """Whether something may fall, or does: nothing may stand over that."""
+        return self.stage in HOT
 
     @property
     def two_chains(self) -> bool | None:
@@ -101,14 +124,24 @@ class Model:
         return line.state, line.reasons
 
     @property
+    def replaced(self) -> Job | None:
+        """The latest good attempt before the one in hand, whose place it takes; `None` for none."""
+        if self.view is None or self.job is None:
+            return None
+        run, attempt = self.job
+        earlier = [job for job, one in self.view.results.items()
+                   if job.run == run and job.attempt < attempt and one.verdict in GOOD]  # fmt: skip
+        return earlier[-1] if earlier else None
+
+    @property
     def simulated(self) -> bool:
         """Whether a stamp is needed."""
         return self.state.simulated or bool(self.view and self.view.simulated)
 
     @property
-    def blindfold(self) -> bool:
-        """Whether the latest drop's numbers must not be seen yet."""
-        return self.flow.stage is Stage.RESULT and not self.flow.shown
+    def blind(self) -> bool:
+        """Whether what this session measured is kept back."""
+        return bool(self.state.section("session").get("blind") or (self.view and self.view.blind))
 
 
 def alarm(model: Model) -> Alarm | None:
@@ -119,6 +152,12 @@ def alarm(model: Model) -> Alarm | None:
             f"no daemon: {silence or 'connecting'}",
             f"{hint}{'; ' * bool(hint)}tried again by itself; a drop that was fired is recorded "
             "without this screen; in danger switch the release's supply off",
+        )
+    if model.disk_s > SLOW_DISK_S:
+        return Alarm(
+            f"the disk has been at one write for {model.disk_s:.1f} s",
+            "nothing is lost, and a board that was armed has switched off by itself; "
+            "is the disk full, asleep, or across a network? another program may hold the file",
         )
     link, error = model.state.section("link"), model.state.section("error")
     if link.get("state") == "down" or (link.get("state") == "opening" and error):

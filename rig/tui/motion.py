@@ -91,7 +91,7 @@ def motions(
     table = _table(edges, hz, thin=matches is None)
     found = []
     for role, _, parts in edge_trains(protocol, run, table):
-        model = _model(protocol, run, role)
+        model = model_fall(protocol, run, role)
         if matches is not None:
             pairs = [_matched(part, matches) for part in parts]
         else:
@@ -190,20 +190,26 @@ def _motion(role: str, times: Array, heights: Array, model: Trajectory | None) -
     return ChainFall(role, times, heights, model, delay)
 
 
-def _model(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
-    """Take the prediction's fall, moment by moment."""
+def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
+    """Take the prediction's fall of a chain, moment by moment; `None` outside its domain.
+
+    Parameters
+    ----------
+    role
+        ``impact`` or ``free``.
+    """
     start, gravity = protocol.drop.value, protocol.gravity.value
     name = run.impact if role == "impact" else run.free
     assert name is not None
-    # One κ for all legs: where rods are alike, or nothing is struck.
-    kappas = air_of(protocol, name) or [0.0]
+    kappas = air_of(protocol, name) or [0.0] * protocol.chains[name].chain.rods
     if role == "free" or protocol.surface is None:
         return free_trajectory(0.0, start, gravity, kappas[0])
     found = predict_incline(protocol, run.incline_deg, name)
-    if found.alpha is None or found.gamma is None or len(set(kappas)) > 1:
+    if found.alpha is None or found.gamma is None:
         return None
     chain = protocol.chains[name].chain
     gains = kicks(chain, [found.alpha] * chain.rods, found.gamma)
     places = np.array(chain.heights)
     ratios = np.ones(places.size)
-    return struck_trajectory(0.0, start, gravity, np.array(gains), ratios, places, kappas[0])
+    air = np.array([*kappas, kappas[-1]])
+    return struck_trajectory(0.0, start, gravity, np.array(gains), ratios, places, 1.0, air)

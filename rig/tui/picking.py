@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from textual.content import Content
 
+from rig.analysis.result import GOOD
 from rig.errors import RigError
+from rig.records import Job
 from rig.results import protocol_of
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
-from rig.tui.actions import shown_key
 from rig.tui.replay import Player
 from rig.tui.screens.ask import Pick
 from rig.tui.widgets.banner import LOOKS
@@ -64,7 +65,7 @@ async def sessions(app: CommandContext) -> None:
     mine = view.path if view else app.options.session
     folder = mine.parent if mine else Path()
     entries = await asyncio.to_thread(session_list, folder)
-    await app.go("history")
+    app.turn("history")
     now = app.history.view.path if app.history.view else mine
     at = next((n for n, one in enumerate(entries) if now and _same(one.path, now)), 0)
 
@@ -73,7 +74,7 @@ async def sessions(app: CommandContext) -> None:
             app.begin(_open(app, entries[number]))
 
     title = f"Sessions in {plain(folder.resolve(), 80)}, the newest first"
-    app.ask(Pick(title, [_line(one) for one in entries], at, _stop_key(app)), chosen)
+    app.ask(Pick(title, [_line(one) for one in entries], at), chosen)
 
 
 def drops(app: CommandContext) -> None:
@@ -81,24 +82,25 @@ def drops(app: CommandContext) -> None:
     found, history = app.history.view, app.history
     if found is None:
         return
-    model = app.model
-    hidden = model.flow.job if model.blindfold and history.other is None else None
     lines = []
+    counting = {Job(one.run.number, one.attempt) for one in found.analysis.runs
+                if one.verdict in GOOD}  # fmt: skip
     for job in found.jobs:
-        verdict = "recorded" if job == hidden else found.results[job].verdict
+        verdict = found.results[job].verdict
         symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
         run = found.plan[job.run]
         hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
         lines.append(
             Content.assemble(f"run {job.run:3}, attempt {job.attempt}   {hung:28}",
-                             (f"{symbol} {verdict}", color))
+                             (f"{symbol} {verdict:10}", color),
+                             "counts" if job in counting else "")
         )  # fmt: skip
 
     def chosen(number: int | None) -> None:
         if number is not None:
             history.choose(number)
 
-    app.ask(Pick("Drops of this session", lines, history.player.at, _stop_key(app)), chosen)
+    app.ask(Pick("Drops of this session", lines, history.player.at), chosen)
 
 
 async def _open(app: CommandContext, entry: SessionEntry) -> None:
@@ -127,7 +129,3 @@ def _line(entry: SessionEntry) -> Content:
 
 def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
-
-
-def _stop_key(app: CommandContext) -> str:
-    return shown_key(app.keys["stop"])

@@ -177,7 +177,9 @@ async def _picture(shot: Screenshot, session: Path, keys: Mapping[str, str]) -> 
             first = app.view.jobs[0]
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
-            await app.go("history")
+            app.turn("history")
+            while app.page != "history":
+                await pilot.pause()
         # All edges came at once, which looks like flicker for a while.
         while len(shot.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
             gate.flickers(now := monotonic()) or not gate.steady(now)

@@ -68,17 +68,10 @@ def _expected_end(found: Sequence[ChainFall]) -> float:
     return max(ends, default=0.0)
 
 
-def incline_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
-    """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing.
-
-    Parameters
-    ----------
-    hidden
-        A run whose numbers must not be seen yet.
-    """
+def incline_pictures(view: SessionView) -> list[Picture]:
+    """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing."""
     found = []
-    runs = [one for one in _shown(view, hidden) if one.verdict in GOOD]
-    summary = view.analysis.summary if hidden is None else ()
+    runs = [one for one in view.analysis.runs if one.verdict in GOOD]
     for row in averaged():
         name, scale, title = row.name, row.scale, f"{row.symbol} ({row.unit}), incline (°)"
         curve = view.curves.get(name)
@@ -91,7 +84,7 @@ def incline_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
         ]
         means = [
             (line.incline_deg, line.means[name].value * scale, line.means[name].expanded * scale)
-            for line in summary
+            for line in view.analysis.summary
             if name in line.means
         ]
         found.append(
@@ -123,20 +116,15 @@ def _model_lines(curves: Mapping[str, Any], name: str, scale: float) -> Iterator
         )
 
 
-def control_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
+def control_pictures(view: SessionView) -> list[Picture]:
     """Draw the control charts: of skew with its limits, and of gravity beside the expected one.
-
-    Parameters
-    ----------
-    hidden
-        A run whose numbers must not be seen yet.
 
     Returns
     -------
     list of Picture
         Those of quantities that this scene has.
     """
-    runs = _shown(view, hidden)
+    runs = view.analysis.runs
     found = []
     if view.protocol.two_chains:
         row = RELEASE_SKEW
@@ -150,11 +138,6 @@ def control_pictures(view: SessionView, hidden: int | None) -> list[Picture]:
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
         found.append(_chart("g of the free chain (m/s²), run", view, expected, points))
     return found
-
-
-def _shown(view: SessionView, hidden: int | None) -> list[DropResult]:
-    """All runs but one whose numbers must not be seen yet."""
-    return [one for one in view.analysis.runs if one.run.number != hidden]
 
 
 def _point(measured: Measured | None, scale: float = 1.0) -> tuple[float, float] | None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING
 
+from rig.analysis.result import GOOD
 from rig.campaign import plan
 from rig.campaign.events import Stage
 from rig.records import Job
@@ -16,16 +17,25 @@ if TYPE_CHECKING:
     from rig.campaign.plan import RunLine
     from rig.tui.client import ReconnectingClient
     from rig.tui.follow import Follower
+    from rig.tui.model import StopAnswer
 
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 
 
-def model(client: ReconnectingClient | None, follower: Follower, flow: Flow, page: str) -> Model:
+def model(
+    client: ReconnectingClient | None,
+    follower: Follower,
+    flow: Flow,
+    stop: StopAnswer | None,
+    page: str,
+) -> Model:
     """Take everything that is drawn, as it is now."""
     view = follower.view
     found = Model(
         state=follower.state,
         flow=flow,
+        stop=stop,
+        disk_s=client.disk_s if client else 0.0,
         indicators=follower.indicators,
         protocol=view.protocol if view else None,
         view=view,
@@ -73,6 +83,11 @@ def job(model: Model, page: str) -> Job | None:
     if model.flow.stage in _BETWEEN:
         return latest if page == "result" and latest else next_job(model)
     return model.flow.job
+
+
+def good(model: Model, run: int) -> bool:
+    """Whether a run has a drop that counts."""
+    return any(line.run == run and line.state in GOOD for line in runs(model))
 
 
 def settle_s(model: Model) -> float:

@@ -119,6 +119,8 @@ class Chain:
         Velocity down the slope of each rod as it is let go, m/s; `None` hangs still.
     spin
         Turning about the vertical as it is let go, rad/s.
+    held
+        How many rods, from the first on, are not let go.
     """
 
     rods: Rods
@@ -130,6 +132,7 @@ class Chain:
     drag: Numbers | None = None
     swing: Numbers | None = None
     spin: float = 0.0
+    held: int = 0
 
 
 @dataclass(slots=True)
@@ -145,7 +148,8 @@ class Fall:
     frames_s, places, axes
         For pictures: now and then all middles and axes; shapes (F,), (F, 3, N), (F, 3, N).
     touched_s
-        First touch of each rod, s; infinite if none.
+        First touch of each rod, with the board or with a rod that touched before, s; infinite if
+        none.
     touched_height
         Of its middle then, m.
     top_speed

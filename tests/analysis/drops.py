@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.align import align
 from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
-from rig.analysis.components import STATED, Components
+from rig.analysis.components import Components
 from rig.analysis.drop import analyze_drop
 from rig.analysis.drop_model import DropModel
 from rig.analysis.identify import Identification, adjusted, identify
@@ -33,6 +33,7 @@ UNIFORM, GRADED, SINGLE, FENCE = (
 )
 SCENES = {"uniform": UNIFORM, "graded": GRADED, "single": SINGLE, "fence": FENCE}
 
+STATED = Components()
 HZ = 16_000_000
 CLOCK_U = 1e-6  # what a minute of pings gives
 STRAY = -1

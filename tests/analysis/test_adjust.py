@@ -40,8 +40,8 @@ class Linear:
         residuals = self.offset[role] + self.jacobian[role] @ x
         sigma = self.sigma[role][match]
         ones = np.ones_like(sigma)
-        left = Residuals(residuals[match], sigma, ones, ones.astype(np.bool_))
-        return Equations(left, self.jacobian[role][match], np.arange(5), 5)
+        left = Residuals(residuals[match], sigma, ones, ones > 0.0, ones < 0.0)
+        return Equations(left, 0.0 * ones, self.jacobian[role][match], np.arange(5), 5)
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """All rows in standard deviations: J/σ and r(0)/σ."""

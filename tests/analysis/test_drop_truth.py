@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rig.analysis.components import STATED
-from rig.analysis.gravity import check_gravity
+from rig.analysis.adjust import DONE
 from rig.model.chain import Chain
+from rig.protocol.protocol import Drag
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import (
     FENCE,
     HZ,
     SCENES,
+    STATED,
     UNIFORM,
     Case,
     case,
@@ -56,11 +58,11 @@ def test_a_perfect_rig_measures_the_truth(scene, incline):
 
 @pytest.mark.parametrize(("scene", "incline"), PLACES)
 def test_finer_ticks_leave_less(scene, incline):
-    """At 1 ps what is left is the pull of the vague priors of α, release and gravity."""
+    """At 1 ps what is left is the pull of vague priors, and what an adjustment leaves undone."""
     one = case(SCENES[scene], Dials.quiet(), incline=incline, hz=10**12, clock_u=0.0)
     for name, measured in one.analyze().quantities.items():
         error = measured.value - truth_of(one, name)
-        assert abs(error) < 1e-4 * measured.budget["edges"], name
+        assert abs(error) < DONE * measured.u, name
 
 
 def test_skew_is_found_with_its_sign_and_taken_out():
@@ -84,6 +86,7 @@ LONGER = replace(
     UNIFORM.chains["B"],
     chain=Chain((1.0,) * 22, tuple(0.055 * k for k in range(22))),
     widths=UNIFORM.chains["B"].widths[:1] * 22,
+    diameters=UNIFORM.chains["B"].diameters[:1] * 22,
 )
 
 
@@ -147,7 +150,7 @@ def test_fewest_is_the_binomial_bound():
 # Every dial at the size that the analysis takes for it, and nothing that it does not know of.
 AS_ASSUMED = with_dials(
     skew_sd=1e-3, hang_sd=0.3e-3, drop_error=1.0, rod_sd=0.3e-3, width_sd=0.1e-3, gate_sd=0.3e-3,
-    beam_sd=1e-3, impulse_sd=0.05, jitter_sd=2e-6,
+    datum_sd=0.3e-3, beam_sd=1e-3, impulse_sd=0.05, jitter_sd=2e-6,
 )  # fmt: skip
 CLOCK = 3e-4
 
@@ -171,8 +174,11 @@ def test_stated_uncertainties_are_the_real_ones(scene):
         for name, measured in result.quantities.items():
             ratios.setdefault(name, []).append((measured.value - truth_of(one, name)) / measured.u)
     for name, found in ratios.items():
-        # χ² of 40: below 16.9 or above 76.1 once in 2000 each.
-        assert 16.9 < sum(ratio**2 for ratio in found) < 76.1, name
+        # χ² of 40: below 16.9 or above 76.1 once in 2000 each. Rods may lie where the top one
+        # strikes, but in the model's world none does.
+        squares = sum(ratio**2 for ratio in found)
+        assert squares < 76.1, name
+        assert squares > 16.9 or "strike" in name, name
 
 
 @pytest.mark.parametrize("error", [-4e-3, 4e-3])
@@ -192,16 +198,13 @@ def test_a_wrong_clock_that_is_known_to_be_unsure_covers_the_truth(scene, error)
 @pytest.mark.parametrize("error", [5e-3, -5e-3])
 def test_a_clock_said_to_be_better_than_it_is_does_not_pass_unseen(error):
     """Much of it looks like air, but no air gives a chain another gravity, and none pushes."""
-    drops = []
-    for run in range(1, 5):
-        one = case(UNIFORM, Dials(skew_sd=1e-3, clock=error), run=run)
-        scale = one.scale._replace(hz=float(HZ))
-        result = replace(one, scale=scale).analyze()
-        drops.append((result, one.drop, scale))
-        if error < 0.0:
-            assert result.verdict == "marginal"
-            assert "speeds up" in result.reasons[0]
-    assert not check_gravity(UNIFORM, drops).agrees
+    one = case(UNIFORM, Dials(skew_sd=1e-3, clock=error))
+    result = replace(one, scale=one.scale._replace(hz=float(HZ))).analyze()
+    assert result.verdict == "void"
+    (reason,) = result.reasons
+    found = re.search(r"clock is ([\d.]+)% ± ([\d.]+)% (fast|slow)", reason)
+    assert abs(float(found[1]) - 100.0 * abs(error)) < float(found[2])
+    assert found[3] == ("fast" if error > 0.0 else "slow")
 
 
 AIRS = (0.0, 0.004, 0.03, 0.08)
@@ -218,7 +221,35 @@ def test_what_the_air_takes_is_told_by_the_free_chain(drag):
         still = case(UNIFORM, Dials(skew_sd=1e-3), incline=incline, seed=seed).analyze()
         for name, measured in result.quantities.items():
             assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
-            assert measured.u == pytest.approx(still.quantities[name].u, rel=0.1), name
+            # What falls a tenth slower is told a tenth worse in time.
+            assert measured.u == pytest.approx(still.quantities[name].u, rel=0.15), name
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.03])
+@pytest.mark.parametrize("scene", ["graded", "single", "fence"])
+def test_where_nothing_or_little_tells_the_air_it_widens_the_intervals(scene, drag):
+    """A chain alone, and rods of which thin ones are held back more than thick ones."""
+    for seed in range(1, 5):
+        one = case(SCENES[scene], Dials(skew_sd=1e-3, drag=drag), seed=seed)
+        result = one.analyze()
+        assert result.verdict == "accepted", result.reasons
+        assert not wrong_rods(result, one.truth)
+        for name, measured in result.quantities.items():
+            assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
+
+
+@pytest.mark.parametrize("scene", ["graded", "single", "fence"])
+def test_stated_air_is_where_an_adjustment_begins(scene):
+    """A terminal speed of 18 m/s, κ = 0.030/m: nobody need guess how much it may be."""
+    alone = SCENES[scene]
+    stated = replace(alone, drag=Drag(terminal_speed=Quantity(18.0, 0.5)))
+    for seed in (1, 2):
+        one = case(stated, Dials(skew_sd=1e-3), seed=seed)
+        result, guessed = one.analyze(), replace(one, protocol=alone).analyze()
+        assert result.verdict == "accepted", result.reasons
+        for name, measured in result.quantities.items():
+            assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
+            assert measured.u < (0.5 if scene == "fence" else 1.1) * guessed.quantities[name].u
 
 
 def test_a_free_fall_has_the_gravity_of_the_place():

@@ -159,11 +159,10 @@ WRONG = [
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("change", WRONG)
 def test_what_is_no_fall_of_this_chain_is_void(scene, change):
-    for seed in (1, 2):
-        one = case(SCENES[scene], MILD, incline=40.0 if scene == "uniform" else None, seed=seed)
-        result = one.with_edges(change(one)).analyze()
-        assert result.verdict == "void"
-        assert result.reasons
+    one = case(SCENES[scene], MILD, incline=40.0 if scene == "uniform" else None)
+    result = one.with_edges(change(one)).analyze()
+    assert result.verdict == "void"
+    assert result.reasons
 
 
 @pytest.mark.parametrize("incline", [40.0, 80.0])
@@ -201,10 +200,6 @@ def test_a_dead_gate_is_said_and_harms_nothing_but_the_number_of_edges(channel):
     dead = one.with_edges([edge for edge in one.drop.edges if edge.channel != channel])
     lenient = accepting(dead, missed_edges=0.2).analyze()
     printable(lenient)
-    if channel in {6, 7} and lenient.verdict == "void":
-        # Of the impact side's gates only these two see late rods early.
-        assert "ambiguous" in only_reason(lenient, "void")
-        return
     assert f"channel {channel} " in only_reason(lenient, "marginal")
     assert lenient.quantities.keys() == one.analyze().quantities.keys()
     for name, measured in lenient.quantities.items():
@@ -223,7 +218,9 @@ def test_a_dead_side_is_void(role):
         QUIET.with_edges([edge for edge in QUIET.drop.edges if edge.channel in keep]),
         missed_edges=1.0,
     ).analyze()
-    assert only_reason(result, "void").startswith(f"the {role} side does not look like")
+    unlike, dead = result.reasons
+    assert unlike.startswith(f"the {role} side does not look like")
+    assert dead == f"the gates of the {role} side gave no edges: dead or not plugged in"
     printable(result)
 
 
@@ -254,6 +251,7 @@ def test_a_chain_of_few_rods(scene, rods):
             rod_chain,
             chain=Chain(rod_chain.chain.masses[:rods], rod_chain.chain.heights[:rods]),
             widths=rod_chain.widths[:rods],
+            diameters=rod_chain.diameters[:rods],
         )
         for name, rod_chain in protocol.chains.items()
     }
@@ -273,7 +271,7 @@ def test_what_is_known_exactly_stays_as_it_is(scene):
         protocol,
         drop=Quantity(protocol.drop.value),
         gravity=Quantity(protocol.gravity.value),
-        gates=replace(protocol.gates, height_u=0.0),
+        gates=replace(protocol.gates, height_u=0.0, datum_u=0.0),
         chains={
             name: replace(rod_chain, position_u=0.0, width_u=0.0)
             for name, rod_chain in protocol.chains.items()
@@ -282,7 +280,8 @@ def test_what_is_known_exactly_stays_as_it_is(scene):
     one = case(exact, Dials.quiet(), clock_u=0.0)
     result = one.analyze()
     assert result.verdict == "accepted"
-    ours = {"edges", "hanging height", "single impulses", "beam offsets", "air"}
+    ours = {"edges", "hanging height", "side", "single impulses", "beam offsets", "air"}
+    ours |= {"contact", "top rod", "strings"}
     if scene == "fence":
         ours.add("gravity")  # what is measured, so it is never known
     for name, measured in result.quantities.items():

@@ -8,22 +8,21 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from rig.analysis.components import LEAST_SHARE, STATED
-from rig.analysis.drop import fit_drop
+from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.equations import STRAY, normal_equations
 from rig.analysis.evidence import STATED_WEIGHT
-from rig.analysis.joint_fit import FEWEST, joint_fit
+from rig.analysis.joint_fit import FEWEST
 from rig.analysis.quantities import measurands
 from rig.analysis.refine import Budgets
 from rig.analysis.session import analyze
 from rig.bench.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.model.chain import Chain
-from rig.protocol import reader
+from rig.model.impact import impact_on
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
 from sim.dials import Dials
 from sim.lab import ChainLab
-from tests.analysis.drops import FENCE, UNIFORM, case, true_value, with_dials, wrong_rods
+from tests.analysis.drops import FENCE, STATED, UNIFORM, case, true_value, with_dials, wrong_rods
 from tests.analysis.sessions import MILD, analysis, cases, fit_session
 
 FOUR = (1, 2, 3, 4)
@@ -106,7 +105,9 @@ def test_how_much_everything_scatters_is_found_whatever_was_stated(factor):
     )  # fmt: skip
     components = fit_session(EIGHT, dials, 2).components
     # All at 60°, where α is 0.0689: only the sum of both parts shows.
-    found = asdict(components) | {"impulse": components.impulses(0.0689119616602868) / 0.0689}
+    found = asdict(components) | {
+        "impulse": components.impulses(0.0689119616602868, above(25))[0] / 0.0689
+    }
     true = {
         "gates": dials.gate_sd / UNIFORM.gates.height_u,
         "rods": dials.rod_sd / UNIFORM.chains["A"].position_u,
@@ -156,8 +157,10 @@ def test_intervals_hold_the_truth_and_are_not_too_wide():
     for name, found in ratios.items():
         means = np.array([np.mean(np.square(rig)) for rig in found])
         # The drops of one rig may share their error: ten independent values at the least, forty
-        # at the most. χ² of 10 below 1.26 or above 37.3 once in 2000 each.
-        assert 0.126 < means.mean() < 3.73, name
+        # at the most. χ² of 10 below 1.26 or above 37.3 once in 2000 each. What may lie on the
+        # surface lies on none of the model's.
+        assert means.mean() < 3.73, name
+        assert means.mean() > 0.126 or "strike" in name, name
     for name in ("speed_m_s", "release_skew_s"):  # hardly shared: χ² of 40
         squares = np.square(ratios[name]).ravel()
         assert 16.9 < squares.sum() < 76.1, name
@@ -213,6 +216,22 @@ def test_a_session_teaches_what_the_air_takes(drag):
         assert not wrong_rods(result, one.truth)
         for name, measured in result.quantities.items():
             assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u
+
+
+def test_a_post_off_its_height_moves_a_mean_by_what_the_budget_allows_for():
+    """Beams of one side share an error that no number of drops averages, or tells."""
+    scenes = {u: replace(UNIFORM, gates=replace(UNIFORM.gates, datum_u=u)) for u in (0.0, 1e-3)}
+    ratios = {u: [] for u in scenes}
+    for seed in range(6):
+        drops = cases(FOUR, replace(MILD, datum_sd=1e-3), seed)
+        for u, scene in scenes.items():
+            found = analyze(scene, [one.drop for one in drops], lambda _, at=drops[0].scale: at)
+            (line,) = found.summary
+            truth = np.mean([one.truth.separation_m for one in drops])
+            separation = line.means["separation_m"]
+            ratios[u].append((separation.value - truth) / separation.u)
+    # χ² of 6: above 27.9 once in 10⁴.
+    assert np.square(ratios[1e-3]).sum() < 27.9 < np.square(ratios[0.0]).sum()
 
 
 def test_few_drops_teach_nothing():
@@ -315,7 +334,9 @@ def test_two_rods_have_too_few_impulses_to_learn_their_scatter_from():
     found = analysis([case(scene, MILD, run=run) for run in range(1, 9)])
     assert found.joint is not None
     told = found.joint.degrees["impulse"] - STATED_WEIGHT  # a degree weighs as a member does
-    assert 0.0 < told < 1e-3
+    # α may be anything, with a standard uncertainty of 1: it takes all but that of each impulse.
+    alpha = impact_on(scene.surface, both["A"].chain, 40.0).alpha
+    assert 0.0 < told < 8 * STATED.impulses(alpha, above(2))[0] ** 2
     for name in ("impulse", "impulse_floor"):
         value = getattr(found.joint.components, name)
         assert value == pytest.approx(getattr(STATED, name), rel=told), name
@@ -365,37 +386,3 @@ def test_beams_that_rods_pass_while_others_strike_do_not_keep_the_joint_fit_from
         for one, result in zip(drops, found.runs, strict=True):
             separation = result.quantities["separation_m"]
             assert abs(separation.value - true_value(one.truth, "separation_m")) < 4 * separation.u
-
-
-NARROW = """\
-protocol: 1
-chains: {A: {rods: 2, diameter: 15 mm, length: 30 mm, rod_length: 206 mm, tilt: 5 deg}}
-surface: {restitution: 0.50, friction: 0.20}
-drop: 60 mm
-gravity: 9.81 m/s^2
-plan: {incline: 40 deg, repeats: 6}
-accept: {release_skew: 50 ms, missed_edges: 60 %}
-gates:
-  impact:
-    - {channel: 0, height: 8.6 mm}
-    - {channel: 1, height: 12.1 mm}
-    - {channel: 2, height: 23.0 mm}
-    - {channel: 3, height: 36.1 mm}
-    - {channel: 4, height: 75.0 mm}
-  height_uncertainty: 0 mm
-"""
-
-
-def test_no_drop_is_blamed_where_most_lose_edges_together():
-    """Gates are a millimetre off and said to be exact: that is no fault of one drop."""
-    scene = reader.parse(NARROW)
-    dials = Dials(jitter_sd=50e-6, gate_sd=1e-3)
-    drops = [case(scene, dials, seed=26, run=run) for run in range(1, 7)]
-    found = analysis(drops)
-    alone = [fit_drop(one.protocol, one.run, one.drop, one.scale)[1] for one in drops]
-    together = joint_fit([fit for fit in alone if fit is not None]).drops
-    lost = [drop.matched < 0.9 * fit.matched for drop, fit in zip(together, alone, strict=True)]
-    assert sum(lost) > 3  # else this test shows nothing
-    assert found.joint is None
-    assert not any("go with the other" in why for one in found.runs for why in one.reasons)
-    assert len(found.adjusted) == 6  # each by itself, for whatever else is made of them

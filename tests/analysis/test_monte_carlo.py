@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
 
 from rig.analysis.monte_carlo import Propagated, agreement, monte_carlo, session_monte_carlo
@@ -64,13 +65,16 @@ def test_a_session_s_seed_is_kept():
 
 @pytest.mark.parametrize("shift", [0.0, 0.3])
 def test_intervals_agree_as_their_ends_do(shift):
-    """Half a unit of the first digit of u is 12.5 % of u here, and 10⁶ trials add 0.5 %."""
+    """Half a unit of the first digit of u is 12.5 % of u here; 10⁶ trials are good for 0.5 %."""
     drawn = Propagated(5.0, 0.004, 5.0 - 1.959964 * 0.004, 5.0 + 1.959964 * 0.004)
     found = agreement(5.0 + shift * 0.004, 0.004, drawn, 10**6)
     assert found.d_low == pytest.approx(shift * 0.004, abs=1e-8)
     assert found.d_high == pytest.approx(shift * 0.004, abs=1e-8)
-    assert 0.0005 < found.tolerance < 0.00053
+    assert found.tolerance == pytest.approx(0.0005)
+    assert found.error == pytest.approx(0.0054 * 0.004, rel=0.01)
+    assert found.decided
     assert found.agrees == (shift == 0.0)
+    assert not agreement(5.0 + shift * 0.004, 0.004, drawn, 100).decided
     assert found.json()["agrees"] == found.agrees
 
 
@@ -96,3 +100,62 @@ def test_too_little_for_trials_is_bad_input():
         session_trials(analysis(drops[:3]), 10)
     with pytest.raises(InputError, match="1 trials tell no uncertainty"):
         session_trials(analysis(drops), 1)
+
+
+M = 10**6
+
+
+def _sum(kind, rng):
+    """JCGM 101, 9.2: four normal inputs, four rectangular, and one of these ten times wider."""
+    if kind == "normal":
+        return rng.normal(size=(4, M)).sum(axis=0)
+    half = math.sqrt(3.0) * np.array([1.0, 1.0, 1.0, 10.0 if kind == "one is wider" else 1.0])
+    return (half[:, None] * rng.uniform(-1.0, 1.0, (4, M))).sum(axis=0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "u", "end", "validated"),
+    # Tables 2 to 4: u and the end of the symmetric 95 % interval, to the digits given there.
+    [
+        ("normal", 2.0, 3.92, True),
+        ("rectangular", 2.0, 3.88, True),
+        ("one is wider", 10.1, 17.0, False),
+    ],
+)
+def test_sums_of_jcgm_101(kind, u, end, validated):
+    drawn = Propagated.of(_sum(kind, np.random.default_rng(5)))
+    last = 0.1 if kind == "one is wider" else 0.01
+    assert drawn.u == pytest.approx(u, abs=0.05)
+    assert (-drawn.low, drawn.high) == pytest.approx((end, end), abs=0.5 * last + 2 * 2.7e-3 * u)
+    found = agreement(0.0, u if kind != "one is wider" else math.sqrt(103.0), drawn, M, digits=2)
+    # 3.92 and 3.88 are so near to δ = 0.05 apart that this many trials do not tell.
+    assert found.decided == (kind != "rectangular")
+    assert found.agrees == validated
+
+
+def test_mass_calibration_of_jcgm_101():
+    """9.3, table 6, in mg: what is linearised misses that air and densities act together."""
+    rng = np.random.default_rng(6)
+    mass, extra = rng.normal(100_000.0, 0.050, M), rng.normal(1.234, 0.020, M)
+    air = rng.uniform(1.10, 1.30, M)
+    weight, reference = rng.uniform(7e3, 9e3, M), rng.uniform(7.95e3, 8.05e3, M)
+    drawn = Propagated.of(
+        (mass + extra) * (1 + (air - 1.2) * (1 / weight - 1 / reference)) - 100_000.0
+    )
+    assert drawn.mean == pytest.approx(1.2340, abs=4e-4)
+    assert drawn.u == pytest.approx(0.0754, abs=4e-4)
+    assert (drawn.low, drawn.high) == pytest.approx((1.0834, 1.3825), abs=2e-3)
+    found = agreement(1.234, math.hypot(0.050, 0.020), drawn, M, digits=2)
+    assert found.decided
+    assert not found.agrees
+
+
+@pytest.mark.parametrize(
+    ("at", "mean", "u"), [(0.0, 50.0, 50.0), (0.01, 150.0, 112.0), (0.05, 2550.0, 502.0)]
+)
+def test_comparison_loss_of_jcgm_101(at, mean, u):
+    """9.4, in 10⁻⁶: X₁² + X₂², where the first derivative vanishes."""
+    rng = np.random.default_rng(7)
+    drawn = Propagated.of(1e6 * (rng.normal(at, 0.005, M) ** 2 + rng.normal(0.0, 0.005, M) ** 2))
+    assert drawn.mean == pytest.approx(mean, abs=0.5 + 4 * u / math.sqrt(M))
+    assert drawn.u == pytest.approx(u, abs=0.5 + 0.004 * u)

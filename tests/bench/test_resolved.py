@@ -10,12 +10,12 @@ from dataclasses import replace
 import pytest
 
 from rig.bench import resolved_paper
-from rig.bench.figures import film_figure
 from rig.bench.resolved import CASES, JudgedDrop, as_json, summary
 from rig.bench.resolved_paper import Ensemble
 from rig.cli import main
 from rig.commands import bench_resolved
-from rig.report.canvas import SECOND
+from rig.report.film import film_figure
+from tests.report.test_figures import FILM
 
 TWO = """
 protocol: 1
@@ -137,6 +137,9 @@ WORK = [
         ("step", 1e-5, 2e-4, 2e-5, 1.0), ("step", 5e-6, 2e-4, 5e-6, 2.0),
         ("touch", 1e-5, 2e-4, 1e-4, 1.0), ("touch", 5e-6, 1e-4, 0.0, 2.0),
     )
+] + [
+    {"changed": "25 rods", "step_s": 1e-5, "touch_s": 2e-4, "rms_m": None, "worst_m": None,
+     "cpu_s": 0.1},
 ]  # fmt: skip
 
 
@@ -145,21 +148,24 @@ def test_error_against_run_time_is_kept_and_drawn(tmp_path, monkeypatch, capsys)
     assert main(["bench", "resolved", "--work", "-o", str(tmp_path)]) == 0
     assert "0.0200" in capsys.readouterr().out
     with (tmp_path / "resolved-work.csv").open(newline="") as table:
-        assert [float(row["rms_m"]) for row in csv.DictReader(table)] == [2e-5, 5e-6, 1e-4, 0.0]
+        errors = [row["rms_m"] for row in csv.DictReader(table)]
+    assert errors == ["2e-05", "5e-06", "0.0001", "0.0", ""]
     ET.fromstring((tmp_path / "resolved-work.svg").read_text())
 
 
+def test_what_others_published_is_kept_and_printed(tmp_path, monkeypatch, capsys):
+    lines = [
+        {"what": "ahead (m)", "of": "15 rods", "mean": 0.055, "sd": 0.005, "n": 16},
+        {"what": "T/T_ff", "of": "20 rods", "mean": 0.926, "sd": None, "n": 1},
+    ]
+    monkeypatch.setattr(bench_resolved, "published", lambda: lines)
+    assert main(["bench", "resolved", "--published", "-o", str(tmp_path)]) == 0
+    assert "0.9260" in capsys.readouterr().out
+    with (tmp_path / "resolved-published.csv").open(newline="") as table:
+        assert [row["sd"] for row in csv.DictReader(table)] == ["0.005", ""]
+
+
 def test_a_fall_is_drawn(tmp_path, monkeypatch):
-    found = {
-        "incline_deg": 40.0, "board_m": -0.02, "times_s": [0.19, 0.2], "radii_m": [0.006] * 2,
-        "left": [[[-0.05, 0.0, 0.1], [-0.05, 0.0, 0.15]]] * 2,
-        "right": [[[0.05, 0.0, 0.08], [0.05, 0.0, 0.17]]] * 2,
-        "rest_m": [[0.05], [0.1]],
-    }  # fmt: skip
-    monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: found)
+    monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: FILM)
     assert main(["bench", "resolved", "--film", "40", "-o", str(tmp_path)]) == 0
-    drawn = (tmp_path / "resolved-fall.svg").read_text()
-    ET.fromstring(drawn)
-    assert SECOND in drawn  # the right string is shorter than at rest
-    tight = film_figure(found | {"rest_m": [[0.05], [0.09]]})
-    assert SECOND not in tight
+    assert (tmp_path / "resolved-fall.svg").read_text() == film_figure(FILM)

@@ -26,6 +26,7 @@ from rig.campaign.events import (
     Note,
     Opened,
     Reject,
+    Restore,
     Stage,
     Stop,
     Stopped,
@@ -88,17 +89,15 @@ def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
     assert step(flow, GoOn(None))[0].stage is Stage.DONE
 
 
-def test_blind_a_drop_is_judged_before_its_numbers_are_shown():
-    flow, _ = through(Flow(blind=True), *TO_RESULT, DONE)
-    assert not flow.shown
-    kept, effects = through(flow, GoOn(NEXT))
-    assert (kept.stage, kept.shown, effects) == (Stage.RESULT, True, [])
-    rejected, effects = through(flow, Reject(" a cough "))
-    assert rejected.shown
-    assert effects == [Log(JOB, "rejected", ("a cough",))]
+def test_a_rejection_keeps_notes_and_can_be_taken_back():
+    flow, _ = through(Flow(), *TO_RESULT, DONE)
     noted, effects = through(flow, Note("warm"))
-    assert not noted.shown
     assert effects == [Log(JOB, "accepted", ("note: warm",))]
+    rejected, effects = through(noted, Reject(" a cough "), Reject("a sneeze"), Note("cold"))
+    assert effects[0] == Log(JOB, "rejected", ("a cough", "note: warm"))
+    restored, effects = through(rejected, Restore())
+    assert effects == [Log(JOB, "accepted", ("note: warm", "note: cold"))]
+    assert step(restored, Restore()) == (restored, ())
 
 
 def test_no_cause_no_rejection():
@@ -149,9 +148,9 @@ events = st.one_of(
 )  # fmt: skip
 
 
-@given(st.lists(events, max_size=60), st.booleans(), st.booleans())
-def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening, blind, attended):
-    flow = Flow(blind=blind, attended=attended)
+@given(st.lists(events, max_size=60), st.booleans())
+def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening, attended):
+    flow = Flow(attended=attended)
     armed, waited = None, 0.0
     for event in happening:
         before = flow
@@ -173,16 +172,6 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
             assert Stop() in effects
             assert flow.stage not in BEFORE_RELEASE
         assert flow.ticket >= before.ticket
-
-
-@given(st.lists(events, max_size=40))
-def test_blind_numbers_are_shown_only_by_a_decision(happening):
-    flow = Flow(blind=True)
-    for event in happening:
-        before = flow
-        flow, _ = step(flow, ticketed(flow, event))
-        if before.stage is Stage.RESULT and not before.shown and flow.stage is Stage.RESULT:
-            assert not flow.shown or isinstance(event, (GoOn, Reject))
 
 
 def test_the_countdown_is_as_long_as_it_was_set():
@@ -291,13 +280,3 @@ def test_voids_that_others_logged_count_too():
     flow = voids(SKEW, SKEW)
     flow, _ = through(flow, GoOn(NEXT), Found(Job(1, 3)), judged, DONE, GoOn(NEXT))
     assert flow.stage is Stage.PREPARE
-
-
-def test_blind_it_halts_after_the_decision():
-    flow, _ = through(voids(SKEW, SKEW), GoOn(NEXT))
-    flow = replace(flow, blind=True)
-    flow, _ = through(flow, *void(3)[1:])
-    assert flow.trouble == ""
-    flow, _ = through(flow, GoOn(NEXT))
-    assert (flow.stage, flow.shown, flow.trouble) == (Stage.RESULT, True, "")
-    assert through(flow, GoOn(NEXT))[0].stage is Stage.HALTED

@@ -21,7 +21,7 @@ from tests.cli.test_replay import tamper
 
 PING, REFERENCE, STATUS = (wire.CODES[kind] for kind in (wire.Ping, wire.Reference, wire.Status))
 ARM, FIRE = wire.CODES[wire.Arm], wire.CODES[wire.Fire]
-CERTIFICATE, DISARMED = wire.CODES[wire.DropCertificate], wire.CODES[wire.Disarmed]
+CERTIFICATE, DISARMED = wire.CODES[wire.DropCertificate2], wire.CODES[wire.Disarmed]
 S = 10**9
 
 

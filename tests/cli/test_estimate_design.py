@@ -115,6 +115,14 @@ def test_an_estimate_of_a_fence_is_refused(call, tmp_path):
 
 
 @pytest.fixture
+def scene(tmp_path):
+    """The picket fence, of which it is known that the air takes next to nothing."""
+    path = tmp_path / "fence.yaml"
+    path.write_text(FENCE.read_text("utf-8") + "priors: {drag: 0.005}\n", "utf-8")
+    return path
+
+
+@pytest.fixture
 def table(tmp_path):
     """Three falls through the upper gate of the picket fence, as a data logger's table."""
     from rig.protocol import reader
@@ -134,9 +142,9 @@ def table(tmp_path):
     return path
 
 
-def test_a_logger_s_table_gives_gravity_with_its_uncertainty(call, table, tmp_path):
+def test_a_logger_s_table_gives_gravity_with_its_uncertainty(call, table, scene, tmp_path):
     session = tmp_path / "s"
-    given = ("import", table, "--protocol", FENCE, "--session", session, "--simulated")
+    given = ("import", table, "--protocol", scene, "--session", session, "--simulated")
     done = call(*given, "--channel", "1", "--clock-uncertainty", "20 ppm")
     assert (done.code, done.err) == (0, f"48 edges of 3 runs → {session}\n")
     found = json.loads(call("analyze", session, "--json").out)
@@ -147,14 +155,14 @@ def test_a_logger_s_table_gives_gravity_with_its_uncertainty(call, table, tmp_pa
     assert call("report", session, "-o", tmp_path / "r.html").code == 0
 
 
-def test_a_column_of_times_of_darkening_is_enough(call, table, tmp_path):
+def test_a_column_of_times_of_darkening_is_enough(call, table, scene, tmp_path):
     """Some timers tell only when a beam darkens: nothing else is then expected, or missed."""
     rows = [line.split(";") for line in table.read_text("utf-8").splitlines()[1:]]
     times = [time for time, state, *_ in rows if state == "1"]
     column = tmp_path / "column.csv"
     column.write_text("\n".join(["Time (s)", *times]), "utf-8")
     session = tmp_path / "s"
-    given = ("import", column, "--protocol", FENCE, "--session", session, "--simulated")
+    given = ("import", column, "--protocol", scene, "--session", session, "--simulated")
     done = call(*given, "--channel", "1", "--clock-uncertainty", "20 ppm")
     assert (done.code, done.err) == (0, f"8 edges of 1 runs → {session}\n")
     found = json.loads(call("analyze", session, "--json").out)

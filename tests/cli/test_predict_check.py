@@ -154,6 +154,16 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
         assert any(line.startswith("  no surface:") for line in rest)
 
 
+def test_check_for_one_board_is_its_refusal(call):
+    graded = "protocols/graded-chain.yaml"
+    code, _, _ = call("check", graded, "--board", "mega")
+    assert code == 0
+    code, out, err = call("check", graded, "--board", "uno")
+    assert (code, out) == (2, "")
+    said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change it"
+    assert f"{said}, or take an Arduino Mega 2560" in err
+
+
 def test_check_says_what_predict_notes(call, tmp_path):
     path = tmp_path / "p.yaml"
     path.write_text(SINGULAR, "utf-8")

@@ -74,7 +74,9 @@ def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
     assert stamp == "SIMULATED DATA"
     assert headings.split()[:2] == ["incline", "(°)"]
     assert set(rule) == {"─", " "}
+    rows, remarks = rows[:2], rows[2:]
     assert [row.split()[:2] for row in rows] == [["40", "2"], ["60", "2"]]
+    assert remarks[0].startswith("these falls look like the model")
     assert clock.startswith("time scale: board −13")
     told = [line for line in err.splitlines() if line.startswith("run ")]
     assert [line.split()[1] for line in told] == ["1/4", "2/4", "3/4", "4/4"]

@@ -53,6 +53,8 @@ def block(port):
 
 def press_stop(port):
     port.board.stop(True)
+    port.clock.sleep(1e-3)  # longer than any spike
+    port.board.advance(port.clock.now_ns())
     port.board.stop(False)
 
 

@@ -26,7 +26,10 @@ from tests.analysis.sessions import analysis as analyzed
 from tests.estimate.sessions import DIALS, analysis, forms
 
 INCLINES = (30.0, 50.0, 70.0)
-TRUE = Components(floor=1e-6, hang=1e-4, beam=5e-4, impulse=0.02, impulse_floor=1e-6, gates=2 / 3)
+TRUE = Components(
+    floor=1e-6, hang=1e-4, beam=5e-4, departure=1e-6, impulse=0.02, impulse_floor=1e-6, bounce=1e-6,
+    gates=2 / 3,
+)  # fmt: skip
 """What the simulation's default dials are, in the analysis' words."""
 
 
@@ -129,6 +132,7 @@ def speed_errors(layout: tuple[float, ...]) -> np.ndarray:
 
 def predicted_speed_u(layout: tuple[float, ...]) -> float:
     protocol = placed(SINGLE, list(layout), repeats=16)
+    protocol = replace(protocol, priors=replace(protocol.priors, strings=0.0))  # as TRUE has it
     beams = beams_of(protocol)
     found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)), ("speed_m_s",))
     return found.typical("speed_m_s")

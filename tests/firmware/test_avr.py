@@ -13,7 +13,7 @@ from tests.link.bench import ScriptedLab
 from tests.link.conformance import DeviceConformance
 from tests.link.virtual import VirtualBench
 
-_HALF_TICKS = 1 << 15
+_TURN_TICKS = 1 << 16
 
 
 class AvrBench(VirtualBench):
@@ -33,9 +33,9 @@ class AvrBench(VirtualBench):
 
     def preset_tick(self, seconds_before_wrap):
         avr = self.now().avr
-        halves = 2**17 - round(seconds_before_wrap * 16e6) // _HALF_TICKS
-        even = int.from_bytes(avr.peek("halves"), "little") % 2  # must go on with the counter
-        avr.poke("halves", (halves // 2 * 2 + even).to_bytes(4, "little"))
+        upper = 2**16 - round(seconds_before_wrap * 16e6) // _TURN_TICKS
+        lower = avr.peek("looked")[:2]  # must go on with the counter
+        avr.poke("looked", lower + upper.to_bytes(2, "little"))
 
 
 class AvrConformance(DeviceConformance):

@@ -182,7 +182,8 @@ def test_the_board_says_something_else(names, avrdude, flash):
     assert f"answers as {names['board']}, {names['firmware']}" in err
 
 
-def test_the_board_says_nothing(avrdude, flash):
+def test_the_board_says_nothing(avrdude, flash, monkeypatch):
+    monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
     with silent_port() as path:
         code, out, err = flash("--port", path)
     assert (code, out) == (4, "")

@@ -105,8 +105,11 @@ class HoldSuite(Suite):
         for _ in range(4):
             device.poll()
         bench.reset()
-        with pytest.raises(DeviceError, match="restarted"):
+        with pytest.raises(
+            DeviceError, match=r"in the drop: .* back \d\.\d\d s after FIRE"
+        ) as told:
             device.collect(LABEL)
+        assert "shared with the magnets" in told.value.hint
         (drop,) = device.transcript.unfinished()
         assert drop == device.transcript.pending(LABEL)
         assert any("restarted" in fault for fault in drop.faults)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from rig.link import messages as wire
@@ -15,7 +17,7 @@ LONG = {"pulse_us": 100_000, "record_ms": 150}
 
 
 class OutputSuite(Suite):
-    def test_outputs_are_on_for_the_pulse_and_no_longer(self, watched, device):
+    def test_outputs_are_on_for_the_pulse_and_no_longer(self, watched, device, identity):
         seen = [watched.outputs()]
         token = arm(device, **LONG)
         seen.append(watched.outputs())
@@ -27,9 +29,11 @@ class OutputSuite(Suite):
         seen.append(watched.outputs())
         watched.clock().sleep(0.04)
         seen.append(watched.outputs())
-        device.collect(LABEL)
+        drop = device.collect(LABEL)
         seen.append(watched.outputs())
         assert seen == [0, 0, 0, 1, 1, 0, 0]
+        self.close(watched, identity, drop.certificate.pulse_ticks, 0.1)
+        assert drop.certificate.restarts == 0
 
     def test_all_releases_of_a_drop_go_together(self, watched, device, identity):
         if identity.releases < 2:
@@ -42,6 +46,7 @@ class OutputSuite(Suite):
     def test_a_drop_without_release_switches_nothing(self, watched, device):
         device.fire(arm(device, release=0, pulse_us=0))
         assert watched.outputs() == 0
+        assert device.collect(LABEL).certificate.pulse_ticks == 0
 
     def test_nothing_is_on_outside_of_a_recording(self, watched, device):
         device.fire(arm(device, pulse_us=80_000, record_ms=40))
@@ -54,6 +59,19 @@ class OutputSuite(Suite):
         device.fire(arm(device, **LONG))
         device.abort()
         assert watched.outputs() == 0
+        (fault,) = device.collect(LABEL).faults
+        assert re.fullmatch(r"the release pulse was cut after \S+ ms: it was aborted", fault)
+
+    def test_a_restart_that_nobody_noticed_is_in_the_certificate(self, bench):
+        line = Wire(bench)
+        bench.reset()
+        line.hear(2.0, until=lambda _, message: isinstance(message, wire.Boot))
+        _, certificate = line.drop()
+        assert certificate.restarts & 128
+        line.ask(wire.Acknowledge(certificate.label, certificate.crc32), 3)
+        line.ask(wire.Identify(), 4)
+        _, certificate = line.drop(release=0, pulse_us=0)
+        assert certificate.restarts == 0
 
     def test_a_reset_switches_off(self, watched, device):
         device.fire(arm(device, **LONG))
@@ -166,7 +184,30 @@ class StopSuite(Suite):
         stoppable.stop(False)
         watched.clock().sleep(0.001)
         assert watched.outputs() == 0
-        self.check(stoppable, device.collect(LABEL), identity)
+        drop = device.collect(LABEL)
+        (fault,) = drop.faults
+        assert re.fullmatch(
+            r"the release pulse was cut after 2\d(\.\d)? ms: the emergency stop was opened", fault
+        )
+        self.check(stoppable, drop, identity, faults=drop.faults)
+
+    @pytest.mark.parametrize("width", [1e-5, 2e-4])
+    def test_a_spike_at_it_is_no_stop(self, stoppable, device, identity, width):
+        token = arm(device, **LONG)
+        for _ in range(3):
+            self.spike(stoppable, width)
+        device.fire(token)
+        stoppable.clock().sleep(0.02)
+        self.spike(stoppable, width)
+        drop = device.collect(LABEL)
+        self.check(stoppable, drop, identity)
+        assert drop.certificate.pulse_end == wire.PulseEnd.ORDERED
+
+    def spike(self, stoppable, width):
+        stoppable.stop(True)
+        stoppable.clock().sleep(width)
+        stoppable.stop(False)
+        stoppable.clock().sleep(1e-3)
 
     def test_a_drop_is_read_while_it_is_open(self, stoppable, device):
         drop = self.drop(device)

@@ -81,7 +81,7 @@ def device(clock: FakeClock, answers: dict, **options) -> Device:
 
 
 IDENTITY = wire.Identity(
-    1, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, 0, 256, ""
+    2, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, 0, 256, ""
 )
 
 
@@ -89,6 +89,36 @@ def test_the_first_byte_is_a_delimiter(clock):
     port = FakePort(clock, {wire.Identify: [IDENTITY]})
     assert Device(port, clock).connect() == IDENTITY
     assert port.written[0] == b"\0"
+
+
+class Captive(FakePort):
+    """A board whose boot loader goes on 5 s after the last byte that it heard."""
+
+    freed_ns = 0
+
+    def read(self, size=1):
+        if self.freed_ns and self.clock.ns >= self.freed_ns:
+            self.freed_ns = 0
+            self.answers = {wire.Identify: [IDENTITY]}
+            self.out = b"\0" + encode(Frame(*_with(wire.Boot(0))))
+        return super().read(size)
+
+    def write(self, data):
+        if not self.answers:
+            self.freed_ns = self.clock.ns + 5 * 10**9
+        return super().write(data)
+
+
+def _with(message):
+    code, payload = wire.pack(message)
+    return code, 1, 0, payload
+
+
+def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
+    port = Captive(clock, {})
+    assert Device(port, clock).connect() == IDENTITY
+    with pytest.raises(DeviceTimeoutError, match="did not answer Identify"):
+        device(clock, {}).connect()
 
 
 def test_repeats_have_the_same_seq_and_back_off(clock):
@@ -111,7 +141,7 @@ def test_seq_wraps_around_zero(clock):
 
 def test_an_older_identity_is_refused(clock):
     old = replace(IDENTITY, protocol_version=0)
-    with pytest.raises(DeviceError, match="protocol version 0, this program version 1"):
+    with pytest.raises(DeviceError, match="protocol version 0, this program version 2"):
         device(clock, {wire.Identify: [old]}).connect()
 
 

@@ -99,7 +99,8 @@ def test_a_program_that_does_not_speak_rfc_2217(monkeypatch):
     assert "firewall" in caught.value.hint
 
 
-def test_an_echo_is_no_board():
+def test_an_echo_is_no_board(monkeypatch):
+    monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
     port = open_port("loop://")
     with pytest.raises(DeviceTimeoutError, match="did not answer"):
         Device(port, port_clock(port), tries=2).connect(boot_wait_s=0)

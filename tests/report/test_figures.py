@@ -6,14 +6,22 @@ from xml.etree import ElementTree
 import pytest
 
 from rig.analysis.result import Audit, DropResult, Measured
+from rig.films import Film
 from rig.protocol.protocol import Run
+from rig.report.canvas import SECOND
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
+from rig.report.film import film_figure
 from rig.report.pictures import pictures
 from rig.sections import Sections
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
 CURVES = fake_analysis.curves()
+FILM = Film(
+    40.0, -0.02, [0.006] * 2, [[0.05], [0.1]], [0.19, None], [0.19, 0.2],
+    [[[-0.05, 0.0, 0.1], [-0.05, 0.0, 0.15]]] * 2, [[[0.05, 0.0, 0.08], [0.05, 0.0, 0.17]]] * 2,
+)  # fmt: skip
+"""Two rods that do not move; the right string is shorter than at rest."""
 
 
 def all_three() -> list[str]:
@@ -78,6 +86,16 @@ def test_pictures_follow_the_scene() -> None:
     assert [picture.alt for picture in pictures(fake_analysis.gravity(), sections=Sections())] == [
         "Acceleration of each run"
     ]
+    first = next(one for one in TWO.runs if one.verdict == "accepted")
+    films = {(one.run.number, one.attempt): FILM for one in TWO.runs}
+    fell = pictures(TWO, CURVES, films=films, sections=Sections())[-1]
+    assert fell.alt == f"How run {first.run.number} fell"
     assert pictures(fake_analysis.EMPTY, sections=Sections()) == []
     (picture,) = pictures(fake_analysis.single_chain(), sections=Sections())
     assert "eparation" not in picture.alt + picture.caption
+
+
+def test_slack_strings_are_drawn_apart() -> None:
+    loose = film_figure(FILM)
+    tight = film_figure(replace(FILM, rest_m=[[0.05], [0.09]]))
+    assert tight.count(SECOND) < loose.count(SECOND)

@@ -118,11 +118,14 @@ def test_a_file_of_the_first_format_is_read_and_continued(path: Path) -> None:
     connection = sqlite3.connect(path)
     connection.execute("DROP TABLE reference")
     connection.execute("DROP TABLE host_break")
-    connection.execute('ALTER TABLE "drop" DROP COLUMN release_sense')
+    newer = ("release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv")
+    for column in newer:
+        connection.execute(f'ALTER TABLE "drop" DROP COLUMN {column}')
     connection.execute("PRAGMA user_version = 1")
     connection.close()
     assert DEVICE_DROP.certificate is not None
-    without = replace(DEVICE_DROP, certificate=replace(DEVICE_DROP.certificate, release_sense=None))
+    account = replace(DEVICE_DROP.certificate, **dict.fromkeys(newer))
+    without = replace(DEVICE_DROP, certificate=account)
     with Session.open(path, readonly=True) as session:
         assert list(session.drops()) == [without, IMPORTED]
         assert session.pulses() == session.host_breaks() == []
@@ -189,7 +192,7 @@ def test_results_are_replaced_as_a_whole(path: Path) -> None:
         "UPDATE meta SET value = 'false' WHERE key = 'simulated'",
         'INSERT OR REPLACE INTO "drop" SELECT id + 100, run, attempt, tick_hz, fire_tick, '
         "initial_state, events, crc32, overflows, glitches, late, '[]', host_ns, provenance, "
-        'release_sense FROM "drop"',
+        'release_sense, 0, 0, 0, 0, 0 FROM "drop"',
     ],
 )
 def test_raw_records_are_never_altered(path: Path, statement: str) -> None:

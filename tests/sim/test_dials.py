@@ -14,7 +14,7 @@ from rig.errors import InputError
 from sim.dials import Dials, read_dials
 
 TIMES = ("skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall")
-LENGTHS = ("hang_sd", "rod_sd", "width_sd", "gate_sd", "beam_sd")
+LENGTHS = ("hang_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd")
 SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled")
 FACTORS = (
     "drop_error", "impulse_sd", "friction", "restitution", "clock", "drift", "wander", "reference",

@@ -32,10 +32,10 @@ def paths(draw) -> Path:
     gains = kicks(chain, alphas, draw(st.floats(0, 3)))
     # No impact throws the chain back up: only then is there one time for each height.
     gains = [max(gain, -0.5) for gain in gains]
-    kappa = draw(st.one_of(st.just(0.0), st.floats(1e-4, 0.3)))
-    events = drag_hits(chain, gains, [kappa] * rods, start, gravity)
+    kappas = draw(st.one_of(st.just([]), st.lists(st.floats(1e-4, 0.3), **lists)))
+    events = drag_hits(chain, gains, kappas or [0.0] * rods, start, gravity)
     heights = tuple(-z for z in chain.heights)
-    return Path(draw(st.floats(0, 1)), start, gravity, events, heights, kappa)
+    return Path(draw(st.floats(0, 1)), start, gravity, events, heights, kappas)
 
 
 def end(path: Path) -> float:
@@ -67,17 +67,18 @@ def test_each_hit_is_on_the_way(path):
 @given(paths())
 def test_the_speed_steps_at_each_hit_and_only_there(path):
     g, e = path.gravity, 1e-4
-    for before, after in pairwise(path.hits):
+    kappas = path.kappas or [0.0] * len(path.hits)
+    for (before, after), kappa in zip(pairwise(path.hits), kappas[1:], strict=True):
         if after.time_s - before.time_s < e:
             continue
         first, last = path.release_s + before.time_s, path.release_s + after.time_s
         # Exact for constant acceleration: v(0) = Δz/e − a e/2, v(e) = Δz/e + a e/2. Here z falls.
         slow, fast = before.speed_after, after.speed_before
-        left, come = (g - path.kappa * v * v for v in (slow, fast))
+        left, come = (g - kappa * v * v for v in (slow, fast))
         leaving = (path.height_at(first) - path.height_at(first + e)) / e - left * e / 2
         arriving = (path.height_at(last - e) - path.height_at(last)) / e + come * e / 2
         # In air the acceleration changes by 2κva, which two thirds of e²/2 make a speed of.
-        change = path.kappa * e * e
+        change = kappa * e * e
         assert leaving == pytest.approx(slow, abs=1e-8 + change * slow * abs(left))
         assert arriving == pytest.approx(fast, abs=1e-8 + change * fast * abs(come))
 
@@ -92,7 +93,7 @@ def test_it_never_rises_and_hangs_still_before(path, parts):
 
 @given(st.floats(0.1, 3), st.floats(0.5, 30), st.floats(1e-3, 1.0), st.floats(1e-3, 1.5))
 def test_a_free_fall_in_air_is_the_logarithm_of_a_cosh(start, gravity, kappa, since):
-    path = Path(0.02, start, gravity, kappa=kappa)
+    path = Path(0.02, start, gravity, kappas=[kappa])
     with mp.workdps(40):
         x = mp.sqrt(mp.mpf(kappa) * gravity) * ((0.02 + since) - 0.02)
         fallen = float(mp.log(mp.cosh(x)) / kappa)

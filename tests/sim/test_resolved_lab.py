@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +11,12 @@ import numpy as np
 import pytest
 
 from rig.errors import InputError
+from rig.films import Film, read_films
 from rig.link.messages import pack_label
 from rig.ports import truth_file
 from rig.protocol import reader
-from rig.results import detailed
 from rig.runner import Operator, run_protocol
-from rig.session.store import Session
-from sim import fall_cache, resolved_lab
+from sim import fall_cache
 from sim.dials import Dials, read_dials
 from sim.edges import Request, falls
 from sim.film import film
@@ -108,7 +106,7 @@ def test_truth_at_level_and_at_strike(dropped):
 
 def test_a_rod_that_strikes_early_is_followed_to_the_level(dropped):
     lab, _, _ = dropped
-    (struck,) = fall([lab.chains(pack_label(1, 1))["impact"]], step=lab.step)
+    struck = fall(lab.chains(pack_label(1, 1))["impact"])
     struck.touched_height[-1], struck.top_speed = 0.02, 4.0
     time_s, speed = at_level(struck, GRAVITY)
     assert speed == pytest.approx(math.sqrt(16.0 + 2 * GRAVITY * 0.02))
@@ -126,36 +124,42 @@ def test_a_drop_comes_out_the_same_alone_again_and_from_the_disk(dropped, monkey
 
     assert again() == edges[1]  # from the disk
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(ResolvedLab, "_block", lambda self, label: [label])
     assert again() == edges[1]
 
 
-def test_a_drop_comes_out_the_same_from_several_processes(dropped, monkeypatch, tmp_path):
+def test_arming_a_drop_has_the_next_ones_made(dropped, monkeypatch, tmp_path):
     lab, _, edges = dropped
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(resolved_lab, "FEW", 1)
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    made: list[int] = []
+
+    def make(self, label):
+        made.append(label)
+        return self._hidden(label)
+
+    monkeypatch.setattr(ResolvedLab, "_hidden", ResolvedLab._make, raising=False)
+    monkeypatch.setattr(ResolvedLab, "_make", make)
     twin = ResolvedLab(lab.protocol, lab.dials, 3, world=lab.world)
     labels = [pack_label(run, 1) for run in (1, 2)]
-    resolved_lab.make_ahead([(twin, labels)])
+    twin.rest(labels[0])
+    twin.rest(labels[0])  # armed once more
     assert [twin.drop(label) for label in labels] == edges
+    assert sorted(made) == labels
 
 
 def test_a_scene_without_a_board_costs_little():
     fence = reader.read(Path(__file__).parents[2] / "protocols/picket-fence.yaml")
     lab = ResolvedLab(fence, Dials(), 3, world=ResolvedDials())
     chain = lab.chains(pack_label(1, 1))["free"]
-    (found,) = fall([chain], step=lab.step)
+    found = fall(chain)
     assert found.frames_s.size == 0  # not one step: the whole way down is a formula
 
 
 def test_what_was_kept_for_other_parameters_is_not_taken(dropped):
-    lab, _, _ = dropped
+    lab, _, edges = dropped
     other = ResolvedLab(
         lab.protocol, lab.dials, 3, world=replace(lab.world, string_restitution=0.7)
     )
-    assert not lab.lacks(pack_label(1, 1))
-    assert other.lacks(pack_label(1, 1))
+    assert other.drop(pack_label(1, 1)) != edges[0]
 
 
 def test_a_disk_that_takes_nothing_only_costs_time(monkeypatch, tmp_path):
@@ -166,20 +170,22 @@ def test_a_disk_that_takes_nothing_only_costs_time(monkeypatch, tmp_path):
 
 
 def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
-    path = tmp_path / "four.session"
+    one = tmp_path / "one.yaml"
+    text = Path(scene).read_text().replace("repeats: 2", "repeats: 1")
+    one.write_text(text.replace("incline: 40 deg", "incline: 80 deg"))  # soon analysed
+    path = tmp_path / "one.session"
     url = "sim://?dynamics=resolved&quiet=1&yaw_sd=1 deg"
-    run_protocol(scene, url, str(path), Operator(lambda _: None), 3)
-    told = [json.loads(line) for line in truth_file(path).read_text().splitlines()]
-    assert [one["run"] for one in told] == [1, 2]
-    with Session.open(path, readonly=True) as session:
-        found = detailed(session)[0]
-    assert len(found.runs) == 2
-    for result, one in zip(found.runs, told, strict=True):
-        skew = result.quantities.get("release_skew_s")
-        assert skew is None or abs(skew.value - one["release_skew_s"]) < 1e-3
+    run_protocol(str(one), url, str(path), Operator(lambda _: None), 3)
+    (truth,) = [json.loads(line) for line in truth_file(path).read_text().splitlines()]
+    with truth_file(path).open("a") as cut:
+        cut.write('{"run": 2, "attempt"')
+    ((label, shown),) = read_films(path).items()
+    assert label == (truth["run"], truth["attempt"]) == (1, 1)
+    assert shown.touched_s == pytest.approx(truth["touched_s"], abs=1e-5)
+    assert shown.times_s[-1] > truth["strike_time_s"]
 
 
-def test_falls_for_benchmarks_come_in_one_batch(scene):
+def test_falls_for_benchmarks(scene):
     url = f"sim://?protocol={scene}&dynamics=resolved&quiet=1&yaw_sd=1 deg"
     lines = [json.loads(line) for line in falls([Request(url, [3, 4], [[1], [2]])])]
     assert [line["seed"] for line in lines] == [3, 4]
@@ -231,17 +237,30 @@ def test_air_takes_from_a_chain_what_the_dial_says(scene):
     assert np.isclose(mean, 0.05, rtol=1e-12)
 
 
-def test_a_film_shows_rods_whole_and_above_the_board(scene):
-    settings = {"protocol": scene, "dynamics": "resolved", "quiet": "1", "yaw_sd": "1 deg"}
-    found = film(settings, 1, 3)
-    left, right = np.array(found["left"]), np.array(found["right"])
-    assert left.shape == right.shape == (3, 4, 3)
-    assert np.linalg.norm(right - left, axis=-1) == pytest.approx(np.full((3, 4), 0.102), abs=1e-6)
-    middle = (left + right) / 2
-    board = found["board_m"] - middle[..., 1] * math.tan(math.radians(found["incline_deg"]))
-    assert (middle[..., 2] > board).all()
+def test_a_film_shows_rods_whole_and_above_the_board(dropped):
+    lab, _, _ = dropped
+    chain = lab.chains(pack_label(1, 1))["impact"]
+    found = fall(chain)
+    shown = Film(**film(chain, found))
+    left, right = np.array(shown.left), np.array(shown.right)
+    assert left.shape == right.shape == (len(shown.times_s), 4, 3)
+    assert np.linalg.norm(right - left, axis=-1) == pytest.approx(0.102, abs=2e-4)
+    places = np.array([shown.middles(n) for n in range(len(left))])
+    board = shown.board_m - places[..., 1] * math.tan(math.radians(shown.incline_deg))
+    assert (places[..., 2] > board).all()
     # 18.8 mm: L/2 sin 12° and r/cos 40°, nearly
-    assert found["board_m"] == pytest.approx(-0.0188, abs=0.2e-3)
+    assert shown.board_m == pytest.approx(-0.0188, abs=0.2e-3)
+    # What falls by formula and what falls by steps make one fall, from the release on.
+    for rod in range(4):
+        heights = np.interp(shown.times_s, found.times, found.heights[:, rod])
+        assert places[:, rod, 2] == pytest.approx(heights, abs=0.1e-3)
+    assert shown.times_s[0] < 1e-3
+    assert shown.touched_s == pytest.approx(found.touched_s, abs=1e-5)
+    before, after = (shown.nearest(found.touched_s[0] + late) for late in (-0.01, 0.01))
+    assert shown.tilts_deg(before)[:2] == pytest.approx([12.0, -12.0], abs=0.2)
+    assert abs(shown.tilts_deg(after)[0] - 12.0) > 5.0  # its end was thrown up
+    assert shown.slack(before) == ([False] * 3, [False] * 3)
+    assert any(shown.slack(after)[0] + shown.slack(after)[1])
 
 
 def test_a_free_chain_swings_too(scene):

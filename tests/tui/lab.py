@@ -32,12 +32,14 @@ if TYPE_CHECKING:
 KEYS = {action.name: action.keys for action in ACTIONS}
 
 _DAEMON = """\
-import rig.daemon.lease
+import rig.daemon.lease, rig.daemon.worker
 rig.daemon.lease.LEASE_S = 60.0
+rig.daemon.worker._COMMIT_S = 0.5
 from rig.cli import main
 raise SystemExit(main())
 """
-"""One that takes no screen for lost which a busy machine leaves no time for a sign of life."""
+"""One that takes no screen for lost which a busy machine leaves no time for a sign of life, and
+leaves other writers a gap soon."""
 
 
 @dataclass
@@ -70,6 +72,15 @@ class Operator:
 
         await self.until(there)
 
+    async def means(self) -> None:
+        """Say yes to what is asked, once it stands there to be read."""
+
+        async def gone() -> bool:
+            await self.press("enter")
+            return len(self.app.screen_stack) == 1
+
+        await self.until(gone)
+
     async def sees(self, *texts: str) -> None:
         """Wait until all of these stand on the screen, however lines are broken."""
         await self.until(lambda: all(text in flat(self.app) for text in texts))
@@ -86,6 +97,8 @@ class Lab:
     folder: Path
     protocol: Path
     url: str = "sim://?seed=3"
+    patience_s: float = PATIENCE_S
+    """With a daemon that other programs hold up."""
     daemons: list[subprocess.Popen[bytes]] = field(default_factory=list)
 
     @property
@@ -135,8 +148,11 @@ class Lab:
             self.session,
             socket=self.socket,
             countdown_s=countdown_s,
+            still_s=0.0,
         )
         app = RigApp(options, KEYS)
+        if app.client:
+            app.client.patience_s = self.patience_s
         if name and app.client:
             app.client.name = name
         async with app.run_test(size=size) as pilot:

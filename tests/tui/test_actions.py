@@ -8,7 +8,7 @@ import pytest
 
 from rig.campaign.machine import Stage
 from rig.errors import InputError
-from rig.tui.actions import ACTIONS, BY_NAME, possible, shown_key
+from rig.tui.actions import ACTIONS, BY_NAME, hindrance, shown_key
 from rig.tui.keys import combined, read_keys
 from rig.tui.widgets.text import LONGEST, duration, plain
 
@@ -22,15 +22,13 @@ def test_every_key_has_one_meaning():
 def test_stop_is_possible_always():
     for stage in Stage:
         for driving in (True, False):
-            assert possible(BY_NAME["stop"], stage, driving=driving)
+            assert not hindrance(BY_NAME["stop"], stage, driving=driving)
 
 
 def test_of_one_chart_there_is_no_other():
     for two_chains in (True, False, None):
-        offered = possible(
-            BY_NAME["control_chart"], Stage.DONE, driving=True, two_chains=two_chains
-        )
-        assert offered == (two_chains is not False)
+        why = hindrance(BY_NAME["control_chart"], Stage.DONE, driving=True, two_chains=two_chains)
+        assert why == ("this scene has one chain" if two_chains is False else "")
 
 
 def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
@@ -41,8 +39,9 @@ def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
     assert keys["go_on"] == BY_NAME["go_on"].keys
 
 
-def test_f9_always_stops():
-    assert combined({"stop": "f12"}, "k")["stop"] == "f12,f9"
+def test_f9_always_stops_and_enter_goes_on():
+    given = combined({"stop": "f12", "go_on": "space"}, "k")
+    assert (given["stop"], given["go_on"]) == ("f12,f9", "space,enter")
     with pytest.raises(InputError, match="f9 is the key of stop"):
         combined({"note": "f9"}, "k")
 

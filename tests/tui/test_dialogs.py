@@ -78,8 +78,11 @@ def test_stop_works_in_every_state_that_lasts(lab):
                 (Stage.SETTLING, "f9", "nothing fell"), (Stage.COUNTDOWN, "escape", "nothing fell"),
                 (Stage.TESTING, "f9", "the release is off"),
             ):  # fmt: skip
-                await op.press(*("l", "enter") if stage is Stage.TESTING else ("enter",))
-                await op.at(stage)
+                if stage is Stage.TESTING:
+                    await op.press("l")
+                    await op.until(lambda: isinstance(op.app.screen, Confirm))
+                    await op.means()
+                await op.arms(stage)
                 await stops(op, key)
                 await op.at(Stage.PREPARE)
                 await op.sees(said)
@@ -104,7 +107,8 @@ def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
                 await op.press("n")
                 await op.until(lambda: len(op.app.screen_stack) == 1)
                 assert not called
-            await op.press("l", "enter")
+            await op.press("l")
+            await op.means()
             await op.sees("release driven for 80 ms", "no gate saw anything")
             assert op.app.page == "device"
             await op.press("3")

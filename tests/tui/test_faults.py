@@ -3,26 +3,68 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
+import sqlite3
+from contextlib import closing
 
 import pytest
 
 from rig.campaign.machine import Stage
-from tests.tui.lab import run
+from rig.tui import app, client
+from tests.tui.lab import PATIENCE_S, run
 from tests.tui.screen import text_of
 
 
-@pytest.mark.parametrize("page", "123456")
-def test_a_killed_daemon_is_said_replaced_and_gone_on_with(lab, page):
+def test_a_killed_daemon_is_said_replaced_and_gone_on_with(lab):
     async def work():
         async with lab.ready() as op:
-            await op.press(page)
             await asyncio.to_thread(lab.kill)
-            await op.sees("no daemon", "switch the release's supply off")
+            await op.press("f9")
+            await op.sees("STOP NOT HEARD: switch the release's supply off")
             await recovered(op, lab)
             await op.until(lambda: "no daemon" not in text_of(op.app))
             await op.press("3")
             await op.arms(Stage.RESULT)
             await op.sees("ACCEPTED")
+
+    run(work())
+
+
+def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
+    drawn = app._COUNTED_S  # what a slow machine takes from one tick to the next
+    assert client._BEAT_S + client._SILENT_S + client._LATE_S + drawn < 1.0
+
+
+def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_on(lab):
+    async def work():
+        lab.patience_s = client._SILENT_S
+        async with lab.ready(countdown_s=600.0) as op:
+            await op.arms(Stage.COUNTDOWN)
+            os.kill(lab.daemons[0].pid, signal.SIGSTOP)
+            try:
+                await op.sees("no daemon: it hangs", "an armed board has switched itself off")
+                assert op.app.flow.stage is Stage.PREPARE
+                await op.press("f9")
+                await op.sees("STOP NOT HEARD")
+            finally:
+                os.kill(lab.daemons[0].pid, signal.SIGCONT)
+            await op.sees("the daemon was lost before the release: nothing fell")
+            await op.until(lambda: op.app.state.line(1).state == "interrupted")
+            await op.until(lambda: op.app.state.phase == "idle")
+
+    run(work())
+
+
+def test_a_disk_that_takes_nothing_is_said(lab):
+    async def work():
+        async with lab.ready() as op:
+            with closing(
+                sqlite3.connect(lab.session, PATIENCE_S, check_same_thread=False)
+            ) as other:
+                await asyncio.to_thread(other.execute, "BEGIN IMMEDIATE")
+                await op.sees("the disk has been at one write for", "armed has switched off")
+            await op.until(lambda: "the disk" not in text_of(op.app))
 
     run(work())
 

@@ -53,15 +53,14 @@ def test_pages_keys_and_dialogs_go_by_mouse_alone(lab):
                 await op.until(lambda page=page: op.app.page == page)
             await click(op, "app.do('release_test')")
             await op.until(lambda: isinstance(op.app.screen, Confirm))
-            await click(op, "screen.answer(False)")
+            await click(op, "screen.leave")
             await op.until(lambda: len(op.app.screen_stack) == 1)
-            await click(op, "app.do('release_test')")
-            await click(op, "screen.answer(True)")
-            await op.sees("no gate saw anything")
             await click(op, "app.do('go_on')")
             await op.at(Stage.PREPARE)
+            await op.until(lambda: op.app.page == "run")
             await click(op, "app.do('go_on')")
-            await op.at(Stage.RESULT)
+            await op.sees("armed by the Enter key")
+            await op.arms(Stage.RESULT)
             await op.until(lambda: op.app.flow.logged)
             await click(op, "app.do('note')")
             await op.until(lambda: isinstance(op.app.screen, Ask))
@@ -82,13 +81,16 @@ def test_pages_keys_and_dialogs_go_by_mouse_alone(lab):
 def test_a_protocol_and_stop_are_clicked(lab, fence):
     other = lab.folder / "other.yaml"
     other.write_text(fence.replace("TITLE", "The other one"), "utf-8")
+    broken = lab.folder / "broken.yaml"
+    broken.write_text("protocol: 1\n", "utf-8")
 
     async def work():
-        async with lab.operator(files=(lab.protocol, other)) as op:
+        async with lab.operator(files=(broken, lab.protocol, other)) as op:
+            await op.sees("A short fence")  # what can be used, and not the first of the list
             await op.until(lambda: op.app.client and op.app.client.driving)
 
             async def chosen():  # again, should the list have been laid out anew under the pointer
-                await click(op, "app.choose('protocol', 1)")
+                await click(op, "app.choose('protocol', 2)")
                 return "The other one" in flat(op.app)
 
             await op.until(chosen)

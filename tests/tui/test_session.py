@@ -8,9 +8,11 @@ from rig.campaign.machine import Stage
 from rig.predictions import notes
 from rig.session.schema import RunState
 from rig.session.store import Session
+from rig.tui.commands import REASONS
 from rig.tui.screens import protocol as screen
+from rig.tui.screens.ask import AskReason
 from tests.cli.lab import assert_whole, log_of, short
-from tests.tui.lab import run
+from tests.tui.lab import flat, run
 from tests.tui.screen import text_of
 
 
@@ -29,6 +31,7 @@ def test_a_whole_session_takes_two_keys_a_run(lab):
             await op.at(Stage.DONE)
             await op.sees("4 of 4 runs", "40° ✓✓", "60° ✓✓", "release skew")
             await op.press("z")
+            await op.means()
             await op.at(Stage.PROTOCOL)
 
     run(work())
@@ -41,7 +44,7 @@ def test_a_chosen_protocol_is_described_once_with_what_the_model_notes(lab, monk
     monkeypatch.setattr(screen, "notes", lambda protocol: asked.append(protocol) or notes(protocol))
 
     async def work():
-        async with lab.operator(size=(100, 50)) as op:
+        async with lab.operator(size=(160, 90)) as op:
             await op.at(Stage.PROTOCOL)
             await op.sees("note: 0°: rods gather on a pile", "recorded for 1.5 s")
             for _ in range(3):
@@ -95,8 +98,33 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
             await op.until(lambda: op.app.flow.logged)
             await op.press("x", "escape")
             assert op.app.flow.verdict == "accepted"
-            await op.press("x", *"draught", "enter")
-            await op.sees("REJECTED", "draught")
+            await op.press("x")
+            await op.until(lambda: isinstance(op.app.screen, AskReason))
+            await op.until(pressed_and_seen(op, "enter", "only for a reason"))
+            await op.press(*"draught", "enter")
+            await op.sees("REJECTED", "draught", "note: [/b] hm")
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("x")
+            await op.means()
+            await op.until(lambda: op.app.flow.verdict == "accepted" and op.app.flow.logged)
+            await op.press("x", "down", "enter")
+            await op.sees("REJECTED", REASONS[0])
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("a")
+            await op.means()
+            await op.arms(Stage.RESULT)
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("x")
+            await op.press("escape")
+            await op.press("a")
+            await op.sees("the new one counts instead of it")
+            await op.means()
+            await op.arms(Stage.RESULT)
+            await op.until(lambda: op.app.flow.logged)
+            await op.press("x")
+            await op.sees("Attempt 2 was good")
+            await op.press("down", "down", "enter")
+            await op.sees("attempt 2 was good, but the latest one counts: run 1 has no result now")
             await op.until(lambda: op.app.flow.logged)
             await op.press("enter")
             await op.at(Stage.PREPARE)
@@ -104,29 +132,46 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
 
     run(work())
     with Session.open(lab.session, readonly=True) as session:
-        told = [(entry.state, entry.reasons) for entry in session.states()][-3:]
-    assert told == [
+        told = [(entry.state, entry.reasons) for entry in session.states() if entry.attempt == 1]
+    note = "note: [/b] hm"
+    assert told[-5:] == [
         (RunState.ACCEPTED, ()),
-        (RunState.ACCEPTED, ("note: [/b] hm",)),
-        (RunState.REJECTED, ("draught",)),
+        (RunState.ACCEPTED, (note,)),
+        (RunState.REJECTED, ("draught", note)),
+        (RunState.ACCEPTED, (note,)),
+        (RunState.REJECTED, (REASONS[0], note)),
     ]
 
 
-def test_blind_numbers_come_after_the_decision(lab):
+def pressed_and_seen(op, key, text):
+    """Press a key until a text stands on the screen."""
+
+    async def there():
+        await op.press(key)
+        return text in flat(op.app)
+
+    return there
+
+
+def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
+    lab.protocol.write_text(lab.protocol.read_text("utf-8") + "blind: true\n", "utf-8")
+
     async def work():
         async with lab.ready() as op:
-            await op.press("b")
             await op.arms(Stage.RESULT)
-            await op.sees("BLIND", "Anything against it?")
-            for page in "56":
+            await op.sees("BLIND: what was measured is kept back", "ACCEPTED")
+            assert op.app.state.edges == ()
+            for page in "4356":
                 await op.press(page)
-                await op.until(lambda: op.app.page != "result")
+                await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
                 assert "± 0" not in text_of(op.app)
-            await op.press("4")
-            assert "g  " not in text_of(op.app)
+                assert not op.app.view.drops[op.app.view.jobs[0]].edges
             await op.until(lambda: op.app.flow.logged)
-            await op.press("enter")
-            await op.sees("ACCEPTED", "m/s²")
+            await op.press("4", "b")
+            await op.means()
+            await op.sees("ACCEPTED", "m/s²", "± 0")
+            await op.press("b")
+            await op.sees("this session is not blind")
 
     run(work())
 
@@ -143,7 +188,8 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
             assert op.app.flow.stage is Stage.COUNTDOWN
             await other.press("f9")
             await op.until(lambda: op.app.state.line(1).state == "interrupted")
-            await op.press("k", "c")
+            await op.press("c")
+            await op.means()
             await other.until(lambda: other.app.state.holder is None)
             await other.press("c")
             await other.until(lambda: other.app.client.driving)
@@ -180,9 +226,7 @@ def test_after_three_voids_of_a_kind_it_says_so_and_waits(lab):
     async def work():
         async with lab.ready() as op:
             for attempt in (1, 2, 3):
-                await op.at(Stage.PREPARE)
-                await op.press("enter")
-                await op.at(Stage.RESULT)
+                await op.arms(Stage.RESULT)
                 await op.sees(f"run 1, attempt {attempt}", "VOID")
                 await op.until(lambda: op.app.flow.logged)
                 await op.press("enter")

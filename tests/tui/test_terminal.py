@@ -8,10 +8,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
 
+from rig.tui.stillness import STILL_S
 from tests.cli.lab import ROOT, assert_whole, short
 from tests.tui.lab import short_folder
 from tests.waiting import PATIENCE_S, until
@@ -48,6 +50,21 @@ class Terminal:
     def press(self, *keys: str) -> None:
         self.tmux("send-keys", *keys)
 
+    def enters(self, text: str) -> None:
+        """Press Enter by itself where a text stands, until it is gone, or the program is."""
+
+        def gone() -> bool:
+            time.sleep(1.2 * STILL_S)
+            try:
+                if text not in self.screen():
+                    return True
+                self.press("Enter")
+            except subprocess.CalledProcessError:
+                return True
+            return False
+
+        until(gone)
+
     def sees(self, *texts: str) -> None:
         until(
             lambda: all(text in self.screen() for text in texts),
@@ -81,14 +98,18 @@ def test_an_abba_session_by_keys_alone(terminal, url):
     terminal.press("Enter")
     for number, chain in enumerate("ABBA", start=1):
         terminal.sees(f"RUN {number} of 4", f"impact side {chain}", "✓ gates steady", "Enter arm")
-        terminal.press("Enter")
+        if number == 2:  # typed and pasted: neither words nor the Enter behind them arm
+            terminal.press("-l", "hm u\r\r\r")
+            terminal.sees("not armed: Enter came too soon after another key")
+            terminal.sees("RUN 2 of 4", "Enter arm")
+        terminal.enters("Enter arm")
         terminal.sees(f"run {number}, attempt 1", "release skew", "Enter acknowledge")
         terminal.press("Enter")
     terminal.sees("4 of 4 runs", "✓✓✓✓")
-    terminal.press("z")
-    terminal.sees("Enter open session")
     pid = _daemon_of(terminal.folder)
     terminal.press("q")
+    terminal.sees("LEAVE")
+    terminal.enters("LEAVE")
     os.kill(pid, 0)  # it is there without the screen
     os.kill(pid, signal.SIGTERM)
     assert_whole(session, 4)

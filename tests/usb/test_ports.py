@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from rig.cli import main
 from rig.errors import DeviceError
+from rig.recorder.board_locator import BoardLocator
 from rig.usb import udev
 from rig.usb.listing import KNOWN, path_of, serial_number_at, serial_ports
 from tests.flash.pty_board import PtyBoard
@@ -105,6 +108,21 @@ def test_a_port_that_is_named_says_who_is_there(plugged, capsys):
         assert main(["ports", "--identify", there.path]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert last.startswith(f"{there.path}  Arduino Uno, sim, id ")
+
+
+def test_boards_of_one_name_are_told(plugged, capsys):
+    with PtyBoard(board="Arduino Uno") as one, PtyBoard(board="Arduino Uno") as other:
+        assert main(["ports", "--identify", one.path, other.path]) == 0
+    assert re.search("several boards have the id [0-9a-f]{16}: erase", capsys.readouterr().err)
+
+
+def test_a_board_with_another_s_name_is_told(plugged, caplog):
+    locator = BoardLocator("/dev/ttyACM3")
+    for number in ("85430", "85430", "777"):
+        plugged(info("/dev/ttyACM3", 0x2341, 0x42, number))
+        locator.meet(SimpleNamespace(unique_id=bytes(8)))
+        assert bool(caplog.messages) == (number == "777")
+    assert "two boards have the id 0000000000000000" in caplog.text
 
 
 def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):

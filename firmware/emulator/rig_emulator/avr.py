@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 FILL = 0xC5
 """What RAM holds at power-up, so that the stack leaves a mark."""
+_FOR_EVER = b"\xff\xcf"  # rjmp to itself
 _ROOM = 256  # of the buffers in which C hands over what happened
 _COLOURS = re.compile("\x1b\\[[0-9;]*m")
 
@@ -83,7 +84,8 @@ class Avr:
                 raise InputError(f"the program is too large for {mcu}")
         for address, data in image.eeprom:
             self.eeprom_write(address, data)
-        lib.board_line(self._board, round(10 * frequency / baudrate))
+        self.frequency = frequency
+        self.rate(baudrate)
 
     # -- time
 
@@ -122,6 +124,14 @@ class Avr:
     def reset(self) -> None:
         """Pull the reset pin; RAM and EEPROM stay, and what comes on the wires."""
         lib.board_reset(self._board)
+
+    def start_at(self, address: int) -> None:
+        """Begin at an address, now and after each reset: where a boot loader is."""
+        lib.board_start_at(self._board, address)
+
+    def rate(self, baudrate: float) -> None:
+        """Let the host at the other end of UART 0 take another rate."""
+        lib.board_line(self._board, round(10 * self.frequency / baudrate))
 
     @property
     def watchdog_resets(self) -> int:
@@ -233,6 +243,13 @@ class Avr:
     def eeprom_write(self, address: int, data: bytes) -> None:
         """Preset the EEPROM (empty cells are 0xFF)."""
         self._fits(lib.board_eeprom_set(self._board, address, data, len(data)), address)
+
+    def hang(self, function: str) -> None:
+        """Let a function of the program be an endless loop from now on."""
+        symbol = self.symbols[function]
+        self._fits(
+            lib.board_flash(self._board, symbol.address, _FOR_EVER, len(_FOR_EVER)), function
+        )
 
     def _place(self, place: str | int) -> tuple[int, int]:
         if isinstance(place, int):

@@ -12,6 +12,7 @@ from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig_emulator.avr import Avr, Change, Stop
 from rig_emulator.line import LineToHost
+from rig_emulator.name import NAME_AT, name_record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -79,7 +80,7 @@ class EmulatedBoard:
         self.line = LineToHost(baudrate)
         self.history: deque[Change] = deque(maxlen=_HISTORY)
         draw = hashlib.sha256(f"emulated board {seed}".encode()).digest()
-        self.avr.eeprom_write(0, draw[:8])
+        self.avr.eeprom_write(NAME_AT, name_record(draw[:8]))
         self.avr.watch(wiring.sync)
         for pin in (*wiring.gates, wiring.stop, wiring.reference, wiring.sense):
             if pin is not None:

@@ -10,6 +10,7 @@
 #include <stdio.h>
 
 #define UNLIMITED 0xFFFFFFFFu    /* cycles between two looks at the cycle timers */
+#define SUPPLY_MV 5000u
 #define ADDRESSES 0x10000u       /* of a 16-bit pointer */
 
 void schedule(board_t *b, uint64_t cycle, avr_cycle_timer_t timer)
@@ -58,6 +59,7 @@ static void mend_after_reset(board_t *b)
             t->tov_cycles = t->cs_div_value = t->tov_top = 0;
         }
     }
+    compare_after_reset(b);
     line_after_reset(b);
 }
 
@@ -112,6 +114,7 @@ board_t *board_new(const char *mcu, uint32_t frequency, uint8_t fill)
     widen_memory(avr);
     watchdog_first(avr);
     avr->frequency = frequency;
+    avr->vcc = avr->avcc = SUPPLY_MV;
     avr->sleep = no_sleep;
     for (avr_io_t *io = avr->io_port; io; io = io->next) {
         if (strcmp(io->kind, "port") == 0)
@@ -119,6 +122,9 @@ board_t *board_new(const char *mcu, uint32_t frequency, uint8_t fill)
         else if (strcmp(io->kind, "uart") == 0 && ((avr_uart_t *)io)->name == '0')
             connect_uart(b, (avr_uart_t *)io);
     }
+    for (avr_io_t *io = avr->io_port; io; io = io->next)
+        if (strcmp(io->kind, "timer") == 0)
+            connect_compare(b, (avr_timer_t *)io);
     memset(avr->data + avr->ioend + 1, fill, avr->ramend - avr->ioend);
     mend_interrupts(b);
     mend_after_reset(b);
@@ -143,6 +149,8 @@ int board_flash(board_t *b, uint32_t address, const uint8_t *data, uint32_t size
     memcpy(b->avr->flash + address, data, size);
     return 0;
 }
+
+void board_start_at(board_t *b, uint32_t address) { b->avr->reset_pc = b->avr->pc = address; }
 
 int board_eeprom_set(board_t *b, uint32_t address, const uint8_t *data, uint32_t size)
 {

@@ -33,6 +33,8 @@ int board_eeprom_set(board_t *b, uint32_t address, const uint8_t *data, uint32_t
 int board_eeprom_get(board_t *b, uint32_t address, uint8_t *data, uint32_t size);
 int board_poke(board_t *b, uint32_t address, const uint8_t *data, uint32_t size);
 int board_peek(board_t *b, uint32_t address, uint8_t *data, uint32_t size);
+/* Where a reset begins: a boot loader's address. The board begins there now, too. */
+void board_start_at(board_t *b, uint32_t address);
 uint32_t board_ram_start(const board_t *b);
 uint32_t board_ram_end(const board_t *b); /* the last byte */
 

@@ -42,14 +42,33 @@ typedef struct {
     board_t *board;
     avr_ioport_t *io;
     uint8_t driven, level;     /* from outside */
-    uint8_t ddr, port, watched;
+    uint8_t ddr, port, is, watched;
+    uint8_t taken, wave;       /* pins that compare units drive, and how */
+    avr_io_read_t read;        /* simavr's own reading of PINx */
 } port_t;
+
+typedef struct {
+    board_t *board;
+    avr_timer_t *timer;
+    port_t *port;
+    uint8_t unit, pin, latch;
+} wave_t;
+
+typedef struct {
+    board_t *board;
+    avr_timer_t *timer;
+    avr_io_write_t write;      /* simavr's own, behind ours */
+    void *param;
+} hook_t;
 
 struct board {
     avr_t *avr;
     avr_uart_t *uart;
     port_t ports[PORTS];
     entry_t entries[64];
+    wave_t waves[12];          /* four timers with three units each */
+    hook_t hooks[28];
+    uint32_t wave_count, hook_count;
     queue_t edges, incoming, changes, sent;
     uint32_t entry_cycles, host_byte;
     uint32_t overruns, watchdog_resets;
@@ -70,6 +89,10 @@ void mend_interrupts(board_t *b);
 
 void connect_port(board_t *b, avr_ioport_t *io);
 void pins_after_reset(board_t *b);
+void outputs(port_t *p, uint8_t ddr, uint8_t port);
+
+void connect_compare(board_t *b, avr_timer_t *timer);
+void compare_after_reset(board_t *b);
 
 void connect_uart(board_t *b, avr_uart_t *uart);
 void line_after_reset(board_t *b);

@@ -4,12 +4,18 @@
  */
 #include "inside.h"
 
-static void outputs(port_t *p, uint8_t ddr, uint8_t port)
+static uint8_t driven_high(const port_t *p)
+{
+    return p->ddr & ((p->port & ~p->taken) | (p->wave & p->taken));
+}
+
+void outputs(port_t *p, uint8_t ddr, uint8_t port)
 {
     board_t *b = p->board;
-    uint8_t is = ddr & port, was = p->ddr & p->port;
+    uint8_t is, was = p->is;
     p->ddr = ddr;
     p->port = port;
+    p->is = is = driven_high(p);
     for (uint8_t pin = 0; pin < 8; pin++) {
         if (!((is ^ was) >> pin & 1))
             continue;
@@ -147,7 +153,7 @@ int board_watch(board_t *b, char port, int pin, int on)
 int board_output(const board_t *b, char port, int pin)
 {
     const port_t *p = port_of(b, port, pin);
-    return p ? (p->ddr & p->port) >> pin & 1 : -1;
+    return p ? p->is >> pin & 1 : -1;
 }
 
 uint32_t board_take_changes(board_t *b, change_t *to, uint32_t room)

@@ -10,6 +10,7 @@ from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
 from rig_emulator.avr import Avr
+from rig_emulator.name import NAME_AT, name_record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 _BOOT_CYCLES = 500_000
 _ANSWER_CYCLES = 800_000
 _TRIES = 5
+SYNC_LEAD = 2
+"""Cycles by which the sync output rises before the releases."""
 _LABEL = wire.pack_label(1, 1)
 
 
@@ -63,11 +66,14 @@ class Recording:
         The firmware's account.
     late_ticks
         The firmware's rule for late stamps.
+    outputs
+        What the output pins did; cycles count from FIRE too.
     """
 
     events: list[wire.Event]
     certificate: wire.DropCertificate
     late_ticks: int
+    outputs: list[Change]
 
     def stamps(self, flips: Iterable[Flip]) -> list[Stamp]:
         """Set events beside what happened.
@@ -120,6 +126,10 @@ class Stand:
         Its firmware.
     baudrate
         Of the line; the firmware must have been built for it.
+    named
+        The board's own name, eight bytes; empty for an EEPROM of zeros.
+    waits
+        Cycles before it is first asked who it is.
 
     Attributes
     ----------
@@ -129,7 +139,14 @@ class Stand:
         What it said it is.
     """
 
-    def __init__(self, wiring: Wiring, program: Path, baudrate: int = 500_000) -> None:
+    def __init__(
+        self,
+        wiring: Wiring,
+        program: Path,
+        baudrate: int = 500_000,
+        named: bytes = b"on stand",
+        waits: int = 0,
+    ) -> None:
         self.wiring = wiring
         self.avr = Avr(program, wiring.mcu, baudrate=baudrate)
         self._decoder = Decoder()
@@ -137,8 +154,8 @@ class Stand:
         self._ahead = 0  # of the board's ticks before its cycles
         for pin in (*wiring.gates, wiring.stop):
             self.avr.edge(0, pin, False)
-        self.avr.eeprom_write(0, b"on stand")
-        self.hear(_BOOT_CYCLES)
+        self.avr.eeprom_write(NAME_AT, name_record(named) if named else bytes(16))
+        self.hear(_BOOT_CYCLES + waits)
         identity = self.ask(wire.Identify())
         if not isinstance(identity, wire.Identity):
             raise DeviceError(f"the board answers IDENTIFY with {identity}")
@@ -167,7 +184,11 @@ class Stand:
         return (cycle + self._ahead) % 2**32
 
     def record(
-        self, flips: list[Flip] | Callable[[int], list[Flip]], record_ms: int, noise: bytes = b""
+        self,
+        flips: list[Flip] | Callable[[int], list[Flip]],
+        record_ms: int,
+        noise: bytes = b"",
+        pulse_us: int = 0,
     ) -> Recording:
         """Arm, fire, and let gates change.
 
@@ -180,28 +201,15 @@ class Stand:
             For ARM.
         noise
             Bytes the host sends meanwhile, though it should keep silent.
+        pulse_us
+            For ARM, of all releases; 0 for none.
 
         Returns
         -------
         Recording
             What the firmware sent by itself, its drop acknowledged.
         """
-        gates = (1 << len(self.wiring.gates)) - 1
-        armed = self.ask(wire.Arm(_LABEL, gates, 0, 0, 200, record_ms), 100_000)
-        if not isinstance(armed, wire.Armed):
-            raise DeviceError(f"the board answers ARM with {armed}")
-        self.avr.watch(self.wiring.sync)
-        self.avr.take_changes()
-        self._seq = self._seq % 255 + 1
-        code, payload = wire.pack(wire.Fire(armed.token))
-        changes: list[Change] = []
-        while not changes:
-            self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
-            self.avr.run(self.avr.cycle + 100_000)
-            changes = [
-                change for change in self.avr.take_changes() if change.pin == self.wiring.sync
-            ]
-        fire = changes[0].cycle
+        fire, changes = self.arm_and_fire(record_ms, pulse_us)
         for flip in flips if isinstance(flips, list) else flips(fire):
             self.avr.edge(fire + flip.cycle, self.wiring.gates[flip.gate], flip.blocked)
         self.avr.receive(noise)
@@ -218,4 +226,30 @@ class Stand:
         for pin in self.wiring.gates:
             self.avr.edge(0, pin, False)
         self.ask(wire.Acknowledge(_LABEL, certificate.crc32), 100_000)
-        return Recording(events, certificate, self.identity.late_ticks)
+        outputs = [c._replace(cycle=c.cycle - fire) for c in changes + self.avr.take_changes()]
+        return Recording(events, certificate, self.identity.late_ticks, outputs)
+
+    def arm_and_fire(self, record_ms: int, pulse_us: int) -> tuple[int, list[Change]]:
+        """Begin a drop of all gates and all releases.
+
+        Returns
+        -------
+        int, list of Change
+            The cycle of FIRE, and what the outputs did up to now.
+        """
+        gates = (1 << len(self.wiring.gates)) - 1
+        release = (1 << len(self.wiring.releases)) - 1 if pulse_us else 0
+        order = wire.Arm(_LABEL, gates, release, pulse_us, 200, record_ms)
+        armed = self.ask(order, 100_000)
+        if not isinstance(armed, wire.Armed):
+            raise DeviceError(f"the board answers ARM with {armed}")
+        self.avr.watch(self.wiring.sync)
+        self.avr.take_changes()
+        self._seq = self._seq % 255 + 1
+        code, payload = wire.pack(wire.Fire(armed.token))
+        changes: list[Change] = []
+        while not (begun := [c.cycle for c in changes if c.pin == self.wiring.sync]):
+            self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
+            self.avr.run(self.avr.cycle + 100_000)
+            changes += self.avr.take_changes()
+        return begun[0] + SYNC_LEAD, changes

@@ -13,7 +13,7 @@ from rig_emulator.stand import Flip
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig_emulator.stand import Stamp, Stand
+    from rig_emulator.stand import Recording, Stamp, Stand
     from sim.lab_interface import Lab
 
 HZ = 16_000_000
@@ -129,6 +129,15 @@ def across_halves(stand: Stand, reach: int) -> list[Stamp]:
         return made
 
     return stand.record(flips, (2 * reach + 4) * HALF // _MS + 1).stamps(made)
+
+
+def storm(stand: Stand, rate: float, pulse_us: int) -> Recording:
+    """Toggle two gates, on both ports, all through a release pulse."""
+    last = len(stand.wiring.gates) - 1
+    gap = HZ / rate
+    count = round((pulse_us * 16 + 10 * _MS) / gap)
+    flips = [Flip(round(3000 + n * gap), last * (n // 2 % 2), n % 2 == 0) for n in range(count)]
+    return stand.record(flips, pulse_us // 1000 + 5, pulse_us=pulse_us)
 
 
 def pulse(stand: Stand, gate: int, width: int, count: int = 16) -> tuple[int, int]:

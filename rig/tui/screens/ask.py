@@ -5,50 +5,37 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from textual import on
-from textual.containers import Vertical
-from textual.content import Content
-from textual.screen import ModalScreen
-from textual.style import Style
 from textual.widgets import Input, OptionList
 
+from rig.tui.screens.dialog import Dialog, how
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from textual.app import ComposeResult
-
-_CSS = """
-NAME { align: center middle; background: $background 60%; }
-NAME > Vertical { width: 64; max-width: 96%; height: auto; max-height: 90%; border: heavy $primary;
-                  background: $surface; padding: 0 1; }
-NAME Words { height: auto; }
-NAME #how { margin: 1 0 0 0; }
-"""
+    from textual.content import Content
 
 
-class Ask(ModalScreen[str | None]):
+class Ask(Dialog[str | None]):
     """Ask for one line; Enter gives it, Escape leaves it."""
 
-    DEFAULT_CSS = _CSS.replace("NAME", "Ask") + "Ask Input { margin: 1 0 0 0; }"
+    DEFAULT_CSS = "Ask Input { margin: 1 0 0 0; }"
 
-    def __init__(self, question: str, stop_key: str) -> None:
+    def __init__(self, question: str) -> None:
         super().__init__()
         self._question = question
-        self._stop_key = stop_key
 
-    def compose(self) -> ComposeResult:
-        with Vertical():
-            yield Words(id="question")
-            yield Input(max_length=200)
-            yield Words(id="how")
+    def contents(self) -> ComposeResult:
+        yield Words(id="question")
+        yield Input(max_length=200)
+        yield Words(id="how")
 
     def on_mount(self) -> None:
         self.query_one("#question", Words).say((self._question, "bold"))
         self.query_one("#how", Words).say_content(
-            _how(("Enter", "say so", "screen.say"), ("Esc", "leave it", "screen.leave"),
-                 stop=self._stop_key)
-        )  # fmt: skip
+            how(("Enter", "say so", "screen.say"), ("Esc", "leave it", "screen.leave"))
+        )
         self.query_one(Input).focus()
 
     @on(Input.Submitted)
@@ -56,71 +43,109 @@ class Ask(ModalScreen[str | None]):
         """Give what was typed."""
         self.dismiss(self.query_one(Input).value)
 
-    def action_leave(self) -> None:
-        """Give nothing."""
-        self.dismiss(None)
+
+class AskReason(Dialog[str | None]):
+    """Ask for a reason: one of a list, or one that is typed; without one it stays open."""
+
+    DEFAULT_CSS = """
+    AskReason > Vertical { width: 76; }
+    AskReason OptionList { height: auto; border: none; padding: 0; background: $surface; }
+    """
+
+    def __init__(self, question: str, reasons: Sequence[str]) -> None:
+        super().__init__()
+        self._question = question
+        self._reasons = reasons
+
+    def contents(self) -> ComposeResult:
+        yield Words(id="question")
+        yield Input(max_length=200, placeholder="type a reason, or choose one below with ↑ ↓")
+        yield OptionList(*self._reasons, markup=False)
+        yield Words(id="how")
+
+    def on_mount(self) -> None:
+        options = self.query_one(OptionList)
+        options.can_focus, options.highlighted = False, None
+        self.query_one("#question", Words).say((self._question, "bold"))
+        self._tell("Enter", "reject for this reason")
+        self.query_one(Input).focus()
+
+    def _tell(self, key: str, text: str) -> None:
+        self.query_one("#how", Words).say_content(
+            how((key, text, "screen.say"), ("Esc", "leave it", "screen.leave"))
+        )
+
+    def move(self, by: int) -> None:
+        """Go to the previous or next of the list."""
+        options = self.query_one(OptionList)
+        (options.action_cursor_down if by > 0 else options.action_cursor_up)()
+        if options.highlighted is not None:
+            self.query_one(Input).value = self._reasons[options.highlighted]
+
+    @on(OptionList.OptionSelected)
+    def _clicked(self, event: OptionList.OptionSelected) -> None:
+        self.query_one(Input).value = self._reasons[event.option_index]
+
+    @on(Input.Submitted)
+    def action_say(self) -> None:
+        """Give the reason, if there is one."""
+        reason = self.query_one(Input).value.strip()
+        if reason:
+            self.dismiss(reason)
+        else:
+            self._tell("✗", "a drop is rejected only for a reason")
 
 
-class Confirm(ModalScreen[bool | None]):
-    """Ask whether something is really wanted; Enter means it, any other key leaves it."""
+class Confirm(Dialog[bool | None]):
+    """Ask whether something is really wanted; Enter means it, any other key leaves it.
 
-    DEFAULT_CSS = _CSS.replace("NAME", "Confirm") + "Confirm > Vertical { border: heavy $warning; }"
+    A click never means it: it is the second step of something, and the first may have been one.
+    """
 
-    def __init__(self, title: str, question: str, yes: str, stop_key: str) -> None:
+    DEFAULT_CSS = "Confirm > Vertical { border: heavy $warning; }"
+
+    def __init__(self, title: str, question: str, yes: str) -> None:
         super().__init__()
         self._said = title, question
         self._yes = yes
-        self._stop_key = stop_key
 
-    def compose(self) -> ComposeResult:
-        with Vertical():
-            yield Words(id="question")
-            yield Words(id="how")
+    def contents(self) -> ComposeResult:
+        yield Words(id="question")
+        yield Words(id="how")
 
     def on_mount(self) -> None:
         title, question = self._said
         self.query_one("#question", Words).say((f"{title}\n", "bold $warning"), question)
         self.query_one("#how", Words).say_content(
-            _how(("Enter", self._yes, "screen.answer(True)"),
-                 ("any other key", "leave it", "screen.answer(False)"), stop=self._stop_key)
-        )  # fmt: skip
-
-    def action_answer(self, yes: bool) -> None:
-        """Answer by mouse."""
-        self.dismiss(yes)
+            how(("Enter", self._yes, ""), ("any other key", "leave it", "screen.leave"))
+        )
 
 
-class Pick(ModalScreen[int | None]):
+class Pick(Dialog[int | None]):
     """Ask for one of several lines; keys and mouse as in any list."""
 
-    DEFAULT_CSS = (
-        _CSS.replace("NAME", "Pick")
-        + """
+    DEFAULT_CSS = """
     Pick > Vertical { width: 110; }
     Pick OptionList, Pick OptionList:focus { height: auto; max-height: 24; border: none;
         padding: 0; background: $surface; text-wrap: nowrap; text-overflow: ellipsis; }
     """
-    )
 
-    def __init__(self, question: str, lines: Sequence[Content], chosen: int, stop_key: str) -> None:
+    def __init__(self, question: str, lines: Sequence[Content], chosen: int) -> None:
         super().__init__()
         self._question = question
         self._lines = lines
         self._chosen = chosen
-        self._stop_key = stop_key
 
-    def compose(self) -> ComposeResult:
-        with Vertical():
-            yield Words(id="question")
-            yield OptionList(*self._lines, markup=False)
-            yield Words(id="how")
+    def contents(self) -> ComposeResult:
+        yield Words(id="question")
+        yield OptionList(*self._lines, markup=False)
+        yield Words(id="how")
 
     def on_mount(self) -> None:
         self.query_one("#question", Words).say((self._question, "bold"))
         self.query_one("#how", Words).say_content(
-            _how(("Enter", "take it", "screen.take"), ("Backspace", "leave", "screen.leave"),
-                 stop=self._stop_key)
-        )  # fmt: skip
+            how(("Enter", "take it", "screen.take"), ("Backspace", "leave", "screen.leave"))
+        )
         chooser = self.query_one(OptionList)
         chooser.highlighted = self._chosen
         chooser.focus()
@@ -129,18 +154,3 @@ class Pick(ModalScreen[int | None]):
     def action_take(self) -> None:
         """Give the highlighted line."""
         self.dismiss(self.query_one(OptionList).highlighted)
-
-    def action_leave(self) -> None:
-        """Give nothing."""
-        self.dismiss(None)
-
-
-def _how(*ways: tuple[str, str, str], stop: str) -> Content:
-    """Write what a dialog's keys do; each can be clicked."""
-    parts: list[Content] = []
-    for key, text, action in (*ways, (stop, "STOP", "app.do('stop')")):
-        press = Style.from_meta({"@click": action})
-        color = "bold $error" if text == "STOP" else "bold $primary"
-        parts.append(Content.assemble((key, color), f" {text}").stylize(press))
-        parts.append(Content("   "))
-    return Content.assemble(*parts)

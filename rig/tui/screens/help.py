@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import VerticalScroll
 from textual.content import Content
-from textual.screen import ModalScreen
 
 from rig.tui.actions import ACTIONS, shown_key
+from rig.tui.screens.dialog import Dialog
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
@@ -27,27 +27,24 @@ PAGES = {
 """What an operator does on each page."""
 
 
-class Help(ModalScreen[None]):
+class Help(Dialog[None]):
     """The table of actions; any key but the arrows closes it."""
 
-    DEFAULT_CSS = """
-    Help { align: center middle; background: $background 60%; }
-    Help Vertical { width: 96; max-width: 98%; height: 90%; border: heavy $primary;
-                    background: $surface; padding: 0 1; }
-    Help Words { height: auto; }
-    """
+    DEFAULT_CSS = "Help > Vertical { width: 96; max-width: 98%; height: 90%; }"
 
     def __init__(self, page: str, keys: Mapping[str, str]) -> None:
         super().__init__()
         self._page = page
         self._keys = keys
 
-    def compose(self) -> ComposeResult:
-        with Vertical(), VerticalScroll(can_focus=False):
+    def contents(self) -> ComposeResult:
+        with VerticalScroll(can_focus=False):
             yield Words(id="table")
 
     def on_mount(self) -> None:
-        self.query_one(Words).say_content(table(self._page, self._keys, self.app.size.width >= 100))
+        self.query_one("#table", Words).say_content(
+            table(self._page, self._keys, self.app.size.width >= 100)
+        )
 
     def move(self, by: int) -> None:
         """Scroll."""

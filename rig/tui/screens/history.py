@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 from textual.containers import Horizontal, Vertical
 from textual.content import Content
 
+from rig.films import read_films
+from rig.tui.motion import motions
 from rig.tui.plots import chain_pictures
 from rig.tui.replay import Player, end_of, indicators_at, until
+from rig.tui.scale import drawing
 from rig.tui.screens.page import Page
 from rig.tui.screens.result import number_table
 from rig.tui.widgets.banner import LOOKS
+from rig.tui.widgets.chains import ChainView
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.gates import GateBoard
 from rig.tui.widgets.text import Words, plain
@@ -19,9 +23,12 @@ from rig.tui.widgets.text import Words, plain
 if TYPE_CHECKING:
     from textual.app import ComposeResult
 
+    from rig.films import Film
     from rig.records import Job
     from rig.results.live import SessionView
+    from rig.tui.indicators import Indicators
     from rig.tui.model import Model
+    from rig.tui.motion import ChainFall
 
 
 class HistoryPage(Page):
@@ -44,6 +51,10 @@ class HistoryPage(Page):
         self.other: SessionView | None = None
         """Of another session than the one in hand."""
         self._view: SessionView | None = None
+        self._of: object = None
+        self._told: object = None
+        self._falls: tuple[ChainFall, ...] = ()
+        self._film: Film | None = None
 
     def compose(self) -> ComposeResult:
         yield Words(id="which")
@@ -51,6 +62,7 @@ class HistoryPage(Page):
             with Vertical(id="left"):
                 yield GateBoard(id="indicators")
                 yield Words(id="numbers")
+            yield ChainView(id="chains")
             with Vertical(id="right"):
                 yield Figure(id="z")
                 yield Figure(id="dz")
@@ -116,14 +128,12 @@ class HistoryPage(Page):
             said.say(f"Reading the session: {model.read} drops so far …" if waiting
                      else "No drop is recorded yet. o lists other sessions.")  # fmt: skip
             return
-        if model.blindfold and self.other is None and job == model.flow.job:
-            self._blank()
-            said.say("This drop is blind: its numbers come with your decision.")
-            return
         said.say_content(_which(view, job, self.player))
         drop, hz = view.drops[job], view.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
-        self.query_one(GateBoard).show(view.protocol, indicators_at(view.channels, drop, seen), 0.0)
+        indicators = indicators_at(view.channels, drop, seen)
+        self.query_one(GateBoard).show(view.protocol, indicators, 0.0)
+        self._draw_chains(view, job, indicators)
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
         key = (view.path, job, hz, len(seen))
         if z.wants(key):
@@ -132,9 +142,24 @@ class HistoryPage(Page):
             first, second = chain_pictures(view.protocol, run, seen, hz, matches)
             z.show(first, key)
             dz.show(second, key)
-        self.query_one("#numbers", Words).say_content(number_table(view, job, wide=False))
+        if self._told != (view.path, view.reading, job):
+            self._told = view.path, view.reading, job
+            self.query_one("#numbers", Words).say_content(number_table(view, job, wide=False))
+
+    def _draw_chains(self, view: SessionView, job: Job, indicators: Indicators) -> None:
+        """Draw both chains at the moment of the tape, from all edges of the drop."""
+        run, hz = view.plan[job.run], view.scales[job].hz
+        key = (view.path, job, hz)
+        if key != self._of:
+            drop, matches = view.drops[job], view.results[job].matches or None
+            self._of, self._falls = key, motions(view.protocol, run, drop.edges, hz, matches)
+            self._film = read_films(view.path).get(job)
+        at = drawing(view.protocol, run, self._falls, indicators, self.player.time_s, self._film)
+        self.query_one(ChainView).show(at)
 
     def _blank(self) -> None:
+        self._told = None
+        self.query_one(ChainView).show(None)
         self.query_one("#numbers", Words).say("")
         self.query_one(GateBoard).clear()
         for name in ("#z", "#dz"):

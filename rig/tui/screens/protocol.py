@@ -41,7 +41,7 @@ class ProtocolPage(Page):
         super().__init__()
         self.files = files
         self.session = session
-        self.chosen = 0
+        self.chosen = -1  # none yet
         self._read: tuple[Path, int] | None = None
         self._protocol: Protocol | None = None
         self._problem = ""
@@ -56,7 +56,7 @@ class ProtocolPage(Page):
     @property
     def file(self) -> Path | None:
         """The chosen file."""
-        return self.files[self.chosen] if self.files else None
+        return self.files[max(0, self.chosen)] if self.files else None
 
     @property
     def usable(self) -> bool:
@@ -66,7 +66,7 @@ class ProtocolPage(Page):
     def move(self, by: int) -> None:
         """Choose another file."""
         if self.files:
-            self.chosen = (self.chosen + by) % len(self.files)
+            self.chosen = (max(0, self.chosen) + by) % len(self.files)
             self.query_one(VerticalScroll).scroll_home(animate=False)
 
     def choose(self, at: int) -> None:
@@ -81,6 +81,8 @@ class ProtocolPage(Page):
             assert model.protocol is not None
             self.query_one("#scene", Words).say_content(self._description(model.protocol))
             return
+        if self.chosen < 0:
+            self._choose_usable()
         self._look()
         rows = []
         for at, file in enumerate(self.files):
@@ -101,6 +103,15 @@ class ProtocolPage(Page):
         self.query_one("#scene", Words).say_content(
             Content.assemble(into if session else "", self._description(self._protocol))
         )
+
+    def _choose_usable(self) -> None:
+        """Begin with the first file that can be used here, or with the first if none can."""
+        for at in range(len(self.files)):
+            self.chosen = at
+            self._look()
+            if self.usable:
+                return
+        self.chosen = 0
 
     def _description(self, protocol: Protocol) -> Content:
         """Describe a protocol, once: this is drawn many times a second, and predicts."""

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from textual.containers import Horizontal
 from textual.content import Content
 
-from rig.analysis.distributions import coverage_factor
-from rig.analysis.result import Measured
+from rig.analysis.result import normalized_error
 from rig.measurands import RELEASE_SKEW, listed
-from rig.predictions import predicted_run
+from rig.predictions import predicted_parts, predicted_run
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import chain_pictures
 from rig.tui.screens.page import Page
+from rig.tui.why import speed_picture, stated, why_words
 from rig.tui.widgets.banner import Banner
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.text import Words
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from rig.results.live import SessionView
     from rig.tui.model import Model
     from rig.tui.widgets.figure import Picture
-    from rig.units import Quantity
 
 
 class ResultPage(Page):
@@ -36,12 +34,19 @@ class ResultPage(Page):
     SCOPED_CSS = False
     DEFAULT_CSS = """
     ResultPage #numbers { height: auto; padding: 0 1; }
+    ResultPage #why { height: auto; padding: 1 1 0 1; }
+    ResultPage.-unknown #why, .-low ResultPage #why { display: none; }
     ResultPage #figures { height: 1fr; }
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._told: object = None
 
     def compose(self) -> ComposeResult:
         yield Banner(id="banner")
         yield Words(id="numbers")
+        yield Words(id="why")
         with Horizontal(id="figures"):
             yield Figure(id="z")
             yield Figure(id="dz")
@@ -50,19 +55,23 @@ class ResultPage(Page):
         """Draw what holds now."""
         self.query_one(Banner).show(model)
         view, job = model.view, model.job
-        ready = view is not None and job in view.results and not model.blindfold
+        ready = view is not None and job in view.results
         numbers = self.query_one("#numbers", Words)
         numbers.display = ready
+        self.set_class(not ready, "-unknown")
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
         if not ready or view is None or job is None:
             z.show(None)
             dz.show(None)
             return
-        numbers.say_content(number_table(view, job))
+        if self._told != (view.path, view.reading, job):  # predicting takes its time
+            self._told = view.path, view.reading, job
+            numbers.say_content(number_table(view, job))
+            self.query_one("#why", Words).say(why_words(view, job))
         key = (view.path, job, view.scales[job].hz)
         if z.wants(key):
             first, second = drop_pictures(view, job)
-            z.show(first, key)
+            z.show(speed_picture(view, job) or first, key)
             dz.show(second, key)
 
 
@@ -76,7 +85,8 @@ def drop_pictures(view: SessionView, job: Job) -> tuple[Picture | None, Picture 
 def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     """Write the numbers with U95; where there is room, the model's and the normalized error too."""
     result = view.results[job]
-    expected = predicted_run(view.protocol, view.plan[job.run])
+    run = view.plan[job.run]
+    expected, parts = predicted_run(view.protocol, run), predicted_parts(view.protocol, run)
     head = f"{'':15}{'measured ± U95':>20}"
     lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
     for row in listed():
@@ -88,9 +98,9 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
         if not wide:
             pass
         elif model is not None:
-            told = Measured(model.value, model.u) if model.u else model.value
-            line += f"{plus_minus(told, row.scale):>16}"
-            line += f"   {fixed(_normalized(measured, model), 2):>5}"
+            line += f"{plus_minus(stated(model), row.scale):>16}"
+            error = normalized_error(measured, model, parts.get(row.name))
+            line += f"   {fixed(error, 2):>5}"
         elif row == RELEASE_SKEW:
             limit = view.protocol.accept.release_skew * row.scale
             line += f"{f'limit ±{limit:g}':>16}"
@@ -98,8 +108,3 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     counts = " · ".join(f"{kind} {count}" for kind, count in result.audit.json().items())
     lines.append(Content(f"{'edges':15}{counts}"))
     return Content("\n").join(lines)
-
-
-def _normalized(measured: Measured, model: Quantity) -> float | None:
-    width = math.hypot(measured.expanded, coverage_factor(math.inf) * model.u)
-    return (measured.value - model.value) / width if width > 0.0 else None

@@ -10,9 +10,12 @@ from textual.content import Content
 from textual.widgets import Digits
 
 from rig.campaign.events import Stage
-from rig.tui.motion import as_table
+from rig.tui.motion import as_table, motions
 from rig.tui.plots import chain_pictures
+from rig.tui.scale import drawing
 from rig.tui.screens.page import Page
+from rig.tui.why import expected_words
+from rig.tui.widgets.chains import ChainView
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.gates import GateBoard, named
 from rig.tui.widgets.text import Words, duration, plain
@@ -20,6 +23,7 @@ from rig.tui.widgets.text import Words, duration, plain
 if TYPE_CHECKING:
     from textual.app import ComposeResult
 
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.tui.model import Model
 
@@ -49,6 +53,8 @@ class RunPage(Page):
         super().__init__()
         self._of: Job | None = None
         self._table = as_table(())  # its edges
+        self._expects_of: tuple[Protocol | None, Run | None] = None, None
+        self._expects = ""
 
     def compose(self) -> ComposeResult:
         with Horizontal():
@@ -57,6 +63,7 @@ class RunPage(Page):
                 yield Digits("3", id="count")
                 yield Words(id="checks")
                 yield GateBoard(id="indicators")
+            yield ChainView(id="chains")
             with Vertical(id="right"):
                 yield Figure(id="z")
                 yield Figure(id="dz")
@@ -67,13 +74,23 @@ class RunPage(Page):
         self.set_class(stage in _FALLING, "-live")
         counting = stage is Stage.COUNTDOWN and model.driving
         self.set_class(counting, "-count")
-        self.query_one("#card", Words).say_content(_card(model, low=self.screen.has_class("-low")))
+        self.query_one("#card", Words).say_content(
+            _card(model, self._expected(model), low=self.screen.has_class("-low"))
+        )
         if counting:
             self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
         checks = self.query_one("#checks", Words)
         checks.say_content(_checks(model))
         self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
         self._plots(model)
+
+    def _expected(self, model: Model) -> str:
+        """Say what the model expects of the run in hand, worked out once."""
+        protocol, run = model.protocol, model.run
+        if protocol is not self._expects_of[0] or run != self._expects_of[1]:
+            self._expects_of = protocol, run
+            self._expects = expected_words(protocol, run) if protocol and run else ""
+        return self._expects
 
     def _plots(self, model: Model) -> None:
         drop = model.state.section("drop")
@@ -82,18 +99,29 @@ class RunPage(Page):
         edges = model.state.edges if live else ()
         key = (model.job, model.run, len(edges), live)
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        if not z.wants(key):
-            return
         if model.job != self._of or len(edges) < len(self._table):
             self._of, self._table = model.job, as_table(())
         # Only what is new is taken over: there may be thousands, and they come every tick.
         self._table = np.concatenate([self._table, as_table(edges[len(self._table) :])])
+        self._chains(model, hz, live=live)
+        if not z.wants(key):
+            return
         first, second = chain_pictures(model.protocol, model.run, self._table, hz, None)
         z.show(first, key)
         dz.show(second, key)
 
+    def _chains(self, model: Model, hz: float, *, live: bool) -> None:
+        """Draw both chains where the latest edge has them."""
+        view = self.query_one(ChainView)
+        if not live or model.protocol is None or model.run is None:
+            view.show(None)
+            return
+        falls = motions(model.protocol, model.run, self._table, hz)
+        time_s = float(self._table[-1, 0]) / hz if len(self._table) else 0.0
+        view.show(drawing(model.protocol, model.run, falls, model.indicators, time_s))
 
-def _card(model: Model, *, low: bool) -> Content:
+
+def _card(model: Model, expected: str, *, low: bool) -> Content:
     """Say what to hang where; on a low screen in few lines."""
     run, job, protocol = model.run, model.job, model.protocol
     if job is None or run is None or protocol is None:
@@ -108,10 +136,11 @@ def _card(model: Model, *, low: bool) -> Content:
         incline = ("incline", f"{run.incline_deg:g}°")
         facts = [("impact side", plain(run.impact, 40)), *free, incline]
     datum = "contact point" if protocol.surface is not None else "datum of the gates"
+    expects = [("model", expected)] if expected else []
     start = ("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {datum}")
     width, between = (0, "   ") if low else (12, "\n")
     hung = Content(between).join(_fact(*fact, width) for fact in facts)
-    return Content("\n").join([head, hung, _fact(*start, width)])
+    return Content("\n").join([head, hung, *(_fact(*fact, width) for fact in (start, *expects))])
 
 
 def _fact(name: str, value: str, width: int) -> Content:

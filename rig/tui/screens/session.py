@@ -75,12 +75,11 @@ class SessionPage(Page):
             for figure in figures:
                 figure.show(None)
             return
-        hidden = model.job.run if model.blindfold and model.job else None
-        key = (view.path, view.reading, hidden, self._chart)
+        key = (view.path, view.reading, self._chart)
         if not any(figure.wants(key) for figure in figures):
             return
         low, wide = self.screen.has_class("-low"), self.screen.has_class("-wide")
-        means, charts = incline_pictures(view, hidden), control_pictures(view, hidden)
+        means, charts = incline_pictures(view), control_pictures(view)
         turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
         shown = {
             "separation": means[:1],
@@ -130,7 +129,7 @@ def _plan(model: Model) -> Content:
         return Condition(line.incline_deg, line.impact if unlike else None)
 
     summary = {}
-    if model.view is not None and not model.blindfold:
+    if model.view is not None:
         summary = {one.condition: one for one in model.view.analysis.summary}
     ordered = sorted(model.state.runs, key=condition)
     groups = [list(group) for _, group in groupby(ordered, key=condition)]
@@ -150,7 +149,7 @@ def _plan(model: Model) -> Content:
 def _taught(model: Model) -> tuple[str, str]:
     """Say whether the drops have taught each other what they have in common."""
     view = model.view
-    if view is None or model.blindfold or not view.analysis.summary:
+    if view is None or not view.analysis.summary:
         return "", ""
     more = " · learning from the newest …" if view.lagging else ""
     if view.fitted:
@@ -163,8 +162,7 @@ def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:
     """A symbol a run; the one that is on turns its colours round."""
     for line in runs:
         now = model.job is not None and line.run == model.job.run
-        hidden = model.blindfold and now
-        symbol, colour = LOOKS.get("recorded" if hidden else line.state, ("?", "$foreground"))
+        symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))
         yield symbol, f"{colour} reverse" if now else colour
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from rig.analysis.remedies import remedies
+from rig.analysis.result import GOOD
 from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
@@ -39,16 +40,10 @@ class Banner(Words):
 
 
 def verdict_words(model: Model) -> Content:
-    """Write the verdict; in blind mode only that there is one to be given."""
+    """Write the verdict and its reasons."""
     if model.job is None:
         return Content("no drop yet")
     run = f"run {model.job.run}, attempt {model.job.attempt}"
-    if model.blindfold:
-        return Content.assemble(
-            (" BLIND ", "bold $background on $accent"),
-            f"  {run} is recorded. Anything against it? Reject it now with a cause, or keep it:\n"
-            "  only then its numbers are shown.",
-        )
     verdict, reasons = model.verdict
     if not verdict:
         return Content(f"{run}: not judged yet")
@@ -60,6 +55,17 @@ def verdict_words(model: Model) -> Content:
     lines += [Content.assemble("  ", (plain(reason, 200), "")) for reason in reasons[:4]]
     if len(reasons) > 4:
         lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))
+    replaced = model.replaced
+    if verdict not in GOOD and replaced is not None:
+        lines += [
+            Content(f"  attempt {replaced.attempt} was good, but the latest one counts: "
+                    f"run {model.job.run} has no result now"),
+            Content("  → a repeats it, in its block and before anything is changed at the rig"),
+        ]  # fmt: skip
+    if model.blind:
+        lines.append(
+            Content("  BLIND: what was measured is kept back until the session is unblinded")
+        )
     if verdict == "void":
         lines += [Content(f"  → {what}") for what in remedies(reasons)[:_REMEDIES]]
     return Content("\n").join(lines)

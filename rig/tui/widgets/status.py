@@ -75,7 +75,7 @@ def headline(model: Model, page: str, width: int) -> Content:
         link = "file only"
     right = [f"{plain(model.port, 24)}  {link}" if model.port else link]
     stamp = " ▲ SIMULATED " if model.simulated else ""
-    blind = " BLIND " if model.flow.blind else ""
+    blind = " BLIND " if model.blind else ""
     taken = len(right[0]) + len(stamp) + len(blind) + 4
     name = _NAMES.get(page, "")
     title = plain(model.state.section("session").get("title") or

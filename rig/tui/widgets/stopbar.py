@@ -9,8 +9,7 @@ from textual.content import Content
 from textual.style import Style
 
 from rig.campaign.events import Stage
-from rig.campaign.machine import BEFORE_RELEASE
-from rig.tui.actions import ACTIONS, OFFLINE, possible, shown_key
+from rig.tui.actions import ACTIONS, OFFLINE, hindrance, shown_key
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
 
 _ALWAYS = ("help", "palette", "quit")
-_FIRST = ("go_on", "reject", "note", "again", "control", "blind")
+_FIRST = ("go_on", "reject", "note", "again", "control", "unblind")
 _GO_ON = {
     Stage.PROTOCOL: "open session",
     Stage.DEVICE: "to the first run",
@@ -39,34 +38,40 @@ _OF_PAGE = {
 """What is wanted most on some pages."""
 
 
+class StopLine(Words):
+    """The bar that stops everything, also by mouse, and what there is to be stopped."""
+
+    DEFAULT_CSS = """
+    StopLine { dock: bottom; height: 1; padding: 0 1; background: $error 25%; color: $foreground; }
+    StopLine.-hot { background: $error; color: $background; text-style: bold; }
+    """
+
+    def show(self, model: Model, keys: Mapping[str, str]) -> None:
+        """Draw what holds now."""
+        self.set_class(model.hot, "-hot")
+        press = Style.from_meta({"@click": "app.do('stop')"})
+        self.say_content(
+            Content.assemble(
+                (f" ■ STOP  {shown_key(keys['stop'])} or Esc ", press), f"  {_doing(model)}"
+            )
+        )
+
+
 class StopBar(Vertical):
     """Keys of this page, and the bar that stops everything, also by mouse."""
 
     DEFAULT_CSS = """
     StopBar { dock: bottom; height: 2; }
     StopBar #hints { height: 1; padding: 0 1; background: $panel; color: $foreground; }
-    StopBar #stop { height: 1; padding: 0 1; background: $error 25%; color: $foreground; }
-    StopBar #stop.-hot { background: $error; color: $background; text-style: bold; }
     """
 
     def compose(self) -> ComposeResult:
         yield Words(id="hints")
-        yield Words(id="stop")
+        yield StopLine()
 
     def show(self, model: Model, page: str, keys: Mapping[str, str], width: int) -> None:
         """Draw what holds now."""
         self.query_one("#hints", Words).say_content(hints(model, page, keys, width - 2))
-        stop = self.query_one("#stop", Words)
-        hot = model.stage in {*BEFORE_RELEASE, Stage.LIVE}
-        stop.set_class(hot, "-hot")
-        key = shown_key(keys["stop"])
-        press = Style.from_meta({"@click": "app.do('stop')"})
-        stop.say_content(
-            Content.assemble(
-                (f" ■ STOP  {key} or Esc ", press),
-                f"  {_doing(model)}",
-            )
-        )
 
 
 def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Content:
@@ -79,13 +84,11 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
     by_name = {action.name: action for action in ACTIONS}
     for name in names:
         action = by_name[name]
-        if model.offline and name not in OFFLINE:
+        if (model.offline and name not in OFFLINE) or (name == "unblind" and not model.blind):
             continue
-        if not possible(
-            action, model.flow.stage, driving=model.driving, two_chains=model.two_chains
-        ):
+        if hindrance(action, model.flow.stage, driving=model.driving, two_chains=model.two_chains):
             continue
-        label = _label(name, action.label, model)
+        label = _label(name, action.label, model, page)
         text = f"{shown_key(keys[name])} {label}"
         if used + len(text) + 2 > width:
             break
@@ -98,14 +101,33 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
     return Content.assemble(*parts)
 
 
-def _label(name: str, label: str, model: Model) -> str:
+def _label(name: str, label: str, model: Model, page: str) -> str:
     if name == "go_on":
-        if model.blindfold:
-            return "keep, show numbers"
+        if model.flow.stage is Stage.PREPARE and page != "run":
+            return "to the run"
         return _GO_ON.get(model.flow.stage, label)
+    if name == "reject" and model.flow.verdict == "rejected":
+        return "take back"
     if name == "control":
         return "give control back" if model.driving else "take control"
     return label
+
+
+_TOLD_S = 4.0
+_UNANSWERED_S = 0.5
+
+
+def _answer(model: Model) -> str:
+    """Say what became of a STOP that was pressed just now."""
+    if model.stop is None:
+        return ""
+    waited = model.now_s - model.stop.at_s
+    unheard = model.stop.heard is False or (model.stop.heard is None and waited > _UNANSWERED_S)
+    if waited > _TOLD_S and (model.connected or not unheard):
+        return ""
+    if unheard:
+        return "STOP NOT HEARD: switch the release's supply off"
+    return "STOP: everything is off" if model.stop.heard else "STOP …"
 
 
 def _doing(model: Model) -> str:
@@ -113,7 +135,9 @@ def _doing(model: Model) -> str:
         Stage.TESTING: "RELEASE TEST; any key stops",
         Stage.SETTLING: "chains come to rest; any key stops",
         Stage.ARMING: "arming; any key stops",
-        Stage.COUNTDOWN: "ARMED; any key stops" if model.driving else "ARMED by another client",
+        Stage.COUNTDOWN: f"ARMED: falls in {max(0.0, model.flow.left_s):.1f} s; any key stops"
+        if model.driving
+        else "ARMED by another client",
         Stage.FIRING: "letting go",
         Stage.LIVE: "FALLING, recording",
         Stage.JUDGING: "reading and analysing the drop",
@@ -121,7 +145,10 @@ def _doing(model: Model) -> str:
     if model.offline:
         return "a file is looked at: no rig is connected"
     if not model.connected:
-        return "no daemon: nothing can be stopped from here"
+        return _answer(model) or "no daemon: nothing can be stopped from here"
+    answer = _answer(model)
+    if answer and not model.hot:
+        return answer
     holder = model.state.holder
     watching = "" if model.driving or holder is None else f" · watching {holder[:24]}"
-    return words.get(model.stage, model.state.phase) + watching
+    return words.get(model.stage, model.state.phase) + watching + " · " * bool(answer) + answer

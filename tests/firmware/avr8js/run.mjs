@@ -73,8 +73,8 @@ for (const name of "BCD") {
   const config = avr8js[`port${name}Config`];
   const port = (ports[name] = new avr8js.AVRIOPort(cpu, config));
   let before = 0;
-  port.addListener(() => {
-    const driven = cpu.data[config.DDR] & cpu.data[config.PORT];
+  port.addListener((value) => {
+    const driven = cpu.data[config.DDR] & value; // what a compare unit drives is in it
     for (let bit = 0; bit < 8; bit++) {
       if (!(((driven ^ before) >> bit) & 1)) continue;
       const pin = `P${name}${bit}`;

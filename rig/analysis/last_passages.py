@@ -1,0 +1,162 @@
+"""V and Δz from the last passages alone: a second opinion that knows no impacts.
+
+Once every rod below has struck, the top rod falls freely. Its last passages, and those of the free
+chain about that time, are two short falls of known acceleration: with no α, no γ and no release in
+them, they are wrong in other ways than the adjustment of a whole drop.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rig.analysis.result import Measured
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.fit import Fit
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Index = NDArray[np.intp]
+
+_NEAR = 0.02
+"""How far from the moment that is asked for a passage of the free chain may be, s."""
+_APART = 3.0  # standard uncertainties beyond which two opinions are not the same
+
+
+class _Passages(NamedTuple):
+    """When a chain's top rod would have been where, shape ``(edges,)`` each.
+
+    Attributes
+    ----------
+    times, heights
+        s, m above the gates' zero.
+    gate, rod
+        Of each edge: what a beam is off, and a rod, several edges share.
+    sigma
+        What each edge is off by itself, m.
+    sign
+        −½ where a rod's lower side darkens the beam, ½ where its upper side clears it.
+    """
+
+    times: Array
+    heights: Array
+    gate: Index
+    rod: Index
+    sigma: Array
+    sign: Array
+
+    def only(self, chosen: Flags) -> _Passages:
+        """Leave out the others."""
+        times, heights, gate, rod, sigma, sign = self
+        return _Passages(
+            times[chosen], heights[chosen], gate[chosen], rod[chosen], sigma[chosen], sign[chosen]
+        )
+
+
+def last_passages(fit: Fit) -> dict[str, Measured]:
+    """Measure V, and Δz as it fell, at the contact level.
+
+    Returns
+    -------
+    dict
+        By JSON name; nothing where the top rod's last passages are fewer than two edges, and no Δz
+        where the free chain is not seen at that time.
+    """
+    model = fit.model
+    if "impact" not in model.records or model.records["impact"].chain.chain.rods < 2:
+        return {}
+    struck = _passages(fit, "impact")
+    places = model.records["impact"].chain.chain.heights
+    # Below here its nearest neighbour has struck.
+    alone = (struck.rod == len(places) - 1) & (struck.heights < places[-1] - places[-2])
+    if np.count_nonzero(alone) < 2:
+        return {}
+    level = model.protocol.contact.level.value
+    last = struck.only(alone)
+    when = float(last.times[np.argmin(last.heights)])
+    for _ in range(3):  # Newton's steps to the moment at which it is at the level
+        (height, speed), covariance = _fall(fit, "impact", last, when)
+        when += (height - level) / speed
+    found = {"speed_m_s": Measured(speed, _u(covariance, 0.0, 1.0))}
+    moment_u = _u(covariance, 1.0, 0.0) / speed
+    if "free" in model.records:
+        free = _passages(fit, "free")
+        near = free.only(np.abs(free.times - when) < _NEAR)
+        if near.times.size >= 2 and np.ptp(near.times) > 0.0:
+            (height, falling), covariance = _fall(fit, "free", near, when)
+            u = math.hypot(_u(covariance, 1.0, 0.0), falling * moment_u)
+            datum = math.sqrt(2.0) * model.protocol.gates.datum_u if model.protocol.gates else 0.0
+            found["separation_raw_m"] = Measured(height - level, math.hypot(u, datum))
+    return found
+
+
+def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) -> list[str]:
+    """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
+    said = []
+    for name, symbol, unit, scale in (
+        ("speed_m_s", "V", "m/s", 1.0),
+        ("separation_raw_m", "Δz as it fell", "mm", 1e3),
+    ):
+        if name not in found or name not in alone:
+            continue
+        one, other = found[name], alone[name]
+        # They share their last edges and so the errors of these: they are nearer than that.
+        if abs(one.value - other.value) > _APART * math.hypot(one.u, other.u):
+            said.append(
+                f"the last passages alone have {symbol} = {other.value * scale:.3g} ± "
+                f"{other.expanded * scale:.2g} {unit}, the whole fall {one.value * scale:.3g} ± "
+                f"{one.expanded * scale:.2g} {unit}: its end does not fall as the model says"
+            )
+    return said
+
+
+def _passages(fit: Fit, role: str) -> _Passages:
+    """Collect a side's matched edges as passages of its top rod."""
+    model, record = fit.model, fit.model.records[role]
+    expected = model.expected[role]
+    pick, edge = expected.chosen(fit.matches[role])
+    rod, gate = expected.rods[pick], expected.gate[pick]
+    places = np.array(record.chain.chain.heights)
+    # The reference is at the level when the edge comes, and the top rod as much higher.
+    heights = expected.levels[pick] + places[-1]
+    clock = 1.0 + float(fit.x[model.unknowns["clock"]][0])
+    sigma = model.residuals(role, fit.x, fit.matches[role]).sigma
+    return _Passages(expected.times[edge] * clock, heights, gate, rod, sigma, expected.sign[pick])
+
+
+def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[float, float], Array]:
+    """Height and speed of a chain's top rod at a moment, and their covariance.
+
+    Generalized least squares of z(t) = z − v(t − t₀) − ½g(t − t₀)²: edges are off by themselves,
+    and together by their beam's height and aim, their rod's place and the rods' width.
+    """
+    protocol, chain = fit.model.protocol, fit.model.records[role].chain
+    assert protocol.gates is not None
+    since = seen.times - when
+    fallen = seen.heights + 0.5 * protocol.gravity.value * since**2
+    design = np.stack([np.ones_like(since), -since], axis=1)
+    ripple = fit.model.components.beam * math.tan(math.radians(chain.tilt_deg))
+    turn = np.where(seen.rod % 2, -1.0, 1.0)  # a beam off the middle sees neighbours either way
+    beam = protocol.gates.height_u**2 + ripple**2 * np.outer(turn, turn)
+    place = chain.position_u if role == "free" else 0.0
+    covariance = (
+        np.diag(seen.sigma**2)
+        + beam * (seen.gate[:, None] == seen.gate)
+        + place**2 * (seen.rod[:, None] == seen.rod)
+        + chain.width_u**2 * np.outer(seen.sign, seen.sign)
+    )
+    weighted = np.linalg.solve(covariance, np.column_stack([design, fallen]))
+    inverse = np.linalg.inv(design.T @ weighted[:, :2])
+    height, speed = inverse @ (design.T @ weighted[:, 2])
+    return (float(height), float(speed)), inverse.astype(np.float64, copy=False)
+
+
+def _u(covariance: Array, *slope: float) -> float:
+    return math.sqrt(float(np.array(slope) @ covariance @ np.array(slope)))

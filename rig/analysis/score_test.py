@@ -1,0 +1,78 @@
+"""How much better a drop would fit if something were off its place, without fitting it again.
+
+Rao's score test: at the best estimate, from the slope and the curvature of the likelihood along a
+direction of the unknowns in which nothing is known beforehand.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rig.analysis.equations import normal_equations
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.analysis.fit import Fit
+
+    Array = NDArray[np.float64]
+
+_UNTOLD = 1e-12  # of what the edges tell, below which the other unknowns do it as well
+
+
+class Score(NamedTuple):
+    """What a shift along one direction would do.
+
+    Attributes
+    ----------
+    size
+        By how much to shift, in units of the direction.
+    u
+        Its standard uncertainty; infinite where the edges tell nothing of it.
+    gain
+        By how much the logarithm of the likelihood would be more.
+    follow
+        How much the unknowns would then move, for a shift of size 1; shape ``(unknowns,)``.
+    """
+
+    size: float
+    u: float
+    gain: float
+    follow: Array
+
+
+def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
+    """Try shifts of the unknowns that cost nothing beforehand.
+
+    With J the observation equations at the estimate, r what they leave over, both in standard
+    deviations, A = JᵀJ + 1 in units of the priors S, and c = Jd: θ = −cᵀr/h with h = cᵀc −
+    cᵀJS A⁻¹ SJᵀc, and the gain is ½ (cᵀr)²/h.
+
+    Parameters
+    ----------
+    directions
+        Shape ``(unknowns,)`` each.
+    """
+    if not directions:
+        return []
+    model, estimate = fit.model, fit.estimate
+    unit = np.ones_like(estimate.sd)
+    raw = normal_equations(model, fit.matches, estimate.x, unit, estimate.scatter)
+    along = np.stack(directions, axis=1)
+    slope = along.T @ raw.vector
+    seen = raw.matrix @ along
+    whole = np.einsum("ij,ij->j", along, seen)
+    shared = estimate.sd[:, None] * seen
+    follow = np.linalg.solve(estimate.information, shared)
+    told = whole - np.einsum("ij,ij->j", shared, follow)
+    sure = told > _UNTOLD * whole
+    h = np.where(sure, told, np.inf)
+    u = np.where(sure, h**-0.5, np.inf)
+    moves = -estimate.sd[:, None] * follow
+    sizes, gains = -slope / h, 0.5 * slope**2 / h
+    rows = zip(sizes.tolist(), u.tolist(), gains.tolist(), moves.T, strict=True)
+    return [Score(*row) for row in rows]

@@ -1,0 +1,25 @@
+"""``rig unblind``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.errors import SessionError
+from rig.results import kept_back, protocol_of
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def main(arguments: Namespace) -> int:
+    """Record that a blind session's numbers may be seen from now on."""
+    with Session.open(arguments.session) as session:
+        if not kept_back(session, protocol_of(session)):
+            when = f"since {session.unblinded}" if session.unblinded else "and never was blind"
+            raise SessionError(
+                f"{arguments.session} is open {when}", "its numbers: rig analyze SESSION"
+            )
+        session.unblind()
+        print(f"unblinded at {session.unblinded}; its numbers: rig analyze {arguments.session}")
+    return 0

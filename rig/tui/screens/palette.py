@@ -1,0 +1,86 @@
+"""Every action by its name: what is typed narrows the list, and what cannot be done says why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from textual import on
+from textual.content import Content
+from textual.fuzzy import Matcher
+from textual.widgets import Input, OptionList
+from textual.widgets.option_list import Option
+
+from rig.tui.screens.dialog import Dialog, how
+from rig.tui.widgets.text import Words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from textual.app import ComposeResult
+
+
+class Choice(NamedTuple):
+    """An action with its key; `hindrance` says why it cannot be done now."""
+
+    name: str
+    text: str
+    key: str
+    hindrance: str = ""
+
+
+class Palette(Dialog[str | None]):
+    """Choose an action; gives its name."""
+
+    DEFAULT_CSS = """
+    Palette > Vertical { width: 96; }
+    Palette OptionList, Palette OptionList:focus { height: auto; max-height: 16; border: none;
+        padding: 0; background: $surface; text-wrap: nowrap; text-overflow: ellipsis; }
+    """
+
+    def __init__(self, choices: Sequence[Choice]) -> None:
+        super().__init__()
+        self._choices = sorted(choices, key=lambda one: bool(one.hindrance))
+
+    def contents(self) -> ComposeResult:
+        yield Input(placeholder="what is to be done?")
+        yield OptionList(markup=False)
+        yield Words(id="how")
+
+    def on_mount(self) -> None:
+        self.query_one("#how", Words).say_content(
+            how(("↑ ↓ Enter", "do it", "screen.take"), ("Esc", "leave it", "screen.leave"))
+        )
+        self.query_one(OptionList).can_focus = False
+        self.query_one(Input).focus()
+        self._narrow("")
+
+    @on(Input.Changed)
+    def _typed(self, event: Input.Changed) -> None:
+        self._narrow(event.value)
+
+    def _narrow(self, query: str) -> None:
+        """Show what fits, what can be done first."""
+        matcher = Matcher(query)
+        shown = [one for one in self._choices if not query or matcher.match(one.text)]
+        options = self.query_one(OptionList)
+        options.clear_options()
+        options.add_options(Option(_line(one), one.name, disabled=bool(one.hindrance))
+                            for one in shown)  # fmt: skip
+        options.action_first()
+
+    def move(self, by: int) -> None:
+        """Go to the previous or next."""
+        options = self.query_one(OptionList)
+        (options.action_cursor_down if by > 0 else options.action_cursor_up)()
+
+    @on(Input.Submitted)
+    @on(OptionList.OptionSelected)
+    def action_take(self) -> None:
+        """Give the highlighted action, if any."""
+        option = self.query_one(OptionList).highlighted_option
+        self.dismiss(option.id if option is not None and not option.disabled else None)
+
+
+def _line(one: Choice) -> Content:
+    why = (f"  {one.hindrance}", "$warning") if one.hindrance else ""
+    return Content.assemble((f"{one.key:8}", "bold $primary"), one.text, why)

@@ -1,0 +1,100 @@
+"""Why the chain that strikes arrives first, in words and as speed against time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.result import Measured, normalized_error
+from rig.measurands import SEPARATION, SPEED, averaged
+from rig.predictions import predict_incline, predicted_parts, predicted_run
+from rig.report.numbers import fixed, plus_minus
+from rig.tui.motion import model_fall
+from rig.tui.widgets.figure import Picture, Series
+
+if TYPE_CHECKING:
+    from rig.protocol.protocol import Protocol, Run
+    from rig.records import Job
+    from rig.results.live import SessionView
+    from rig.units import Quantity
+
+_BESIDE_S = 0.02
+_POINTS = 400  # of a curve whose steps stand 10 ms apart
+
+
+def expected_words(protocol: Protocol, run: Run) -> str:
+    """Say before the drop what the model expects of it; empty where it has no answer."""
+    expected = predicted_run(protocol, run)
+    told = [
+        f"{row.symbol} {plus_minus(stated(expected[row.name]), row.scale)} {row.unit}"
+        for row in averaged()
+        if row.name in expected
+    ]
+    return "  ".join(told)
+
+
+def stated(model: Quantity) -> Measured | float:
+    """Take a prediction as a measured value is written: with U95 where it has any."""
+    return Measured(model.value, model.u) if model.u else model.value
+
+
+def why_words(view: SessionView, job: Job) -> str:
+    """Say what a drop means beside the model and free fall; empty where nothing was measured."""
+    run, found = view.plan[job.run], view.results[job].quantities
+    expected, parts = predicted_run(view.protocol, run), predicted_parts(view.protocol, run)
+    lines = []
+    speed = found.get(SPEED.name)
+    if speed is not None and run.impact is not None:
+        free = predict_incline(view.protocol, run.incline_deg, run.impact, run.free).free_fall_speed
+        model = expected.get(SPEED.name)
+        told = f"model {plus_minus(stated(model), SPEED.scale)}, " if model is not None else ""
+        here = f"here {plus_minus(speed, SPEED.scale)} {SPEED.unit}"
+        lines.append(f"V: free fall {free:.3f}, {told}{here}")
+    apart = found.get(SEPARATION.name)
+    fall = model_fall(view.protocol, run, "free") if run.free is not None else None
+    if apart is not None and fall is not None and run.free is not None:
+        length = view.protocol.chains[run.free].chain.length
+        late = np.diff(fall.times(np.array([apart.value - length, -length])))[0]
+        lines.append(
+            f"it arrives {apart.value * SEPARATION.scale:.1f} {SEPARATION.unit} ahead: "
+            f"free fall needs {late * 1e3:.0f} ms more for that"
+        )
+    for row in averaged():
+        if row.name in found and row.name in expected:
+            error = normalized_error(found[row.name], expected[row.name], parts.get(row.name))
+            if error is not None:
+                lines.append(f"{row.symbol} {_agreement(error)}")
+    return "\n".join(lines)
+
+
+def _agreement(error: float) -> str:
+    """Put Eₙ into words: the difference over the expanded uncertainty that it has."""
+    share = fixed(abs(error), 1)
+    if abs(error) <= 1.0:
+        return f"agrees with the model: off by {share} of what the uncertainties allow"
+    side = "above" if error > 0.0 else "below"
+    return f"is {side} the model by {share} times what the uncertainties allow"
+
+
+def speed_picture(view: SessionView, job: Job) -> Picture | None:
+    """Draw V(t) by the model, a step for each rod that strikes, and what was measured at its end.
+
+    `None` where no chain strikes, or the model has no answer.
+    """
+    run = view.plan[job.run]
+    fall = model_fall(view.protocol, run, "impact") if run.impact is not None else None
+    if fall is None or fall.hits is None:
+        return None
+    end = float(fall.time[-1])
+    times = np.linspace(0.0, end, _POINTS)
+    series = [Series("line", times * 1e3, fall.heights(times)[1], "accent", label="model")]
+    free = model_fall(view.protocol, run, "free")
+    if free is not None:
+        series.append(Series("line", times * 1e3, free.heights(times)[1], "secondary",
+                             label="free fall"))  # fmt: skip
+    measured = view.results[job].quantities.get(SPEED.name)
+    if measured is not None:
+        series.append(Series("bars", [end * 1e3], [measured.value], "primary", "●", "measured ± U",
+                             [measured.expanded]))  # fmt: skip
+    return Picture("V (m/s), t (ms)", tuple(series), (0.0, 1e3 * (end + _BESIDE_S)))

@@ -1,0 +1,159 @@
+"""A chain as it hangs, as the arrays that the loops of `sim.resolved.motion` work on."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.resolved.contact_law import damping
+from sim.resolved.motion import AIR, Bodies, Ground, Neighbours, Record, StringPairs, World, rim
+
+if TYPE_CHECKING:
+    from sim.resolved.scene import Board, Bounce, Chain, Numbers
+
+_FIXED = 1e6  # kg: in a second 10 kN move it by 5 mm
+_SOUND = 0.5  # of 2, where the leapfrog of the stiffest string would break
+
+
+def hang(chain: Chain) -> World:
+    """Hang a chain, at the moment of its release.
+
+    Raises
+    ------
+    ValueError
+        A restitution that `damping` refuses.
+    """
+    bodies = _bodies(chain)
+    return World(
+        bodies, _strings(chain, bodies), _ground(chain, bodies), _neighbours(chain, bodies),
+        _record(chain),
+    )  # fmt: skip
+
+
+def stable_step(chain: Chain) -> float:
+    """The longest step, s, that the stiffest string between the lightest rods bears well."""
+    bodies = _bodies(chain)
+    stiffness = _strings(chain, bodies).stiffness.T
+    both = np.zeros((2, bodies.mass.size))
+    both[:, :-1] += stiffness
+    both[:, 1:] += stiffness
+    # A rod's end weighs a quarter of the rod; its two strings pull one against the other.
+    fastest = np.sqrt(2.0 * both * 4.0 / bodies.mass).max()
+    return _SOUND / float(fastest) if fastest else math.inf
+
+
+def gaps(world: World) -> Numbers:
+    """How far each rod's lower rim is above the board, m, along the normal; infinite without one.
+
+    Returns
+    -------
+    ndarray
+        Shape (N,).
+    """
+    bodies, ground = world.bodies, world.ground
+    normal = np.array(ground.normal)
+    edges = bodies.place - np.array(
+        [rim(bodies, ground.normal, k) for k in range(len(bodies.mass))]
+    )
+    return np.asarray(edges @ normal - np.abs(bodies.axis @ normal) * bodies.half - ground.level)
+
+
+def lengths(place: Numbers, bodies: Bodies) -> Numbers:
+    """Both distances from end to end of neighbours, m; shape (N − 1, 2)."""
+    arms = bodies.half[:, None] * bodies.axis
+    return np.stack(
+        [np.linalg.norm(np.diff(place + side * arms, axis=0), axis=1) for side in (-1.0, 1.0)],
+        axis=1,
+    )
+
+
+def _bodies(chain: Chain) -> Bodies:
+    rods = chain.rods
+    mass, radius = np.array(rods.masses, float), np.array(rods.diameters, float) / 2.0
+    gravity = np.full(mass.size, chain.gravity)
+    mass[: chain.held], gravity[: chain.held] = _FIXED, 0.0
+    half = np.full(mass.size, rods.length / 2.0)
+    across = mass * (half**2 / 3.0 + radius**2 / 4.0)
+    axis = np.stack(
+        [np.cos(rods.tilts) * np.cos(rods.yaws), np.cos(rods.tilts) * np.sin(rods.yaws),
+         np.sin(rods.tilts)], axis=1,
+    )  # fmt: skip
+    place, velocity, turning, force, torque, foreseen, turns = np.zeros((7, mass.size, 3))
+    place[:, 1] = rods.aside
+    place[:, 2] = chain.start + rods.heights
+    if chain.swing is not None:
+        velocity[:, 1] = chain.swing
+    turning[:, 2] = chain.spin
+    along = (turning * axis).sum(axis=1)[:, None]
+    return Bodies(
+        place, velocity, axis, across[:, None] * (turning - along * axis), force, torque,
+        foreseen, turns, mass, radius, half, across,
+        float(rods.rolling) / (mass * radius**2 / 2.0) - 1.0 / across,
+        np.zeros(mass.size) if chain.drag is None else np.array(chain.drag, float), gravity,
+    )  # fmt: skip
+
+
+def _strings(chain: Chain, bodies: Bodies) -> StringPairs:
+    rest = lengths(bodies.place, bodies)
+    d = damping(chain.strings.restitution)
+    return StringPairs(rest, chain.strings.stiffness / rest, np.zeros_like(rest), d)
+
+
+def _stiffness(mass: Numbers, bounce: Bounce) -> Numbers:
+    """Of a point at the end of a rod, which weighs a quarter of it when it strikes, N/m."""
+    return np.asarray(mass / 4.0 * (math.pi / bounce.time_s) ** 2)
+
+
+def _ground(chain: Chain, bodies: Bodies) -> Ground:
+    count = bodies.mass.size
+    if chain.board is None:
+        nothing = np.zeros(count), np.zeros((count, 2))
+        return Ground((0.0, 0.0, 1.0), -math.inf, 0.0, 0.0, *nothing)
+    bounce = chain.board.bounce
+    return Ground(
+        _normal(chain.board), -_contact(chain, chain.board), bounce.friction,
+        damping(bounce.restitution), _stiffness(bodies.mass, bounce), np.zeros((count, 2)),
+    )  # fmt: skip
+
+
+def _normal(board: Board) -> tuple[float, float, float]:
+    # Of 90° − θ: near a wall all digits of cos θ would be those of π/2 − θ.
+    return 0.0, math.sin(board.incline), math.sin(math.pi / 2 - board.incline)
+
+
+def _contact(chain: Chain, board: Board) -> float:
+    """How far from the board, along its normal, an undisturbed rod's middle is as it touches, m."""
+    rods = chain.rods
+    along = math.sin(float(np.abs(rods.tilts).mean())) * _normal(board)[2]
+    radius = float(rods.diameters[-1]) / 2.0
+    return rods.length / 2.0 * abs(along) + radius * math.sqrt(1.0 - along**2)
+
+
+def board_height(chain: Chain, board: Board) -> float:
+    """How far above the contact level the board below the chain is, m; negative."""
+    return -_contact(chain, board) / _normal(board)[2]
+
+
+def _neighbours(chain: Chain, bodies: Bodies) -> Neighbours:
+    count = bodies.mass.size if chain.touching is not None else 0
+    one, other = np.triu_indices(count, 1)
+    both = bodies.mass[one] * bodies.mass[other] / (bodies.mass[one] + bodies.mass[other])
+    rest = np.zeros(one.size), np.zeros(one.size, np.intp), np.zeros(1, np.intp)
+    if chain.touching is None:
+        return Neighbours(one, other, both, *rest, 0.0, 0.0)
+    bounce = chain.touching
+    stiffness = _stiffness(both, bounce)
+    return Neighbours(one, other, stiffness, *rest, bounce.friction, damping(bounce.restitution))
+
+
+def _record(chain: Chain) -> Record:
+    count = chain.rods.masses.size
+    nothing = np.zeros(count)
+    unknown = np.full(count, math.nan)
+    return Record(
+        np.full(count, math.inf), unknown, nothing, nothing.copy(), unknown.copy(), nothing.copy(),
+        np.zeros(AIR + 1), np.zeros(3), np.zeros(3), np.zeros(1), np.zeros(2),
+        np.full(2, math.nan),
+    )  # fmt: skip

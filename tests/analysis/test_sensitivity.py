@@ -1,0 +1,32 @@
+"""How results move with priors: against analyses of protocols that state these priors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from rig.analysis.sensitivity import FACTOR, prior_sensitivity
+from rig.analysis.session import analyze
+from tests.analysis.drops import UNIFORM
+from tests.analysis.sessions import MILD, analysis, cases
+
+
+@pytest.mark.parametrize("count", [2, 4])  # each by itself, and fitted together
+def test_a_prior_moves_results_as_a_protocol_that_states_it_so(count):
+    drops = cases(tuple(range(1, count + 1)), MILD, 3)
+    found = analysis(drops)
+    rows = [row for row in prior_sensitivity(found) if row["prior"] == "datum_uncertainty"]
+    assert {row["quantity"] for row in rows} == {"separation_m", "speed_m_s"}
+    for word, factor in (("wider", FACTOR), ("narrower", 1.0 / FACTOR)):
+        other = replace(UNIFORM, gates=replace(UNIFORM.gates, datum_u=0.3e-3 * factor))
+        (line,) = analyze(other, [one.drop for one in drops], lambda _: drops[0].scale).summary
+        (here,) = found.summary
+        for row in rows:
+            before, after = (one.means[row["quantity"]] for one in (here, line))
+            # Steps of a joint fit end when they are below 2 % of a standard uncertainty.
+            assert row[word] == pytest.approx(after.value - before.value, abs=0.06 * before.u)
+            ratio = after.expanded / before.expanded
+            assert row[f"U95_ratio_{word}"] == pytest.approx(ratio, rel=0.03)
+    # Of few drops a wider prior may even narrow U95: it is known better than their scatter is.
+    assert max(abs(row["U95_ratio_wider"] - 1.0) for row in rows) > 0.05

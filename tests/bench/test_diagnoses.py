@@ -1,0 +1,58 @@
+"""Rigs that are wrong in one thing: that they are rigs, and how what is said of them is counted."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from rig.bench.diagnoses import LAYOUTS, NONE, OUTCOMES, judged
+from rig.bench.wrong_rigs import WRONG_RIGS
+from rig.cli import main
+from rig.protocol.reader import parse
+from sim.dials import Dials
+from tests.analysis.drops import SINGLE, case
+
+
+def test_every_fault_is_of_some_layout_and_another_rig_than_the_stated_one():
+    for fault in WRONG_RIGS:
+        rigs = [(one, rig) for one in LAYOUTS for rig in fault.rigs(one.protocol())]
+        assert rigs, fault.name
+        for layout, (size, text) in rigs:
+            assert parse(text).gates is not None
+            otherwise = fault.settings(size) or fault.slow(size)
+            assert otherwise or json.loads(text) != json.loads(layout.protocol())
+
+
+@pytest.mark.parametrize(
+    ("reasons", "outcome"),
+    [
+        ((), "unnoticed"),
+        (("the timer's clock is 1.0% ± 0.1% slow (odds 200 to 1)",), "right"),
+        (("9 of 30 edges missed", "gravity is 2.0% ± 0.1% more"), "wrong"),
+        (("likeliest, but not clearly: gravity is 2 %; or the clock is slow",), "likely"),
+        (("9 of 30 edges missed",), "unnamed"),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_slow_clock_is_counted(reasons, outcome):
+    result = replace(case(SINGLE, Dials.quiet()).analyze(), reasons=reasons)
+    assert judged("clock", result) == outcome
+
+
+def test_where_nothing_is_wrong_any_name_is_wrong():
+    result = case(SINGLE, Dials.quiet()).analyze()
+    assert judged(NONE, result) == "unnoticed"
+    assert judged(NONE, replace(result, reasons=("gravity is 2 %",))) == "wrong"
+
+
+def test_the_bench_keeps_table_and_page(tmp_path, capsys):
+    arguments = ["bench", "diagnoses", "-o", str(tmp_path), "--only", "fence", "--drops", "1"]
+    assert main([*arguments, "--clean", "5", "--jobs", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["diagnoses"]
+    assert all(sum(one[name] for name in OUTCOMES) in (1, 5) for one in found)
+    assert sum(one["wrong"] for one in found) == 0
+    (clean,) = (one for one in found if one["fault"] == NONE)
+    assert clean["unnoticed"] + clean["unnamed"] == 5
+    assert "chain stretched" in (tmp_path / "diagnoses.md").read_text("utf-8")
+    assert len((tmp_path / "diagnoses.csv").read_text("utf-8").splitlines()) == 1 + len(found)

@@ -1,0 +1,79 @@
+"""Priors: keys of the protocol, listed by `rig check` and by their page, and used."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from rig.analysis.components import stated
+from rig.errors import InputError
+from rig.protocol.describe import describe
+from rig.protocol.priors import PRIORS
+from rig.protocol.protocol import Priors
+from rig.protocol.reader import parse
+from rig.units import Quantity, format_quantity
+from tests.analysis.drops import UNIFORM, case
+
+PAGE = (Path(__file__).parents[2] / "docs/priors.md").read_text("utf-8")
+
+
+def scene(priors: str):
+    return parse(f"{UNIFORM.text}\npriors: {priors}\n", "f")
+
+
+def test_every_prior_has_a_key_and_what_is_left_out_is_as_by_default():
+    assert [*PRIORS] == [*asdict(Priors())]
+    found = scene("{hang: 1 mm, jitter: 5 us, drag: 0.2, impulses: 8 %, side: 0 mm}").priors
+    assert found == Priors(hang=1e-3, jitter=5e-6, drag=0.2, impulses=0.08, side=0.0)
+    assert UNIFORM.priors == Priors()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{hnag: 1 mm}", "did you mean hang?"),
+        ("{hang: 1 s}", "a length"),
+        ("{hang: 0 mm}", "above 0 mm"),
+        ("{hang: 1 mm ± 1 mm}", "±"),
+        ("3", "a mapping"),
+    ],
+)
+def test_what_is_no_prior_is_refused_at_its_place(text, said):
+    with pytest.raises(InputError) as caught:
+        scene(text)
+    (problem,) = caught.value.problems
+    assert problem.line == len(UNIFORM.text.splitlines()) + 2
+    assert said in str(problem)
+
+
+def test_rig_check_lists_them_all_and_marks_those_of_the_protocol():
+    lines = describe(scene("{hang: 1 mm}")).splitlines()
+    for name, row in PRIORS.items():
+        (line,) = [one for one in lines if one.split()[:1] == [name]]
+        assert line.endswith(row.words)
+        assert ("(stated)" in line) == (name == "hang")
+
+
+def test_the_page_has_the_same_table():
+    rows = [line.strip("| ").split(" | ") for line in PAGE.splitlines() if line.startswith("| `")]
+    usual = asdict(Priors())
+    assert rows[: len(PRIORS)] == [
+        [f"`{n}`", format_quantity(Quantity(usual[n]), r.accepted.unit), r.words, r.source]
+        for n, r in PRIORS.items()
+    ]
+
+
+def test_an_adjustment_takes_what_the_protocol_states():
+    wide = scene(
+        "{hang: 3 mm, side: 5 mm, beam_offset: 10 mm, drag: 0.5, impulses: 50 %, departure: 2 mm}"
+    )
+    one = case(UNIFORM, incline=40.0)
+    components = stated(wide)
+    assert (components.hang, components.beam, components.impulse) == (3e-3, 10e-3, 0.5)
+    narrow, loose = (
+        case(protocol, run=one.run.number).analyze(None).quantities["separation_m"]
+        for protocol in (UNIFORM, wide)
+    )
+    assert loose.u > 1.2 * narrow.u

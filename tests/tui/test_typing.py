@@ -1,0 +1,207 @@
+"""Whatever is typed, pasted, held down or clicked: nothing is armed but by the deliberate step."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from textual import events
+
+from rig.campaign.machine import Flow, Stage
+from rig.records import Job
+from rig.results.live import LiveAnalysis
+from rig.session.store import Session
+from rig.tui.app import RigApp
+from rig.tui.context import Options
+from rig.tui.pictures import QUIET, FakeClient
+from rig.tui.state import state_of
+from tests.cli.lab import short
+from tests.tui.lab import KEYS, run
+
+STILL_S = 0.15
+SIZE = (80, 24)
+MOMENTS = {
+    "device": Flow(Stage.DEVICE),
+    "prepare": Flow(Stage.PREPARE, Job(1, 1), countdown_s=0.3),
+    "countdown": Flow(Stage.COUNTDOWN, Job(1, 1), left_s=60.0, countdown_s=60.0, token=1),
+    "live": Flow(Stage.LIVE, Job(1, 1)),
+    "result": Flow(Stage.RESULT, Job(1, 1), verdict="accepted"),
+    "halted": Flow(Stage.HALTED, Job(1, 1), verdict="void"),
+    "done": Flow(Stage.DONE, Job(1, 1)),
+}
+DIALOGS = ("", "ctrl+p", "question_mark", "n", "a", "q", "c", "l")
+
+WORDS = ("board moved", "laser", "quit", "cza")
+PRESSED = ("enter", "escape", "f9", "up", "down", "ctrl+p", "ctrl+q", "3", "l", "a")
+
+words = st.text(st.characters(codec="ascii", categories=["L", "N", "P", "Z"]), max_size=12)
+deeds = st.one_of(
+    st.tuples(st.just("type"), words | st.sampled_from(WORDS)),
+    st.tuples(st.just("paste"), words),
+    st.tuples(st.just("hold"), st.sampled_from(["enter", "a", "space", "l", "q", "y", "tab"])),
+    st.tuples(st.just("keys"), st.lists(st.sampled_from(PRESSED), max_size=4)),
+    st.tuples(st.just("click"), st.tuples(st.integers(0, 79), st.integers(0, 23))),
+    st.tuples(st.just("wait"), st.sampled_from([0.0, STILL_S, 2 * STILL_S])),
+)
+episodes = st.lists(
+    st.tuples(st.sampled_from(sorted(MOMENTS)), st.sampled_from(DIALOGS),
+              st.lists(deeds, min_size=1, max_size=5)),
+    min_size=3, max_size=6,
+)  # fmt: skip
+ARMS = [("prepare", "", [("wait", 6 * STILL_S), ("keys", ["enter"]), ("wait", 0.6)])]
+ENDS = [("prepare", "", [("wait", 6 * STILL_S), ("keys", ["enter"]), ("type", "x"), ("wait", 0.6)])]
+
+
+class Rig(FakeClient):
+    """A rig that does whatever it is told at once, and remembers it."""
+
+    def __init__(self, state):
+        super().__init__(state)
+        self.told = []
+
+    async def call(self, method, **params):
+        self.told.append((time.monotonic(), method))
+        await (asyncio.Event().wait() if method == "collect" else asyncio.sleep(0))
+        return {"token": 1} if method == "arm" else None
+
+
+class Hands:
+    """Does things, and knows itself when Enter was pressed by itself on a run page at rest."""
+
+    def __init__(self, app):
+        self.app = app
+        self.keys = []
+        self.touched = 0.0
+        self.faces = [(0.0, None)]
+
+    def look(self):
+        """Note what a person would see: which page, which stage, and whether something is open."""
+        if not self.app._open():
+            return  # it was left, on purpose
+        now = self.app.page, self.app.flow.stage, len(self.app.screen_stack)
+        if now != self.faces[-1][1]:
+            self.faces.append((time.monotonic(), now))
+
+    async def key(self, key):
+        self.look()
+        now = time.monotonic()
+        since, face = self.faces[-1]
+        alone = now - max(since, self.touched) >= 0.9 * STILL_S
+        self.keys.append((now, key == "enter" and alone and face))
+        self.touched = now
+        character = key if len(key) == 1 else None
+        self.app.post_message(events.Key({" ": "space"}.get(key, key), character))
+        await asyncio.sleep(0.005)
+        self.look()
+
+    async def do(self, kind, what):
+        if kind == "wait":
+            end = time.monotonic() + what
+            while time.monotonic() < end:
+                await asyncio.sleep(0.01)
+                self.look()
+        elif kind == "paste":
+            self.touched = time.monotonic()
+            self.app.post_message(events.Paste(what))
+            await asyncio.sleep(0.005)
+        elif kind == "click":
+            self.touched = time.monotonic()
+            x, y = what
+            for event in (events.MouseDown, events.MouseUp):
+                self.app.post_message(event(None, x, y, 0, 0, 1, False, False, False, x, y))
+                await asyncio.sleep(0.005)
+        else:
+            for key in [what] * 8 if kind == "hold" else what:
+                await self.key(key)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    path = tmp_path_factory.mktemp("typed") / "typed.session"
+    Session.create(path, short(), "typed.yaml", simulated=True, origin="sim://").close()
+    return path
+
+
+@settings(max_examples=8, deadline=None)
+@given(episodes)
+@example(ARMS)
+@example(ENDS)
+@example([("result", "", [("type", "board moved"), ("hold", "enter"), ("wait", 0.6)])])
+def test_nothing_is_armed_but_by_the_deliberate_step(session, lived):
+    told, keys = run(_typed(session, lived))
+    for at, method in told:
+        meant = [(when, face) for when, face in keys if face and when <= at]
+        if method == "wait":  # the first of what arms
+            assert meant[-1][1] == ("run", Stage.PREPARE, 1)
+        if method == "fire":
+            assert not any(meant[-1][0] < when < at for when, _ in keys)
+        if method in {"test_release", "release_control", "close_session"}:
+            assert meant[-1][1][2] == 2  # Enter in a dialog that could be read
+    methods = [method for _, method in told]
+    if lived == ARMS:
+        assert methods == ["wait", "arm", "fire", "collect"]
+    if lived == ENDS:
+        assert "fire" not in methods
+        assert methods[-1] == "stop"
+
+
+async def _typed(session, lived):
+    """Live through episodes at one screen; what the rig was told, and what each key meant."""
+    async with _screen(session) as (app, pilot):
+        hands = Hands(app)
+        for moment, dialog, does in lived:
+            if not app._open():
+                break
+            while len(app.screen_stack) > 1:
+                app.screen.dismiss(None)
+            app.driver.flow = replace(MOMENTS[moment], ticket=app.flow.ticket + 1)
+            await pilot.pause(0.12)  # its page is there
+            if dialog:
+                await hands.key(dialog)
+            for kind, what in does:
+                if not app._open():
+                    break
+                await hands.do(kind, what)
+        return app.client.told, hands.keys
+
+
+def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
+    async def work():
+        async with _screen(session) as (app, pilot):
+            for moment, flow in MOMENTS.items():
+                app.driver.flow = replace(flow, ticket=app.flow.ticket + 1)
+                await pilot.pause(0.12)
+                waited = []
+                while min(waited, default=1.0) > 0.1:
+                    assert len(waited) < 5, (moment, waited)  # not all for other programs' sake
+                    waited.append(await _stopped(app, pilot))
+
+    run(work())
+
+
+async def _stopped(app, pilot):
+    """Press STOP, where there may be one in a dialog; how long until the rig was told, s."""
+    await pilot.press("question_mark")
+    begun, known = time.monotonic(), len(app.client.told)
+    app.post_message(events.Key("f9", None))
+    while len(app.client.told) == known:
+        await asyncio.sleep(0.001)
+    return app.client.told[-1][0] - begun
+
+
+@asynccontextmanager
+async def _screen(session):
+    whole = state_of(LiveAnalysis(session).read())
+    sections = {**QUIET, "session": whole.sections["session"]}
+    rig = Rig(replace(whole, sections=sections))
+    app = RigApp(Options(session=session, countdown_s=0.3, still_s=STILL_S), KEYS, rig)
+    async with app.run_test(size=SIZE) as pilot:
+        rig.changed = True
+        while not app.page or app.view is None:
+            await pilot.pause(0.01)
+        yield app, pilot
