@@ -26,8 +26,14 @@ class Outcome:
 def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     """Feed the recorded bytes through the parser and the edges through the analysis.
 
-    Drops, clock samples and results are compared with what the session holds, exactly.
+    Drops, clock samples and results are compared with what the session holds, exactly. It may
+    be recording meanwhile.
     """
+    with session.snapshot():
+        return _compared(session, progress)
+
+
+def _compared(session: Reader, progress: Progress | None) -> Outcome:
     lines: list[str] = []
     differences: list[str] = []
 

@@ -170,14 +170,15 @@ class LiveAnalysis:
             The file cannot be read.
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
-            protocol, plan = self._planned(session)
-            clock, states = self.clock(session), tuple(session.states())
-            if states != self._log:  # records are never altered, only added, and that is logged
-                self._drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
-                self._log = states
+            with session.snapshot():
+                protocol, plan = self._planned(session)
+                clock, states = self.clock(session), tuple(session.states())
+                if states != self._log:  # records are only added, and that is logged
+                    self._drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
+                    self._log = states
+                causes, blind = rejected(session), kept_back(session, protocol)
             drops = self._drops
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
-            causes = rejected(session)
             for job, drop in drops.items():
                 self._analyse(protocol, plan[job.run], job, drop, scales[job])
             results = {job: overruled(self._known[job].result, causes.get(job)) for job in drops}
@@ -186,7 +187,6 @@ class LiveAnalysis:
             self._readings += 1
             enough = sum(result.verdict in GOOD for result in results.values()) >= FEWEST
             joint = self._joint_fit if enough else None
-            blind = kept_back(session, protocol)
             view = SessionView(
                 path=self.path,
                 reading=self._readings,

@@ -160,9 +160,11 @@ def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysi
 def _analysed(
     session: Reader, protocol: Protocol, progress: Progress | None
 ) -> tuple[Analysis, Calibration, list[Drop]]:
-    clock = Calibrator().look(session, protocol.reference_u)
-    drops = list(session.drops())
-    found = analyze(protocol, drops, clock.scale, rejected(session), progress)
+    with session.snapshot():
+        clock = Calibrator().look(session, protocol.reference_u)
+        drops = list(session.drops())
+        causes = rejected(session)
+    found = analyze(protocol, drops, clock.scale, causes, progress)
     return found, clock, drops
 
 

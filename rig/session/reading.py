@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -61,6 +62,24 @@ class Reader:
         self._meta: Mapping[str, str] = MappingProxyType(
             dict(self._rows("SELECT key, value FROM meta"))
         )
+
+    @property
+    def readonly(self) -> bool:
+        """Whether nothing can be added."""
+        return True
+
+    @contextmanager
+    def snapshot(self) -> Iterator[None]:
+        """See the records as they stand at the first question, whatever another adds meanwhile."""
+        if not self.readonly or self._opened().in_transaction:  # it alone writes, or has one
+            yield
+            return
+        self._opened().execute("BEGIN")
+        try:
+            yield
+        finally:
+            if self._connection is not None:
+                self._connection.rollback()
 
     @property
     def meta(self) -> Mapping[str, str]:

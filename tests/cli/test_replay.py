@@ -11,6 +11,8 @@ import pytest
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.recorder.recorder import Recorder
+from rig.records import ClockSample
+from rig.replay import replay
 from rig.session.store import Session
 from sim.board import VirtualBoard
 
@@ -54,6 +56,21 @@ def test_a_session_is_identical_to_its_own_bytes(call, finished):
     assert int(clock.split()[2]) > 4
     assert (results, last) == ("results: 4 identical", "identical")
     assert finished.session.read_bytes() == before
+
+
+def test_what_is_recorded_meanwhile_is_no_difference(finished, tmp_path, monkeypatch):
+    session = finished.copy(tmp_path)
+    read = Session.byte_log
+    with Session.open(session) as writer, Session.open(session, readonly=True) as reader:
+
+        def late(self):
+            yield from read(self)
+            writer.add_ping(ClockSample(1, 2, 3))
+            writer.commit()
+
+        monkeypatch.setattr(Session, "byte_log", late)
+        assert replay(reader).lines[-1] == "identical"
+        assert reader.pings()[-1] == ClockSample(1, 2, 3)
 
 
 @pytest.mark.parametrize(

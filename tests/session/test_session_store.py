@@ -257,6 +257,22 @@ def test_readers_beside_a_writer_see_what_is_committed(path: Path) -> None:
             reader.commit()
 
 
+def test_a_snapshot_does_not_move_while_another_writes(path: Path) -> None:
+    with make(path) as writer, Session.open(path, readonly=True) as reader:
+        writer.log_bytes("rx", 1, b"x")
+        writer.commit()
+        with reader.snapshot():
+            with reader.snapshot():  # one in another is the same
+                assert len(list(reader.byte_log())) == 1
+            writer.log_bytes("rx", 2, b"y")
+            writer.commit()
+            assert len(list(reader.byte_log())) == 1
+        assert len(list(reader.byte_log())) == 2
+        with writer.snapshot():  # who writes sees its own records
+            writer.log_bytes("rx", 3, b"z")
+            assert len(list(writer.byte_log())) == 3
+
+
 def test_reader_in_a_write_protected_folder(path: Path) -> None:
     make(path).close()
     path.parent.chmod(0o500)
