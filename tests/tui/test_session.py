@@ -188,6 +188,7 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
             assert op.app.flow.stage is Stage.COUNTDOWN
             await other.press("f9")
             await op.until(lambda: op.app.state.line(1).state == "interrupted")
+            await op.at(Stage.PREPARE)  # only at rest is control given back
             await op.press("c")
             await op.means()
             await other.until(lambda: other.app.state.holder is None)
