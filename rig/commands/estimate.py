@@ -21,23 +21,23 @@ def main(arguments: Namespace) -> int:
     """Estimate the parameters of the impacts from a session."""
     with Session.open(arguments.session, readonly=True) as session:
         analysis, _ = detailed(session, progress("analysing run"))
-        found: dict[str, Any] = {"simulated": session.simulated}
-        found |= estimate(protocol_of(session), analysis)
+        found = estimate(protocol_of(session), analysis)
+        simulated = session.simulated
     like = None if analysis.joint is None else likeness(analysis.joint)
-    if like is not None:
-        found["likeness"] = like.json()
     sections = Sections()
     if arguments.json:
-        print_json(found)
+        said: dict[str, Any] = {"simulated": simulated, **found.json()}
+        print_json(said if like is None else said | {"likeness": like.json()})
     else:
         if like is not None and not like.like:
             print(like.sentence)
-        print(estimate_text(found, sections))
+        print(estimate_text(found, sections, simulated=simulated))
     if arguments.output is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
         folder = make_folder(arguments.output)
-        for name, picture in estimate_pictures(found, sections).items():
+        drawn = estimate_pictures(found, sections, simulated=simulated)
+        for name, picture in drawn.items():
             write_atomic(folder / f"{name}.svg", picture.svg)
             say(f"{folder / name}.svg")
     for sentence in sections.failed.values():

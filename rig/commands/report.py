@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.analysis.curves import model_curves
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.analysis.session import Analysis
+    from rig.estimate.session import SessionEstimate
     from rig.protocol.protocol import Protocol
     from rig.report.embed import PageFigure
 
@@ -49,13 +50,12 @@ def main(arguments: Namespace) -> int:
         )
         effects = found.analysis.effects
         parts = sections.make("The paired differences", lambda: list(effects_parts(effects))) or []
-        simulated = session.simulated
         estimated = sections.make(
-            "The estimate of the impacts",
-            lambda: _estimated(protocol, found.analysis, simulated=simulated),
+            "The estimate of the impacts", lambda: _estimated(protocol, found.analysis)
         )
-        if estimated:
-            figures += estimate_pictures(estimated, sections).values()
+        if estimated is not None:
+            drawn = estimate_pictures(estimated, sections, simulated=session.simulated)
+            figures += drawn.values()
             parts += page_parts(estimated, sections)
         write_report(
             arguments.output,
@@ -83,17 +83,17 @@ def main(arguments: Namespace) -> int:
         )
     if arguments.figures is not None:
         _write_figures(Path(arguments.figures), figures)
-    for sentence in (*(estimated or {}).get("failed", ()), *sections.failed.values()):
+    for sentence in (*(estimated.failed if estimated else ()), *sections.failed.values()):
         say(sentence)
     say(f"report: {arguments.output}")
     return 0
 
 
-def _estimated(protocol: Protocol, analysis: Analysis, *, simulated: bool) -> dict[str, Any]:
-    """What the impacts have in common; empty where there are none, or none is good."""
+def _estimated(protocol: Protocol, analysis: Analysis) -> SessionEstimate | None:
+    """What the impacts have in common; `None` where there are none, or none is good."""
     if protocol.surface is None or not analysis.adjusted:
-        return {}
-    return {"simulated": simulated} | estimate(protocol, analysis)
+        return None
+    return estimate(protocol, analysis)
 
 
 def _write_figures(folder: Path, figures: Sequence[PageFigure]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -23,12 +23,92 @@ if TYPE_CHECKING:
 
     from rig.analysis.result import DropResult, Measured
     from rig.model.surface import Surface
-    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Condition, Protocol
 
     Array = NDArray[np.float64]
 
 
-def agreement(protocol: Protocol, results: Iterable[DropResult]) -> list[dict[str, Any]]:
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A mean less the model, under one condition.
+
+    Attributes
+    ----------
+    n
+        Drops in the mean.
+    value, u
+        Difference and its standard uncertainty, that of the model included, m or m/s.
+    normalized_error
+        E_n; `None` without any uncertainty.
+    """
+
+    condition: Condition
+    n: int
+    value: float
+    u: float
+    normalized_error: float | None
+
+    @property
+    def chi2(self) -> float:
+        """Of this condition alone."""
+        return (self.value / self.u) ** 2
+
+    @property
+    def p(self) -> float:
+        """How often chance alone would make χ² as large."""
+        return chi2_tail(self.chi2, 1)
+
+    def json(self) -> dict[str, Any]:
+        """One of ``inclines``."""
+        return {
+            **self.condition.json(),
+            "n": self.n,
+            "difference": self.value,
+            "u": self.u,
+            "normalized_error": self.normalized_error,
+            "chi2": self.chi2,
+            "p": self.p,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One measurand against the model.
+
+    Attributes
+    ----------
+    quantity
+        Its name in JSON.
+    chi2
+        Of all conditions together, with what they have in common.
+    """
+
+    quantity: str
+    chi2: float
+    differences: tuple[Difference, ...]
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom of χ²."""
+        return len(self.differences)
+
+    @property
+    def p(self) -> float:
+        """How often chance alone would make χ² as large."""
+        return chi2_tail(self.chi2, self.degrees)
+
+    def json(self) -> dict[str, Any]:
+        """One of ``comparison``."""
+        return {
+            "quantity": self.quantity,
+            "chi2": self.chi2,
+            "degrees": self.degrees,
+            "p": self.p,
+            "inclines": [one.json() for one in self.differences],
+        }
+
+
+def agreement(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Comparison, ...]:
     """Compare Δz and V with the protocol's model, all inclines at once.
 
     Means of different inclines share the rig's errors, and predictions share the model's
@@ -37,23 +117,20 @@ def agreement(protocol: Protocol, results: Iterable[DropResult]) -> list[dict[st
 
     Returns
     -------
-    list of dict
-        One a measurand: ``inclines`` with difference, u, normalized error, χ² and p of each;
-        ``chi2``, ``degrees`` and ``p`` of all together.
+    tuple of Comparison
+        One a measurand.
     """
     good = [result for result in results if result.verdict in GOOD]
     cases = by_case(protocol, good, lambda one: one.run)
     # Outside the model's domain there is nothing to compare with.
     cases = [runs for runs in cases if predicted_run(protocol, runs[0].run)]
     if not cases:
-        return []
+        return ()
     names = [row.name for row in averaged() if _tells(protocol, cases, row.name)]
-    return [_compared(protocol, cases, name) for name in names]
+    return tuple(_compared(protocol, cases, name) for name in names)
 
 
-def _compared(
-    protocol: Protocol, cases: Sequence[Sequence[DropResult]], name: str
-) -> dict[str, Any]:
+def _compared(protocol: Protocol, cases: Sequence[Sequence[DropResult]], name: str) -> Comparison:
     means = [mean([one.quantities[name] for one in runs]) for runs in cases]
     shared = _shared([[one.quantities[name] for one in runs] for runs in cases])
     # Scatter that is known from few runs counts for as much as its expanded uncertainty says.
@@ -81,24 +158,11 @@ def _compared(
         normalized_error(one, Quantity(*model), predicted_parts(protocol, runs[0].run).get(name))
         for one, model, runs in zip(means, zip(predicted, models, strict=True), cases, strict=True)
     ]
-    return {
-        "quantity": name,
-        "chi2": chi2,
-        "degrees": len(cases),
-        "p": chi2_tail(chi2, len(cases)),
-        "inclines": [
-            {
-                **protocol.case(runs[0].run),
-                "n": len(runs),
-                "difference": float(off[n]),
-                "u": float(u[n]),
-                "normalized_error": errors[n],
-                "chi2": float((off[n] / u[n]) ** 2),
-                "p": chi2_tail(float((off[n] / u[n]) ** 2), 1),
-            }
-            for n, runs in enumerate(cases)
-        ],
-    }
+    lines = zip(cases, off.tolist(), u.tolist(), errors, strict=True)
+    differences = (
+        Difference(protocol.condition(runs[0].run), len(runs), *line) for runs, *line in lines
+    )
+    return Comparison(name, chi2, tuple(differences))
 
 
 def _shared(values: Sequence[Sequence[Measured]]) -> Array:

@@ -22,11 +22,15 @@ from rig.model.impact import impact_on
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
     from rig.units import Quantity
+
+    Array = NDArray[np.float64]
 
 CONTACT_U = 1e-3
 """How far the contact point may move when the board is inclined anew, m."""
@@ -191,10 +195,10 @@ def best(protocol: Protocol, found: CoefficientProblem) -> HypothesisFit:
     return fit(found.forms, nuisances(protocol, found, model(protocol, found.parameters)))
 
 
-def correlation(outcome: HypothesisFit, names: Sequence[str]) -> list[list[float]]:
-    """Correlation matrix of some parameters."""
+def correlation(outcome: HypothesisFit, names: Sequence[str]) -> Array:
+    """Correlation matrix of some parameters, shape ``(names, names)``."""
     at = [outcome.names.index(name) for name in names]
     part = outcome.covariance[np.ix_(at, at)]
     sd = np.sqrt(np.diag(part))
-    found: list[list[float]] = (part / np.outer(sd, sd)).tolist()
+    found: Array = part / np.outer(sd, sd)
     return found

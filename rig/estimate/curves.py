@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.fit import Fit
 from rig.analysis.free_flight import squared_after
+from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.drop_model import DropModel
     from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol, Run
 
     Array = NDArray[np.float64]
@@ -28,35 +31,86 @@ POINTS = 120
 _STEP = 1e-3  # of an unknown's prior uncertainty
 
 
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A quantity along a fall, each array of shape ``(POINTS,)``.
+
+    Attributes
+    ----------
+    measured, u95
+        Values, and half-widths of their 95 % bands, point by point.
+    model
+        By the model with the protocol's coefficients.
+    """
+
+    measured: Array
+    u95: Array
+    model: Array
+
+    def json(self, name: str) -> dict[str, list[float]]:
+        """``{name, name_U95, name_model}``."""
+        return {
+            name: self.measured.tolist(),
+            f"{name}_U95": self.u95.tolist(),
+            f"{name}_model": self.model.tolist(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class DropCurves:
+    """One drop from release to the top rod's hit.
+
+    Attributes
+    ----------
+    height_m
+        Of the top rod above the contact point, shape ``(POINTS,)``.
+    squared_speed
+        V² of the impact chain at these heights, m²/s².
+    time_s
+        Since the release, shape ``(POINTS,)``.
+    separation
+        Δz at these times at simultaneous release, m; `None` without a free chain.
+    """
+
+    run: Run
+    height_m: Array
+    squared_speed: Curve
+    time_s: Array
+    separation: Curve | None
+
+    def json(self) -> dict[str, Any]:
+        """One of ``curves``."""
+        said: dict[str, Any] = {
+            "run": self.run.number,
+            "incline_deg": self.run.incline_deg,
+            "impact_chain": self.run.impact,
+            "height_m": self.height_m.tolist(),
+            **self.squared_speed.json("speed2_m2_s2"),
+        }
+        if self.separation is not None:
+            said |= {"time_s": self.time_s.tolist(), **self.separation.json(SEPARATION.name)}
+        return said
+
+
 def drop_curves(
     protocol: Protocol, run: Run, drop: Fit | JointDrop, joint: JointFit | None
-) -> dict[str, Any]:
-    """Follow one drop from release to the top rod's hit.
-
-    Returns
-    -------
-    dict
-        ``height_m`` of the top rod above the contact point with ``speed2_m2_s2`` of the impact
-        chain; where a free chain fell, ``time_s`` since the release with ``separation_m`` at
-        simultaneous release. ``…_U95`` are half-widths of 95 % bands, point by point; ``…_model``
-        is the model with the protocol's coefficients.
-    """
+) -> DropCurves:
+    """Follow one drop from release to the top rod's hit, with bands."""
     model, x = drop.model, drop.x
     end = model.trajectory("impact", x)
-    top = model.records["impact"].chain.chain.length
     heights = np.linspace(_top(model, x) - 1e-6, 0.0, POINTS)
-    said: dict[str, Any] = {
-        "run": run.number,
-        "incline_deg": run.incline_deg,
-        "impact_chain": run.impact,
-        "height_m": heights.tolist(),
-    }
-    said |= _with_band("speed2_m2_s2", lambda at: _squares(model, at, heights), drop, joint)
     times = np.linspace(0.0, float(end.time[-1] - end.time[0]), POINTS)
+    separation = None
     if "free" in model.records:
-        said["time_s"] = times.tolist()
-        said |= _with_band("separation_m", lambda at: _separations(model, at, times), drop, joint)
-    return said | _by_model(protocol, run, heights, times, top)
+        separation = Curve(
+            *_with_band(lambda at: _separations(model, at, times), drop, joint),
+            _separations_by_model(protocol, run, times),
+        )
+    squares = Curve(
+        *_with_band(lambda at: _squares(model, at, heights), drop, joint),
+        _squares_by_model(protocol, run, heights, model.records["impact"].chain.chain.length),
+    )
+    return DropCurves(run, heights, squares, times, separation)
 
 
 def _top(model: DropModel, x: Array) -> float:
@@ -99,8 +153,8 @@ def _alone(model: DropModel, x: Array, level: Array) -> Array:
 
 
 def _with_band(
-    name: str, curve: Callable[[Array], Array], drop: Fit | JointDrop, joint: JointFit | None
-) -> dict[str, list[float]]:
+    curve: Callable[[Array], Array], drop: Fit | JointDrop, joint: JointFit | None
+) -> tuple[Array, Array]:
     """Values, and 1.96 standard uncertainties from the covariance of the adjustment."""
     x, sd = drop.x, drop.model.unknowns.sd
     slopes = np.stack(
@@ -122,29 +176,32 @@ def _with_band(
         variance = np.einsum("ij,jk,ik->i", own, drop.inverse, own, optimize=True)
         variance += np.einsum("ij,jk,ik->i", left, shared, left, optimize=True)
     band = coverage_factor(np.inf) * np.sqrt(np.maximum(variance, 0.0))
-    return {name: curve(x).tolist(), f"{name}_U95": band.tolist()}
+    return curve(x), band
 
 
-def _by_model(
-    protocol: Protocol, run: Run, heights: Array, times: Array, top: float
-) -> dict[str, list[float]]:
-    """The same by the model."""
+def _by_model(protocol: Protocol, run: Run) -> tuple[Chain, list[float]]:
+    """The chain that strikes, and what the model says it gains from each rod."""
     assert protocol.surface is not None
     assert run.impact is not None
     chain = protocol.chains[run.impact].chain
     impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
-    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    return chain, kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+
+
+def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) -> Array:
+    """V² by the model; `top` is the top rod's height above the bottom one."""
+    chain, gains = _by_model(protocol, run)
     drop, gravity = protocol.drop.value, protocol.gravity.value
     struck = hits(chain, gains, drop, gravity)
     before = np.array([-drop, *chain.heights[:-1]])
     after = np.array([0.0, *(hit.speed_after for hit in struck[:-1])])
     fallen = top - heights
     leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
-    squares = after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg])
-    found = {"speed2_m2_s2_model": np.maximum(squares, 0.0).tolist()}
-    if protocol.two_chains:
-        motion = Motion(chain, gains, drop, gravity)
-        found["separation_m_model"] = [
-            motion.at(min(time, motion.end_s)).separation_m for time in times.tolist()
-        ]
+    found: Array = np.maximum(after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg]), 0.0)
     return found
+
+
+def _separations_by_model(protocol: Protocol, run: Run, times: Array) -> Array:
+    chain, gains = _by_model(protocol, run)
+    motion = Motion(chain, gains, protocol.drop.value, protocol.gravity.value)
+    return np.array([motion.at(min(time, motion.end_s)).separation_m for time in times.tolist()])

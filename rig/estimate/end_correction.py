@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from rig.estimate.hypothesis_fit import fit
 from rig.model.rods import rod_impacts
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from rig.estimate.coefficients import CoefficientProblem
@@ -27,15 +30,95 @@ STRONG = 10.0
 _TELLS = 0.5  # standard uncertainty of γ over Eq. 10's, above which the edges do not tell it
 
 
-def end_correction(protocol: Protocol, found: CoefficientProblem) -> dict[str, Any] | None:
+@dataclass(frozen=True, slots=True)
+class EndCorrection:
+    """Three hypotheses on γ, each with one α a condition.
+
+    Attributes
+    ----------
+    scale
+        γ over that of Eq. 10, where it is open.
+    chi2
+        By hypothesis: ``open``, ``eq10`` and ``without``.
+    gamma_eq10
+        γ by Eq. 10 where it is the same for all rods.
+    """
+
+    scale: Measured
+    chi2: Mapping[str, float]
+    gamma_eq10: float | None
+
+    @property
+    def aic(self) -> dict[str, float]:
+        """Akaike's criterion of each; γ is one parameter more where it is open."""
+        return {name: one + (2.0 if name == "open" else 0.0) for name, one in self.chi2.items()}
+
+    @property
+    def gamma(self) -> Measured | None:
+        """γ itself, where it is the same for all rods."""
+        if self.gamma_eq10 is None:
+            return None
+        return Measured(self.gamma_eq10 * self.scale.value, self.gamma_eq10 * self.scale.u)
+
+    @property
+    def _worse(self) -> float:
+        """By how much AIC is larger without the correction than with the better of both."""
+        return self.aic["without"] - min(self.aic["open"], self.aic["eq10"])
+
+    @property
+    def needed(self) -> bool | None:
+        """Whether edges want it; `None` where they do not tell."""
+        return self._worse > 0.0 if self.scale.u <= _TELLS else None
+
+    def _p(self, name: str) -> float:
+        """Likelihood ratio of a hypothesis against an open γ."""
+        return chi2_tail(self.chi2[name] - self.chi2["open"], 1)
+
+    @property
+    def sentence(self) -> str:
+        """What follows."""
+        scale, worse = self.scale, self._worse
+        size = f"γ is {scale.value:.3f} ± {scale.expanded:.3f} (95 %) times that of Eq. 10"
+        if self.needed is None:
+            return f"The edges do not tell whether the end correction is needed: {size}."
+        agree = f"p {self._p('eq10'):.2g} for Eq. 10"
+        if worse > STRONG:
+            return (
+                f"The end correction is needed: without it AIC is {worse:.0f} worse; {size}, "
+                f"{agree}."
+            )
+        if worse > 0.0:
+            return (
+                f"The edges lean towards the end correction: without it AIC is {worse:.2g} worse; "
+                f"{size}, {agree}."
+            )
+        return f"The end correction is not needed: without it AIC is {-worse:.2g} better; {size}."
+
+    def json(self) -> dict[str, Any]:
+        """``end_correction``."""
+        said: dict[str, Any] = {
+            "scale": self.scale.json(),
+            "delta_chi2": _above_least(self.chi2),
+            "delta_aic": _above_least(self.aic),
+            "p_without": self._p("without"),
+            "p_eq10": self._p("eq10"),
+        }
+        if self.gamma is not None:
+            said |= {"gamma_eq10": self.gamma_eq10, "gamma": self.gamma.json()}
+        return said | {"needed": self.needed, "sentence": self.sentence}
+
+
+def _above_least(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: one - min(values.values()) for name, one in values.items()}
+
+
+def end_correction(protocol: Protocol, found: CoefficientProblem) -> EndCorrection | None:
     """Compare the three, with one α for each incline, so that Eqs. 8 to 13 are not at stake.
 
     Returns
     -------
-    dict or None
-        ``scale``: γ over that of Eq. 10; ``gamma``, where it is the same for all rods; χ² and AIC
-        of each hypothesis less those of the best; ``p_without`` and ``p_eq10`` by the likelihood
-        ratio (one degree of freedom); ``needed``; ``sentence``. `None` where γ is given as 0.
+    EndCorrection or None
+        `None` where γ is given as 0.
     """
 
     def gammas(form: QuadraticForm) -> Array:
@@ -45,46 +128,13 @@ def end_correction(protocol: Protocol, found: CoefficientProblem) -> dict[str, A
     by_eq10 = {float(gamma) for form in found.forms for gamma in gammas(form)}
     if by_eq10 == {0.0}:
         return None
-    cases = one_alpha(found.forms, lambda one: tuple(protocol.case(one.run).values()))
+    cases = one_alpha(found.forms, lambda one: protocol.condition(one.run))
     inclines = nuisances(protocol, found, cases)
-    outcomes = {
-        "open": fit(found.forms, ended(inclines, gammas, None)),
-        "eq10": fit(found.forms, inclines),
-        "without": fit(found.forms, ended(inclines, gammas, 0.0)),
+    open_ = fit(found.forms, ended(inclines, gammas, None))
+    chi2 = {
+        "open": open_.chi2,
+        "eq10": fit(found.forms, inclines).chi2,
+        "without": fit(found.forms, ended(inclines, gammas, 0.0)).chi2,
     }
-    chi2 = {name: one.chi2 for name, one in outcomes.items()}
-    aic = {name: one + (2.0 if name == "open" else 0.0) for name, one in chi2.items()}
-    scale = Measured(*outcomes["open"][END])
-    said: dict[str, Any] = {
-        "scale": scale.json(),
-        "delta_chi2": {name: one - min(chi2.values()) for name, one in chi2.items()},
-        "delta_aic": {name: one - min(aic.values()) for name, one in aic.items()},
-        "p_without": chi2_tail(chi2["without"] - chi2["open"], 1),
-        "p_eq10": chi2_tail(chi2["eq10"] - chi2["open"], 1),
-    }
-    if len(by_eq10) == 1:
-        (gamma,) = by_eq10
-        said["gamma_eq10"] = gamma
-        said["gamma"] = Measured(gamma * scale.value, gamma * scale.u).json()
-    worse = aic["without"] - min(aic["open"], aic["eq10"])
-    told = scale.u <= _TELLS
-    said["needed"] = bool(worse > 0.0) if told else None
-    said["sentence"] = _sentence(scale, worse, said["p_eq10"], told=told)
-    return said
-
-
-def _sentence(scale: Measured, worse: float, p_eq10: float, *, told: bool) -> str:
-    size = f"γ is {scale.value:.3f} ± {scale.expanded:.3f} (95 %) times that of Eq. 10"
-    if not told:
-        return f"The edges do not tell whether the end correction is needed: {size}."
-    agree = f"p {p_eq10:.2g} for Eq. 10"
-    if worse > STRONG:
-        return (
-            f"The end correction is needed: without it AIC is {worse:.0f} worse; {size}, {agree}."
-        )
-    if worse > 0.0:
-        return (
-            f"The edges lean towards the end correction: without it AIC is {worse:.2g} worse; "
-            f"{size}, {agree}."
-        )
-    return f"The end correction is not needed: without it AIC is {-worse:.2g} better; {size}."
+    same = by_eq10.pop() if len(by_eq10) == 1 else None
+    return EndCorrection(Measured(*open_[END]), chi2, same)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -50,6 +50,16 @@ class Posterior:
     weights: Array
     means: Array
     sds: Array
+
+    def json(self) -> dict[str, Any]:
+        """``posterior``."""
+        return {
+            "nodes": self.weights.size,
+            "names": list(self.names),
+            "weights": self.weights.tolist(),
+            "means": self.means.tolist(),
+            "sds": self.sds.tolist(),
+        }
 
     def moments(self, name: str) -> tuple[float, float]:
         """Mean and standard deviation."""

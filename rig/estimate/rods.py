@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import Measured, normalized_error
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
 from rig.estimate.hypothesis_fit import fit
+from rig.estimate.likelihood_ratio import LikelihoodRatio
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
     from rig.estimate.hypothesis_fit import Hypothesis
     from rig.estimate.quadratic_forms import QuadraticForm
-    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Condition, Protocol
 
     Array = NDArray[np.float64]
 
@@ -29,7 +30,80 @@ RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""
 
 
-def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """Speed that the chain gains from neighbours which the gates tell apart from all others.
+
+    Attributes
+    ----------
+    first, last
+        Rods from the bottom rod, 0.
+    measured
+        ΔV = J/M, m/s.
+    eq9_m_s
+        By Eq. 9 with the best single α.
+    """
+
+    first: int
+    last: int
+    measured: Measured
+    eq9_m_s: float
+
+    @property
+    def normalized_error(self) -> float | None:
+        """Of what was measured against Eq. 9."""
+        return normalized_error(self.measured, Quantity(self.eq9_m_s))
+
+    def json(self) -> dict[str, Any]:
+        """One of ``groups``."""
+        return {
+            "rods": [self.first, self.last],
+            "gain_m_s": self.measured.json(),
+            "eq9_m_s": self.eq9_m_s,
+            "normalized_error": self.normalized_error,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Impulses:
+    """What each rod gave, under one condition.
+
+    Attributes
+    ----------
+    rods
+        How many strike.
+    alpha
+        The best single α.
+    eq9
+        χ² of Eq. 9 with it against all rods open.
+    gains
+        From the bottom rod up.
+    """
+
+    condition: Condition
+    rods: int
+    alpha: Measured
+    eq9: LikelihoodRatio
+    gains: tuple[Gain, ...]
+
+    @property
+    def resolved(self) -> int:
+        """How many rods are told from both their neighbours."""
+        return sum(one.first == one.last for one in self.gains)
+
+    def json(self) -> dict[str, Any]:
+        """One of ``inclines``."""
+        return {
+            **self.condition.json(),
+            "rods": self.rods,
+            "resolved": self.resolved,
+            "alpha": self.alpha.json(),
+            **self.eq9.json(),
+            "groups": [one.json() for one in self.gains],
+        }
+
+
+def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impulses, ...]:
     """Measure the speed that the chain gains from each rod, ΔV = J/M, at each incline.
 
     Neither Eq. 9 nor the scatter about it pulls at these numbers: the α of every rod is open, and
@@ -42,33 +116,31 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> dict[str, An
 
     Returns
     -------
-    dict
-        ``inclines``: for each, the best α, χ² of Eq. 9 with it against all rods open, and
-        ``groups`` of rods (numbers from the bottom rod, 0) with ΔV as measured and by Eq. 9, m/s.
-        ``sentence``: whether each rod was resolved.
+    tuple of Impulses
+        One a condition.
     """
-    lines = [_case(protocol, group) for group in by_case(protocol, forms, lambda one: one.run)]
-    whole = [line for line in lines if line["resolved"] == line["rods"]]
-    if len(whole) == len(lines):
-        words = "The gates resolve the impulse of every rod at every incline."
-    else:
-        short = "; ".join(
-            f"{line['incline_deg']:g}°: {line['resolved']} of {line['rods']}"
-            for line in lines
-            if line not in whole
-        )
-        words = (
-            "The gates do not resolve every rod by itself; neighbours are taken together until "
-            f"their sum is known to {RESOLVED:.0%} (95 %). Resolved alone at {short}."
-        )
-    return {"inclines": lines, "sentence": words}
+    cases = by_case(protocol, forms, lambda one: one.run)
+    return tuple(_impulses(protocol.condition(group[0].run), group) for group in cases)
 
 
-def _case(protocol: Protocol, forms: Sequence[QuadraticForm]) -> dict[str, Any]:
-    incline = forms[0].run.incline_deg
+def resolution(found: Sequence[Impulses]) -> str:
+    """Say whether each rod was resolved."""
+    if all(one.resolved == one.rods for one in found):
+        return "The gates resolve the impulse of every rod at every incline."
+    short = "; ".join(
+        f"{one.condition.incline_deg:g}°: {one.resolved} of {one.rods}"
+        for one in found
+        if one.resolved < one.rods
+    )
+    return (
+        "The gates do not resolve every rod by itself; neighbours are taken together until their "
+        f"sum is known to {RESOLVED:.0%} (95 %). Resolved alone at {short}."
+    )
 
+
+def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
     def contact(hypothesis: Hypothesis) -> Hypothesis:
-        return with_contact(hypothesis, [incline], (0.0, CONTACT_U))
+        return with_contact(hypothesis, [condition.incline_deg], (0.0, CONTACT_U))
 
     single = fit(forms, contact(one_alpha(forms, lambda _: "one")))
     each = fit(forms, contact(each_rod(forms, lambda _: "one")))
@@ -76,33 +148,23 @@ def _case(protocol: Protocol, forms: Sequence[QuadraticForm]) -> dict[str, Any]:
     weight = forms[0].ratios[:rods] * np.mean([form.arrivals[:rods] for form in forms], axis=0)
     gains = weight * each.values[:rods]
     covariance = each.covariance[:rods, :rods] * np.outer(weight, weight)
-    alpha = single.values[0]
-    model = weight * alpha
-    spans = _groups(covariance, np.abs(model))
-    groups = [_group(span, gains, covariance, model) for span in spans]
-    chi2 = max(0.0, single.chi2 - each.chi2)
-    return {
-        **protocol.case(forms[0].run),
-        "rods": rods,
-        "resolved": sum(first == last for first, last in spans),
-        "alpha": Measured(*single["α one"]).json(),
-        "chi2": chi2,
-        "degrees": rods - 1,
-        "p": chi2_tail(chi2, rods - 1) if rods > 1 else None,
-        "groups": groups,
-    }
+    model = weight * single.values[0]
+    return Impulses(
+        condition,
+        rods,
+        Measured(*single["α one"]),
+        LikelihoodRatio(single.chi2 - each.chi2, rods - 1),
+        tuple(
+            _gain(first, last, gains, covariance, model)
+            for first, last in _groups(covariance, np.abs(model))
+        ),
+    )
 
 
-def _group(span: tuple[int, int], gains: Array, covariance: Array, model: Array) -> dict[str, Any]:
-    part = slice(span[0], span[1] + 1)
+def _gain(first: int, last: int, gains: Array, covariance: Array, model: Array) -> Gain:
+    part = slice(first, last + 1)
     measured = Measured(float(gains[part].sum()), _sum_u(covariance, part))
-    predicted = float(model[part].sum())
-    return {
-        "rods": [*span],
-        "gain_m_s": measured.json(),
-        "eq9_m_s": predicted,
-        "normalized_error": normalized_error(measured, Quantity(predicted)),
-    }
+    return Gain(first, last, measured, float(model[part].sum()))
 
 
 def _sum_u(covariance: Array, part: slice) -> float:

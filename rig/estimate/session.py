@@ -1,37 +1,206 @@
-"""Everything that a session says of the impacts, as plain data."""
+"""Everything that a session says of the impacts."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.estimate import coefficients as of
 from rig.estimate.agreement import agreement
+from rig.estimate.alphas import single_alphas
 from rig.estimate.curves import drop_curves
 from rig.estimate.end_correction import end_correction
-from rig.estimate.hypotheses import AIR, one_alpha
-from rig.estimate.hypothesis_fit import fit
+from rig.estimate.hypotheses import AIR
 from rig.estimate.posterior import posterior
 from rig.estimate.quadratic_forms import merged, quadratic_form
-from rig.estimate.rods import impulses
+from rig.estimate.rods import impulses, resolution
 from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from rig.analysis.session import Analysis
+    from rig.estimate.agreement import Comparison
+    from rig.estimate.alphas import SingleAlphas
     from rig.estimate.coefficients import CoefficientProblem
+    from rig.estimate.curves import DropCurves
+    from rig.estimate.end_correction import EndCorrection
     from rig.estimate.hypothesis_fit import HypothesisFit
-    from rig.estimate.quadratic_forms import QuadraticForm
-    from rig.protocol.protocol import Protocol, Run
+    from rig.estimate.posterior import Posterior
+    from rig.estimate.rods import Impulses
+    from rig.protocol.protocol import Condition, Protocol
+    from rig.units import Quantity
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """One coefficient of the impacts.
+
+    Attributes
+    ----------
+    name
+        As in the protocol; of given α's with the chain's name behind it.
+    identified
+        Whether the edges tell it; else it is held by what the protocol states.
+    least_squares
+        From the edges, and from nothing else where it is identified.
+    mean, sd, low, high
+        Of the posterior: moments, and its interval of 95 %.
+    stated
+        In the protocol.
+    """
+
+    name: str
+    identified: bool
+    least_squares: Measured
+    mean: float
+    sd: float
+    low: float
+    high: float
+    stated: Quantity
+
+    def json(self) -> dict[str, Any]:
+        """One of ``parameters``."""
+        return {
+            "name": self.name,
+            "identified": self.identified,
+            "least_squares": self.least_squares.json(),
+            "posterior": {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high},
+            "stated": {"value": self.stated.value, "u": self.stated.u},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPoint:
+    """Where the rods touch at an incline, m above the contact level."""
+
+    incline_deg: float
+    height: Measured
+
+    @property
+    def identified(self) -> bool:
+        """Whether the edges tell it better than is supposed beforehand."""
+        return self.height.u < of.FOUND * of.CONTACT_U
+
+    def json(self) -> dict[str, Any]:
+        """One of ``contact``."""
+        return {
+            "incline_deg": self.incline_deg,
+            "height_m": self.height.json(),
+            "identified": self.identified,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficients:
+    """The coefficients of the impacts, fitted to all drops.
+
+    Attributes
+    ----------
+    parameters
+        Each coefficient that the protocol leaves open and that has a name here.
+    correlation
+        Of the parameters by least squares, shape ``(parameters, parameters)``.
+    posterior
+        Of all parameters; `None` without any.
+    contact
+        One an incline.
+    drag
+        κ in g − κv², 1/m; `None` where it is not fitted.
+    chi2
+        Of the edges.
+    """
+
+    parameters: tuple[Coefficient, ...]
+    correlation: Array
+    posterior: Posterior | None
+    contact: tuple[ContactPoint, ...]
+    drag: Measured | None
+    chi2: float
+
+    def json(self) -> dict[str, Any]:
+        """``parameters`` to ``edges_chi2``."""
+        said: dict[str, Any] = {"parameters": [one.json() for one in self.parameters]}
+        if self.posterior is not None:
+            names = [one.name for one in self.parameters]
+            said |= {
+                "correlation": {"names": names, "matrix": self.correlation.tolist()},
+                "posterior": self.posterior.json(),
+            }
+        return said | {
+            "contact": [one.json() for one in self.contact],
+            "drag_per_m": None if self.drag is None else self.drag.json(),
+            "edges_chi2": self.chi2,
+        }
+
+
+@dataclass(slots=True)
+class SessionEstimate:
+    """What the impacts of a session have in common.
+
+    What could not be worked out is `None`, and missing in JSON.
+
+    Attributes
+    ----------
+    drops, edges
+        How many it rests on.
+    left_out
+        A sentence on each coefficient that the edges do not tell; `None` where that is not known.
+    failed
+        A sentence on each section that could not be worked out.
+    """
+
+    drops: int
+    edges: int
+    left_out: tuple[str, ...] | None = None
+    coefficients: Coefficients | None = None
+    end_correction: EndCorrection | None = None
+    alphas: SingleAlphas | None = None
+    impulses: tuple[Impulses, ...] | None = None
+    comparison: tuple[Comparison, ...] | None = None
+    curves: tuple[DropCurves, ...] | None = None
+    failed: tuple[str, ...] = ()
+
+    @property
+    def free_chain(self) -> bool:
+        """Whether a chain falls beside the one that strikes."""
+        return any(curve.separation is not None for curve in self.curves or ())
+
+    def json(self) -> dict[str, Any]:
+        """As `rig estimate --json` prints it."""
+        said: dict[str, Any] = {"drops": self.drops, "edges": self.edges}
+        if self.left_out is not None:
+            said["left_out"] = list(self.left_out)
+        if self.coefficients is not None:
+            end = self.end_correction
+            said |= self.coefficients.json()
+            said["end_correction"] = None if end is None else end.json()
+        if self.alphas is not None:
+            said |= self.alphas.json()
+        if self.impulses is not None:
+            said["impulses"] = {
+                "inclines": [one.json() for one in self.impulses],
+                "sentence": resolution(self.impulses),
+            }
+        for name, lines in (("comparison", self.comparison), ("curves", self.curves)):
+            if lines is not None:
+                said[name] = [one.json() for one in lines]
+        if self.failed:
+            said["failed"] = list(self.failed)
+        return said
 
 
 @one_thread
-def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
+def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     """Estimate what the impacts of a session have in common.
 
     Parameters
@@ -40,12 +209,6 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
         The session's, with a surface.
     analysis
         Of the session.
-
-    Returns
-    -------
-    dict
-        What ``rig estimate --json`` prints. A section that could not be worked out is missing, and
-        ``failed`` has a sentence on it.
 
     Raises
     ------
@@ -66,152 +229,63 @@ def estimate(protocol: Protocol, analysis: Analysis) -> dict[str, Any]:
     )
     forms = [quadratic_form(good[key], drop, shared) for key, drop in drops.items()]
     like = merged(forms)
-    said: dict[str, Any] = {"drops": len(forms), "edges": sum(one.edges for one in forms)}
+    said = SessionEstimate(len(forms), sum(one.edges for one in forms))
     sections = Sections()
     found, outcome = None, None
     with sections.alone("The coefficients"):
         found = of.coefficient_problem(protocol, like)
-        said["left_out"] = list(found.left_out)
+        said.left_out = tuple(found.left_out)
         if found.forms:
             outcome = of.best(protocol, found)
-            said |= _coefficients(protocol, found, outcome)
+            said.coefficients = _coefficients(protocol, found, outcome)
     with sections.alone("The end correction"):
         if found is not None and found.forms:
-            said["end_correction"] = end_correction(protocol, found)
+            said.end_correction = end_correction(protocol, found)
     with sections.alone("The best single α"):
-        said |= _alphas(protocol, found, outcome, forms, like)
+        said.alphas = single_alphas(protocol, found, outcome, forms, like)
     with sections.alone("The speed gained from each rod"):
-        said["impulses"] = impulses(protocol, like)
+        said.impulses = impulses(protocol, like)
     with sections.alone("The comparison with the model"):
-        said["comparison"] = agreement(protocol, analysis.runs)
+        said.comparison = agreement(protocol, analysis.runs)
     with sections.alone("The curves"):
-        first = {_case(protocol, good[key]): key for key in reversed(drops)}
-        said["curves"] = [
+        first: Mapping[Condition, tuple[int, int]] = {
+            protocol.condition(good[key]): key for key in reversed(drops)
+        }
+        said.curves = tuple(
             drop_curves(protocol, good[key], drops[key], analysis.joint)
             for _, key in sorted(first.items())
-        ]
-    if sections.failed:
-        said["failed"] = [*sections.failed.values()]
+        )
+    said.failed = tuple(sections.failed.values())
     return said
-
-
-def _case(protocol: Protocol, run: Run) -> tuple[object, ...]:
-    return tuple(protocol.case(run).values())
 
 
 def _coefficients(
     protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
-) -> dict[str, Any]:
+) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
-    contact = []
-    for incline in found.inclines:
-        height = Measured(*outcome[f"contact {incline:g}"])
-        contact.append(
-            {
-                "incline_deg": incline,
-                "height_m": height.json(),
-                "identified": height.u < of.FOUND * of.CONTACT_U,
-            }
-        )
-    drag = Measured(*outcome[AIR]).json() if AIR in outcome else None
-    said = _told(protocol, found, outcome) if found.stated else {"parameters": []}
-    return said | {"contact": contact, "drag_per_m": drag, "edges_chi2": outcome.chi2}
-
-
-def _told(protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit) -> dict[str, Any]:
-    """What is said of the coefficients that are fitted."""
     names = list(found.stated)
-    bayes = posterior(protocol, found, outcome)
-    parameters = []
-    for name in names:
-        mean, sd = bayes.moments(name)
-        low, high = bayes.interval(name)
-        stated = found.stated[name]
-        parameters.append(
-            {
-                "name": name,
-                "identified": name not in found.held,
-                "least_squares": Measured(*outcome[name]).json(),
-                "posterior": {"value": mean, "u": sd, "low": low, "high": high},
-                "stated": {"value": stated.value, "u": stated.u},
-            }
-        )
-    return {
-        "parameters": parameters,
-        "correlation": {"names": names, "matrix": of.correlation(outcome, names)},
-        "posterior": {
-            "nodes": bayes.weights.size,
-            "names": list(bayes.names),
-            "weights": bayes.weights.tolist(),
-            "means": bayes.means.tolist(),
-            "sds": bayes.sds.tolist(),
-        },
-    }
+    told = posterior(protocol, found, outcome) if names else None
+    return Coefficients(
+        tuple(_coefficient(name, found, outcome, told) for name in names) if told else (),
+        of.correlation(outcome, names),
+        told,
+        tuple(
+            ContactPoint(incline, Measured(*outcome[f"contact {incline:g}"]))
+            for incline in found.inclines
+        ),
+        Measured(*outcome[AIR]) if AIR in outcome else None,
+        outcome.chi2,
+    )
 
 
-def _alphas(
-    protocol: Protocol,
-    found: CoefficientProblem | None,
-    outcome: HypothesisFit | None,
-    forms: Sequence[QuadraticForm],
-    like: Sequence[QuadraticForm],
-) -> dict[str, Any]:
-    """The best single α of every run and case, and whether they agree.
-
-    A case is an incline, or an incline and a striking chain where chains are unlike.
-    """
-
-    def case(one: QuadraticForm) -> tuple[object, ...]:
-        return _case(protocol, one.run)
-
-    by_run = fit(forms, one_alpha(forms, lambda one: one.run.number))
-    by_case = fit(like, one_alpha(like, case))
-    model = {}
-    if found is not None and outcome is not None:
-        alphas = _model_alphas(protocol, found, outcome)
-        model = {case(one): alpha for one, alpha in zip(found.forms, alphas, strict=True)}
-    cases = []
-    for key, one in sorted({case(one): one for one in reversed(like)}.items()):
-        line: dict[str, Any] = {
-            **protocol.case(one.run),
-            "n": sum(case(other) == key for other in forms),
-            "alpha": Measured(*by_case[f"α {key}"]).json(),
-        }
-        cases.append(line | ({"model": model[key]} if key in model else {}))
-    runs = []
-    for one in forms:
-        alpha = Measured(*by_run[f"α {one.run.number}"])
-        line = {
-            "run": one.run.number,
-            "incline_deg": one.run.incline_deg,
-            "impact_chain": one.run.impact,
-            "alpha": alpha.json(),
-        }
-        if case(one) in model:
-            line["residual"] = (alpha.value - model[case(one)]) / alpha.u
-        runs.append(line)
-    tests = {}
-    if len(forms) > len(cases):
-        tests["runs_share_alpha"] = _test(by_case.chi2 - by_run.chi2, len(forms) - len(cases))
-    if found is not None and outcome is not None and found.parameters and not found.held:
-        degrees = len(set(map(case, found.forms))) - len(found.parameters)
-        if degrees > 0:
-            # Without the nuisances, so that both suppose the same but for α.
-            open_ = fit(found.forms, one_alpha(found.forms, case))
-            plain = fit(found.forms, of.model(protocol, found.parameters))
-            tests["model"] = _test(plain.chi2 - open_.chi2, degrees)
-    return {"alpha": {"inclines": cases, "runs": runs}, "tests": tests}
-
-
-def _test(chi2: float, degrees: int) -> dict[str, Any]:
-    chi2 = max(0.0, chi2)
-    return {"chi2": chi2, "degrees": degrees, "p": chi2_tail(chi2, degrees)}
-
-
-def _model_alphas(
-    protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
-) -> list[float]:
-    """α of the model with the fitted coefficients, of each form."""
-    model = of.model(protocol, found.parameters)
-    values = outcome.values[: len(found.parameters)]
-    return [float(model.targets(one, values)[0][: one.alphas.size].mean()) for one in found.forms]
+def _coefficient(
+    name: str, found: CoefficientProblem, outcome: HypothesisFit, told: Posterior
+) -> Coefficient:
+    return Coefficient(
+        name,
+        name not in found.held,
+        Measured(*outcome[name]),
+        *told.moments(name),
+        *told.interval(name),
+        found.stated[name],
+    )

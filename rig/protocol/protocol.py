@@ -276,10 +276,6 @@ class Protocol:
         """Return what a run has in common with those that it is averaged with."""
         return Condition(run.incline_deg, run.impact if self.unlike_chains else None)
 
-    def case(self, run: Run) -> dict[str, float | str]:
-        """Name the condition of a run as JSON does."""
-        return self.condition(run).json()
-
 
 class Condition(NamedTuple):
     """What runs have in common whose results are averaged.

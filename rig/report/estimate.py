@@ -3,28 +3,55 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
-from rig.measurands import MEASURANDS, SEPARATION
+from rig.estimate.rods import resolution
+from rig.measurands import MEASURANDS
 from rig.report.columns import Column, aligned
-from rig.report.numbers import decimals_for, fixed, plus_minus, value_of
+from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.parts import Part
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator
 
+    from rig.estimate.agreement import Comparison, Difference
+    from rig.estimate.alphas import ConditionAlpha
+    from rig.estimate.likelihood_ratio import LikelihoodRatio
+    from rig.estimate.rods import Gain, Impulses
+    from rig.estimate.session import Coefficient, Coefficients, ContactPoint, SessionEstimate
+    from rig.protocol.protocol import Condition
     from rig.sections import Sections
 
-    Record = Mapping[str, Any]
-    _Make = Callable[[str, Record], Part | None]
+    _Make = Callable[[str, SessionEstimate], Part | None]
 
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
 
 
-def estimate_text(found: Mapping[str, Any], sections: Sections) -> str:
+class _Alpha(NamedTuple):
+    """The best single α under a condition, and where its rods touch."""
+
+    of: ConditionAlpha
+    contact: ContactPoint | None
+
+
+class _Compared(NamedTuple):
+    """What one measurand differs by from the model under one condition."""
+
+    quantity: str
+    of: Difference
+
+
+class _Rods(NamedTuple):
+    """What one rod, or some that are known by their sum, gave under a condition."""
+
+    condition: Condition
+    of: Gain
+
+
+def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool) -> str:
     """Write everything for a terminal; what cannot be written is noted in `sections`."""
-    lines = ["SIMULATED DATA"] if found.get("simulated") else []
-    lines.append(f"{found['drops']} good drops, {found['edges']} edges")
+    lines = ["SIMULATED DATA"] if simulated else []
+    lines.append(f"{found.drops} good drops, {found.edges} edges")
     for heading, make in _PARTS.items():
         lines += (
             sections.make(f'The section "{heading}"', partial(_lines, heading, make, found)) or ()
@@ -32,7 +59,7 @@ def estimate_text(found: Mapping[str, Any], sections: Sections) -> str:
     return "\n".join(lines)
 
 
-def _lines(heading: str, make: _Make, found: Record) -> list[str]:
+def _lines(heading: str, make: _Make, found: SessionEstimate) -> list[str]:
     part = make(heading, found)
     if part is None:
         return []
@@ -40,7 +67,7 @@ def _lines(heading: str, make: _Make, found: Record) -> list[str]:
     return ["", part.heading, *table, *part.sentences]
 
 
-def page_parts(found: Mapping[str, Any], sections: Sections) -> Iterator[Part]:
+def page_parts(found: SessionEstimate, sections: Sections) -> Iterator[Part]:
     """Yield the same for a page, with a record for each rod too, or rods known by their sum."""
     for heading, make in (_PARTS | _PAGE_PARTS).items():
         part = sections.make(f'The section "{heading}"', partial(make, heading, found))
@@ -48,85 +75,89 @@ def page_parts(found: Mapping[str, Any], sections: Sections) -> Iterator[Part]:
             yield part
 
 
-def _coefficients(heading: str, found: Record) -> Part | None:
-    if found.get("parameters"):
-        return Part(heading, _coefficient_words(found), _COEFFICIENTS, found["parameters"])
-    words = [f"{left}." for left in found.get("left_out") or ()]
+def _coefficients(heading: str, found: SessionEstimate) -> Part | None:
+    words = [f"{left}." for left in found.left_out or ()]
+    told = found.coefficients
+    if told is not None and told.parameters:
+        words += _coefficient_words(told, free_chain=found.free_chain)
+        return Part(heading, words, _COEFFICIENTS, told.parameters)
     return Part(heading, words) if words else None
 
 
-def _single_alphas(heading: str, found: Record) -> Part | None:
-    if not found.get("alpha"):
+def _single_alphas(heading: str, found: SessionEstimate) -> Part | None:
+    if found.alphas is None:
         return None
-    return Part(heading, list(_tests(found)), _ALPHAS, _with_contact(found))
+    tests = [
+        f"{what}: {_chi2(test)}."
+        for what, test in (
+            ("Runs of one incline share one α", found.alphas.runs_share_alpha),
+            ("Eqs. 8 to 13 with these coefficients give each α", found.alphas.by_model),
+        )
+        if test is not None
+    ]
+    contact = (
+        {one.incline_deg: one for one in found.coefficients.contact} if (found.coefficients) else {}
+    )
+    lines = [_Alpha(one, contact.get(one.condition.incline_deg)) for one in found.alphas.inclines]
+    return Part(heading, tests, _ALPHAS, lines)
 
 
-def _end_correction(heading: str, found: Record) -> Part | None:
-    said = found.get("end_correction")
-    return Part(heading, [said["sentence"]]) if said else None
+def _end_correction(heading: str, found: SessionEstimate) -> Part | None:
+    said = found.end_correction
+    return None if said is None else Part(heading, [said.sentence])
 
 
-def _impulses(heading: str, found: Record) -> Part | None:
-    said = found.get("impulses")
-    return Part(heading, [said["sentence"]], _IMPULSES, said["inclines"]) if said else None
+def _impulses(heading: str, found: SessionEstimate) -> Part | None:
+    said = found.impulses
+    return None if said is None else Part(heading, [resolution(said)], _IMPULSES, said)
 
 
-def _comparison(heading: str, found: Record) -> Part | None:
-    if not found.get("comparison"):
+def _comparison(heading: str, found: SessionEstimate) -> Part | None:
+    if not found.comparison:
         return None
     words = "Uncertainties of the rig and of the model's parameters are common to the inclines."
-    return Part(heading, [words], _COMPARISON, found["comparison"])
+    return Part(heading, [words], _COMPARISON, found.comparison)
 
 
-def _failed(heading: str, found: Record) -> Part | None:
-    words = [f"{one}." for one in found.get("failed") or ()]
+def _failed(heading: str, found: SessionEstimate) -> Part | None:
+    words = [f"{one}." for one in found.failed]
     return Part(heading, words) if words else None
 
 
-def _incline_by_incline(heading: str, found: Record) -> Part | None:
-    inclines = [
-        {"quantity": one["quantity"], **line}
-        for one in found.get("comparison") or ()
-        for line in one["inclines"]
+def _incline_by_incline(heading: str, found: SessionEstimate) -> Part | None:
+    lines = [
+        _Compared(one.quantity, line) for one in found.comparison or () for line in one.differences
     ]
-    return Part(heading, (), _INCLINES, inclines) if inclines else None
+    return Part(heading, (), _INCLINES, lines) if lines else None
 
 
-def _single_impulses(heading: str, found: Record) -> Part | None:
-    rods = [
-        {**line, **group}
-        for line in (found.get("impulses") or {}).get("inclines", ())
-        for group in line["groups"]
-    ]
+def _single_impulses(heading: str, found: SessionEstimate) -> Part | None:
+    lines = [_Rods(one.condition, gain) for one in found.impulses or () for gain in one.gains]
     folded = "Speed gained from each rod, from the bottom"
-    return Part(heading, (), _RODS, rods, folded) if rods else None
+    return Part(heading, (), _RODS, lines, folded) if lines else None
 
 
-def _coefficient_words(found: Record) -> list[str]:
-    words = [f"{left}." for left in found["left_out"]]
-    names = found.get("correlation", {}).get("names", ())
-    matrix = found.get("correlation", {}).get("matrix", ())
+def _coefficient_words(told: Coefficients, *, free_chain: bool) -> Iterator[str]:
+    names = [symbol(one.name) for one in told.parameters]
     pairs = [
-        f"{symbol(one)} and {symbol(other)} {fixed(matrix[i][j], 2)}"
+        f"{one} and {other} {fixed(told.correlation[i, j], 2)}"
         for i, one in enumerate(names)
         for j, other in enumerate(names[:i])
     ]
     if pairs:
-        words.append(f"Correlation: {', '.join(pairs)}.")
-    words.append(
+        yield f"Correlation: {', '.join(pairs)}."
+    yield (
         "Least squares takes nothing from the protocol but what is marked as held; the posterior "
         "has the protocol's ± as prior."
     )
-    if found.get("drag_per_m"):
-        drag = found["drag_per_m"]
-        seen = abs(drag["value"]) > drag["U95"]
-        words.append(
-            f"Air: κ = ({plus_minus(drag, 1e6)})·10⁻⁶ /m in g − κv², "
+    if told.drag is not None:
+        seen = abs(told.drag.value) > told.drag.expanded
+        yield (
+            f"Air: κ = ({plus_minus(told.drag, 1e6)})·10⁻⁶ /m in g − κv², "
             + ("which slows the chains." if seen else "none to be seen.")
         )
-    elif "drag_per_m" in found and has_free_chain(found):
-        words.append("Air drag is not fitted: it takes a free chain, and rods that are all alike.")
-    return words
+    elif free_chain:
+        yield "Air drag is not fitted: it takes a free chain, and rods that are all alike."
 
 
 def symbol(name: str) -> str:
@@ -135,109 +166,95 @@ def symbol(name: str) -> str:
     return SYMBOLS[what] + (f" of {chain}" if chain else "")
 
 
-def has_free_chain(found: Mapping[str, Any]) -> bool:
-    """Whether a chain falls beside the one that strikes."""
-    return any(SEPARATION.name in curve for curve in found.get("curves") or ())
+def _chi2(test: LikelihoodRatio) -> str:
+    p = test.p
+    assert p is not None
+    verdict = "they do" if p > 0.05 else "doubtful" if p > 0.001 else "they do not"
+    return f"{verdict} (χ² {test.chi2:.1f} of {test.degrees}, p {p:.2g})"
 
 
-def _tests(found: Record) -> Iterator[str]:
-    tests = found.get("tests") or {}
-    if "runs_share_alpha" in tests:
-        yield f"Runs of one incline share one α: {_chi2(tests['runs_share_alpha'])}."
-    if "model" in tests:
-        yield f"Eqs. 8 to 13 with these coefficients give each α: {_chi2(tests['model'])}."
-
-
-def _chi2(test: Record) -> str:
-    verdict = "they do" if test["p"] > 0.05 else "doubtful" if test["p"] > 0.001 else "they do not"
-    return f"{verdict} (χ² {test['chi2']:.1f} of {test['degrees']}, p {test['p']:.2g})"
-
-
-def _with_contact(found: Record) -> list[dict[str, Any]]:
-    contact = {one["incline_deg"]: one for one in found.get("contact") or ()}
-    return [{**line, **contact.get(line["incline_deg"], {})} for line in found["alpha"]["inclines"]]
-
-
-def _contact(line: Record) -> str:
-    if "height_m" not in line:
+def _contact(line: _Alpha) -> str:
+    if line.contact is None:
         return ""
-    return plus_minus(line["height_m"], 1e3) if line["identified"] else "not identified"
+    return plus_minus(line.contact.height, 1e3) if line.contact.identified else "not identified"
 
 
-def _posterior(line: Record) -> str:
-    one = line["posterior"]
-    digits = decimals_for(2.0 * one["u"])
-    return f"{fixed(one['low'], digits)} … {fixed(one['high'], digits)}"
+def _posterior(one: Coefficient) -> str:
+    digits = decimals_for(2.0 * one.sd)
+    return f"{fixed(one.low, digits)} … {fixed(one.high, digits)}"
 
 
-def _stated(line: Record) -> str:
-    one = line["stated"]
-    return f"{one['value']:g}" + (f" (u {one['u']:g})" if one["u"] else "")
+def _stated(one: Coefficient) -> str:
+    return f"{one.stated.value:g}" + (f" (u {one.stated.u:g})" if one.stated.u else "")
 
 
-def _worst(line: Record) -> str:
-    return fixed(max(abs(group["normalized_error"]) for group in line["groups"]), 2)
+def _worst(errors: Iterable[float | None]) -> str:
+    return fixed(max((abs(one) for one in errors if one is not None), default=None), 2)
 
 
-def _p(line: Record) -> str:
-    return "" if line["p"] is None else f"{line['p']:.2g}"
+def _p(p: float | None) -> str:
+    return "" if p is None else f"{p:.2g}"
 
 
-_STRIKES: Column[Record] = Column(
-    "strikes", lambda line: str(line.get("impact_chain", "")), numeric=False
-)
-"""Which chain, where chains are unlike."""
-_COEFFICIENTS: tuple[Column[Record], ...] = (
-    Column("coefficient", lambda line: symbol(line["name"]), numeric=False),
-    Column("least squares ± U", lambda line: plus_minus(line["least_squares"])),
+def _incline(condition: Condition) -> str:
+    return f"{condition.incline_deg:g}"
+
+
+def _strikes(condition: Condition) -> str:
+    """Which chain, where chains are unlike."""
+    return condition.impact_chain or ""
+
+
+_COEFFICIENTS: tuple[Column[Coefficient], ...] = (
+    Column("coefficient", lambda one: symbol(one.name), numeric=False),
+    Column("least squares ± U", lambda one: plus_minus(one.least_squares)),
     Column("posterior, 95 %", _posterior),
     Column("protocol", _stated),
-    Column("from", lambda line: "edges" if line["identified"] else "held", numeric=False),
+    Column("from", lambda one: "edges" if one.identified else "held", numeric=False),
 )
-_ALPHAS: tuple[Column[Record], ...] = (
-    Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
-    _STRIKES,
-    Column("n", lambda line: str(line["n"])),
-    Column("α ± U", lambda line: plus_minus(line["alpha"])),
-    Column("α by coefficients", lambda line: fixed(value_of(line.get("model")), 5)),
+_ALPHAS: tuple[Column[_Alpha], ...] = (
+    Column("incline (°)", lambda line: _incline(line.of.condition)),
+    Column("strikes", lambda line: _strikes(line.of.condition), numeric=False),
+    Column("n", lambda line: str(line.of.n)),
+    Column("α ± U", lambda line: plus_minus(line.of.alpha)),
+    Column("α by coefficients", lambda line: fixed(line.of.model, 5)),
     Column("contact point ± U (mm)", _contact),
 )
-_IMPULSES: tuple[Column[Record], ...] = (
-    Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
-    _STRIKES,
-    Column("rods", lambda line: str(line["rods"])),
-    Column("resolved", lambda line: str(line["resolved"])),
-    Column("χ² of Eq. 9", lambda line: fixed(line["chi2"], 1)),
-    Column("p", _p),
-    Column("largest |Eₙ|", _worst),
+_IMPULSES: tuple[Column[Impulses], ...] = (
+    Column("incline (°)", lambda one: _incline(one.condition)),
+    Column("strikes", lambda one: _strikes(one.condition), numeric=False),
+    Column("rods", lambda one: str(one.rods)),
+    Column("resolved", lambda one: str(one.resolved)),
+    Column("χ² of Eq. 9", lambda one: fixed(one.eq9.chi2, 1)),
+    Column("p", lambda one: _p(one.eq9.p)),
+    Column("largest |Eₙ|", lambda one: _worst(gain.normalized_error for gain in one.gains)),
 )
-_INCLINES: tuple[Column[Record], ...] = (
-    Column("quantity", lambda line: MEASURANDS[line["quantity"]].symbol, numeric=False),
-    Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
-    _STRIKES,
-    Column("n", lambda line: str(line["n"])),
-    Column("measured less model (mm, mm/s)", lambda line: fixed(1e3 * line["difference"], 2)),
-    Column("u", lambda line: fixed(1e3 * line["u"], 2)),
-    Column("Eₙ", lambda line: fixed(line["normalized_error"], 2)),
-    Column("χ²", lambda line: fixed(line["chi2"], 2)),
-    Column("p", _p),
+_INCLINES: tuple[Column[_Compared], ...] = (
+    Column("quantity", lambda line: MEASURANDS[line.quantity].symbol, numeric=False),
+    Column("incline (°)", lambda line: _incline(line.of.condition)),
+    Column("strikes", lambda line: _strikes(line.of.condition), numeric=False),
+    Column("n", lambda line: str(line.of.n)),
+    Column("measured less model (mm, mm/s)", lambda line: fixed(1e3 * line.of.value, 2)),
+    Column("u", lambda line: fixed(1e3 * line.of.u, 2)),
+    Column("Eₙ", lambda line: fixed(line.of.normalized_error, 2)),
+    Column("χ²", lambda line: fixed(line.of.chi2, 2)),
+    Column("p", lambda line: _p(line.of.p)),
 )
-_RODS: tuple[Column[Record], ...] = (
-    Column("incline (°)", lambda line: f"{line['incline_deg']:g}"),
-    _STRIKES,
-    Column("rod", lambda line: "–".join(map(str, dict.fromkeys(line["rods"])))),
-    Column("ΔV ± U (m/s)", lambda line: plus_minus(line["gain_m_s"])),
-    Column("Eq. 9 (m/s)", lambda line: fixed(line["eq9_m_s"], 5)),
-    Column("Eₙ", lambda line: fixed(line["normalized_error"], 2)),
+_RODS: tuple[Column[_Rods], ...] = (
+    Column("incline (°)", lambda line: _incline(line.condition)),
+    Column("strikes", lambda line: _strikes(line.condition), numeric=False),
+    Column("rod", lambda line: "–".join(map(str, dict.fromkeys((line.of.first, line.of.last))))),
+    Column("ΔV ± U (m/s)", lambda line: plus_minus(line.of.measured)),
+    Column("Eq. 9 (m/s)", lambda line: fixed(line.of.eq9_m_s, 5)),
+    Column("Eₙ", lambda line: fixed(line.of.normalized_error, 2)),
 )
-_COMPARISON: tuple[Column[Record], ...] = (
-    Column("quantity", lambda line: MEASURANDS[line["quantity"]].symbol, numeric=False),
-    Column("χ²", lambda line: fixed(line["chi2"], 1)),
-    Column("inclines", lambda line: str(line["degrees"])),
-    Column("p", _p),
-    Column("largest |Eₙ|", lambda line: fixed(
-        max(abs(one["normalized_error"]) for one in line["inclines"]), 2)),
-)  # fmt: skip
+_COMPARISON: tuple[Column[Comparison], ...] = (
+    Column("quantity", lambda one: MEASURANDS[one.quantity].symbol, numeric=False),
+    Column("χ²", lambda one: fixed(one.chi2, 1)),
+    Column("inclines", lambda one: str(one.degrees)),
+    Column("p", lambda one: _p(one.p)),
+    Column("largest |Eₙ|", lambda one: _worst(line.normalized_error for line in one.differences)),
+)
 
 # In order; each is made by itself, and none where there is nothing to say.
 _PARTS: dict[str, _Make] = {

@@ -4,74 +4,86 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from rig.measurands import SEPARATION
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
 from rig.report.embed import PageFigure
-from rig.report.estimate import has_free_chain
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
+    from rig.estimate.alphas import SingleAlphas
+    from rig.estimate.curves import Curve, DropCurves
+    from rig.estimate.rods import Impulses
+    from rig.estimate.session import Coefficients, SessionEstimate
     from rig.sections import Sections
+
+    Array = NDArray[np.float64]
+
+T = TypeVar("T")
 
 _SHOWN = 3
 _STYLES = (("o", MODEL), ("s", SECOND), ("^", INK))
 
 
-def estimate_pictures(found: Mapping[str, Any], sections: Sections) -> dict[str, PageFigure]:
+def estimate_pictures(
+    found: SessionEstimate, sections: Sections, *, simulated: bool
+) -> dict[str, PageFigure]:
     """Draw everything there is, by file name without its ending.
 
     Parameters
     ----------
     found
-        What ``rig estimate --json`` prints.
+        From ``rig estimate``.
     sections
         Where a picture that cannot be drawn is noted.
+    simulated
+        Whether to stamp them so.
     """
-    wanted: dict[str, tuple[str, Callable[[Mapping[str, Any]], PageFigure | None]]] = {}
-    if found.get("alpha"):
-        wanted["alpha"] = "The picture of α", _alpha
-    if found.get("impulses"):
-        wanted["impulses"] = "The picture of the impulses", _impulses
-    if found.get("curves"):
-        wanted["curves"] = "The picture of Δz(t) and V²(z)", _curves
-        if not has_free_chain(found):
-            wanted["curves"] = "The picture of V²(z)", _curves
-    if {"restitution", "friction"} <= set((found.get("posterior") or {}).get("names", ())):
-        wanted["posterior"] = "The picture of the posterior", _posterior
-    drawn = {
-        name: sections.make(what, partial(draw, found)) for name, (what, draw) in wanted.items()
-    }
+    wanted: dict[str, tuple[str, Callable[[], PageFigure | None]]] = {}
+    if found.alphas is not None:
+        wanted["alpha"] = "The picture of α", partial(_alpha, found.alphas, simulated)
+    if found.impulses:
+        wanted["impulses"] = (
+            "The picture of the impulses",
+            partial(_impulses, found.impulses, simulated),
+        )
+    if found.curves:
+        what = "The picture of Δz(t) and V²(z)" if found.free_chain else "The picture of V²(z)"
+        wanted["curves"] = what, partial(_curves, found.curves, simulated)
+    told = found.coefficients
+    if told is not None and {"restitution", "friction"} <= {one.name for one in told.parameters}:
+        wanted["posterior"] = "The picture of the posterior", partial(_posterior, told, simulated)
+    drawn = {name: sections.make(what, draw) for name, (what, draw) in wanted.items()}
     return {name: picture for name, picture in drawn.items() if picture is not None}
 
 
-def _alpha(found: Mapping[str, Any]) -> PageFigure:
+def _alpha(found: SingleAlphas, simulated: bool) -> PageFigure:
     """α against incline, and below it every run's residual."""
-    inclines, runs = found["alpha"]["inclines"], found["alpha"]["runs"]
-    left = [run for run in runs if "residual" in run]
-    with canvas((2.6, 1.6) if left else (2.6,), simulated=found["simulated"]) as drawing:
+    left = [(run.run.incline_deg, run.residual) for run in found.runs if run.residual is not None]
+    with canvas((2.6, 1.6) if left else (2.6,), simulated=simulated) as drawing:
         top = drawing.axes[0]
         top.plot(
-            [run["incline_deg"] for run in runs],
-            [run["alpha"]["value"] for run in runs],
+            [one.run.incline_deg for one in found.runs],
+            [one.alpha.value for one in found.runs],
             "o", color=MUTED, markersize=3, alpha=0.5, markeredgewidth=0, label="single runs",
         )  # fmt: skip
-        fitted = [line for line in inclines if "model" in line]
+        fitted = [one for one in found.inclines if one.model is not None]
         top.plot(
-            [line["incline_deg"] for line in fitted],
-            [line["model"] for line in fitted],
+            [one.condition.incline_deg for one in fitted],
+            np.array([one.model for one in fitted], float),
             "_", color=MODEL, markersize=16, label="fitted coefficients",
         )  # fmt: skip
         top.errorbar(
-            [line["incline_deg"] for line in inclines],
-            [line["alpha"]["value"] for line in inclines],
-            yerr=[line["alpha"]["U95"] for line in inclines],
+            [one.condition.incline_deg for one in found.inclines],
+            [one.alpha.value for one in found.inclines],
+            yerr=[one.alpha.expanded for one in found.inclines],
             fmt="o", color=INK, markersize=4, label="incline ± U (95 %)",
         )  # fmt: skip
         top.set_ylabel("α")
@@ -79,11 +91,7 @@ def _alpha(found: Mapping[str, Any]) -> PageFigure:
         if left:
             low = drawing.axes[1]
             low.axhspan(-2, 2, color=MODEL_BAND, alpha=0.6, linewidth=0)
-            low.plot(
-                [run["incline_deg"] for run in left],
-                [run["residual"] for run in left],
-                "o", color=MODEL, markersize=3, markeredgewidth=0,
-            )  # fmt: skip
+            low.plot(*zip(*left, strict=True), "o", color=MODEL, markersize=3, markeredgewidth=0)
             low.set_ylabel("residual / u")
         drawing.axes[-1].set_xlabel("inclination of the surface (°)")
     return PageFigure(
@@ -94,38 +102,36 @@ def _alpha(found: Mapping[str, Any]) -> PageFigure:
     )
 
 
-def _impulses(found: Mapping[str, Any]) -> PageFigure:
+def _impulses(found: Sequence[Impulses], simulated: bool) -> PageFigure:
     """ΔV of every rod beside Eq. 9, and the normalized errors of all inclines."""
-    lines = found["impulses"]["inclines"]
-    shown = _spread(lines)
-    with canvas((2.6, 1.6), simulated=found["simulated"]) as drawing:
+    shown = _spread(found)
+    with canvas((2.6, 1.6), simulated=simulated) as drawing:
         top, low = drawing.axes
-        for line, (marker, color) in zip(shown, _STYLES, strict=False):
-            groups = line["groups"]
-            rods = [sum(group["rods"]) / 2 for group in groups]
-            top.plot(rods, [group["eq9_m_s"] for group in groups], "-", color=color, linewidth=1)
+        for one, (marker, color) in zip(shown, _STYLES, strict=False):
+            rods = [(gain.first + gain.last) / 2 for gain in one.gains]
+            top.plot(rods, [gain.eq9_m_s for gain in one.gains], "-", color=color, linewidth=1)
             top.errorbar(
                 rods,
-                [group["gain_m_s"]["value"] for group in groups],
-                yerr=[group["gain_m_s"]["U95"] for group in groups],
+                [gain.measured.value for gain in one.gains],
+                yerr=[gain.measured.expanded for gain in one.gains],
                 fmt=marker, color=color, markerfacecolor=PAPER, markersize=4,
-                label=f"{line['incline_deg']:g}° ± U (95 %)",
+                label=f"{one.condition.incline_deg:g}° ± U (95 %)",
             )  # fmt: skip
         gains = [
-            gain
-            for line in shown
-            for group in line["groups"]
-            for gain in (group["eq9_m_s"], group["gain_m_s"]["value"])
+            value
+            for one in shown
+            for gain in one.gains
+            for value in (gain.eq9_m_s, gain.measured.value)
         ]
         if max(gains, default=0.0) > 0.0:  # α may be nothing, and noise less
             top.set_yscale("log")
         top.set_ylabel("speed gained ΔV (m/s)")
         top.legend(title="lines: Eq. 9")
         low.axhspan(-1, 1, color=MODEL_BAND, alpha=0.6, linewidth=0)
-        for line in lines:
+        for one in found:
             low.plot(
-                [sum(group["rods"]) / 2 for group in line["groups"]],
-                [group["normalized_error"] for group in line["groups"]],
+                [(gain.first + gain.last) / 2 for gain in one.gains],
+                np.array([gain.normalized_error for gain in one.gains], float),
                 "o", color=MODEL, markersize=3, alpha=0.6, markeredgewidth=0,
             )  # fmt: skip
         low.set_ylabel("Eₙ, all inclines")
@@ -138,20 +144,18 @@ def _impulses(found: Mapping[str, Any]) -> PageFigure:
     )
 
 
-def _curves(found: Mapping[str, Any]) -> PageFigure:
+def _curves(found: Sequence[DropCurves], simulated: bool) -> PageFigure:
     """Δz(t) and V²(z) with bands (Fig. 4)."""
-    curves = _spread(found["curves"])
+    shown = _spread(found)
     row = SEPARATION
-    free = all(SEPARATION.name in curve for curve in curves)
-    with canvas((2.6,), 7.0 if free else 4.5, simulated=found["simulated"],
+    free = all(one.separation is not None for one in shown)
+    with canvas((2.6,), 7.0 if free else 4.5, simulated=simulated,
                 columns=2 if free else 1, sharex=False) as drawing:  # fmt: skip
-        for curve, (_, color) in zip(curves, _STYLES, strict=False):
-            label = f"{curve['incline_deg']:g}°, run {curve['run']}"
-            if free:
-                axes = drawing.axes[0]
-                _banded(axes, curve["time_s"], curve, row.name, row.scale, color, label)
-            axes = drawing.axes[-1]
-            _banded(axes, curve["height_m"], curve, "speed2_m2_s2", 1.0, color, label)
+        for one, (_, color) in zip(shown, _STYLES, strict=False):
+            label = f"{one.run.incline_deg:g}°, run {one.run.number}"
+            if free and one.separation is not None:
+                _banded(drawing.axes[0], one.time_s, one.separation, row.scale, color, label)
+            _banded(drawing.axes[-1], one.height_m, one.squared_speed, 1.0, color, label)
         if free:
             drawing.axes[0].set_xlabel("time since release (s)")
             drawing.axes[0].set_ylabel("separation Δz (cm)")
@@ -169,28 +173,19 @@ def _curves(found: Mapping[str, Any]) -> PageFigure:
     )
 
 
-def _banded(
-    axes: Axes,
-    at: Sequence[float],
-    curve: Mapping[str, Any],
-    key: str,
-    scale: float,
-    color: str,
-    label: str,
-) -> None:
-    values = scale * np.array(curve[key])
-    band = scale * np.array(curve[f"{key}_U95"])
+def _banded(axes: Axes, at: Array, curve: Curve, scale: float, color: str, label: str) -> None:
+    values, band = scale * curve.measured, scale * curve.u95
     axes.fill_between(at, values - band, values + band, color=color, alpha=0.3, linewidth=0)
     axes.plot(at, values, color=color, linewidth=1.1, label=label)
-    axes.plot(at, scale * np.array(curve[f"{key}_model"]), "--", color=color, linewidth=0.8)
+    axes.plot(at, scale * curve.model, "--", color=color, linewidth=0.8)
 
 
-def _posterior(found: Mapping[str, Any]) -> PageFigure | None:
+def _posterior(told: Coefficients, simulated: bool) -> PageFigure | None:
     """Contours of β and μ; none where the posterior has no spread to draw."""
-    mixture = found["posterior"]
-    beta, mu = (mixture["names"].index(name) for name in ("restitution", "friction"))
-    weights = np.array(mixture["weights"])
-    means, sds = np.array(mixture["means"]), np.array(mixture["sds"])
+    mixture = told.posterior
+    assert mixture is not None
+    beta, mu = (mixture.names.index(name) for name in ("restitution", "friction"))
+    weights, means, sds = mixture.weights, mixture.means, mixture.sds
     middle = float(weights @ means[:, beta])
     spread = float(np.sqrt(weights @ (sds[:, beta] ** 2 + (means[:, beta] - middle) ** 2)))
     # Smooth from node to node: more of them for the eye.
@@ -215,13 +210,13 @@ def _posterior(found: Mapping[str, Any]) -> PageFigure | None:
     levels.append(float(density.max()) * 1.001)
     if not all(low < high for low, high in pairwise(levels)):
         return None  # narrower than the grid
-    with canvas((3.2,), 4.2, simulated=found["simulated"]) as drawing:
+    with canvas((3.2,), 4.2, simulated=simulated) as drawing:
         (axes,) = drawing.axes
         axes.contourf(
             grid, nodes, density.T, levels=levels,
             colors=[MODEL_BAND, MODEL],
         )  # fmt: skip
-        line = {one["name"]: one["least_squares"]["value"] for one in found["parameters"]}
+        line = {one.name: one.least_squares.value for one in told.parameters}
         axes.plot(line["restitution"], line["friction"], "+", color=INK, label="least squares")
         axes.set_xlabel("restitution β")
         axes.set_ylabel("friction μ")
@@ -233,7 +228,7 @@ def _posterior(found: Mapping[str, Any]) -> PageFigure | None:
     )
 
 
-def _spread(lines: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def _spread(lines: Sequence[T]) -> list[T]:
     """Pick at most three, the outermost and one between."""
     if len(lines) <= _SHOWN:
         return list(lines)

@@ -57,19 +57,19 @@ def test_agreement_with_the_model_counts_what_is_common_once():
     """Against a model that is wrong by its own β, many inclines are no more than one."""
     found = analysis((30.0, 50.0, 70.0))
     good = [one for one in found.runs if one.verdict in GOOD]
-    whole = {one["quantity"]: one for one in agreement(UNIFORM, good)}
+    whole = {one.quantity: one for one in agreement(UNIFORM, good)}
     assert set(whole) == {"separation_m", "speed_m_s"}
     for one in whole.values():
-        assert one["degrees"] == 3
-        independent = sum(line["chi2"] for line in one["inclines"])
-        assert one["chi2"] != pytest.approx(independent, rel=0.01)
-        assert one["p"] == pytest.approx(chi2.sf(one["chi2"], 3), rel=1e-9)
+        assert one.degrees == 3
+        independent = sum(line.chi2 for line in one.differences)
+        assert one.chi2 != pytest.approx(independent, rel=0.01)
+        assert one.p == pytest.approx(chi2.sf(one.chi2, 3), rel=1e-9)
     single = [one for one in good if one.run.incline_deg == 50.0]
-    (line,) = agreement(UNIFORM, single)[0]["inclines"]
-    assert agreement(UNIFORM, single)[0]["chi2"] == pytest.approx(line["chi2"])
-    assert line["chi2"] == pytest.approx((line["difference"] / line["u"]) ** 2)
+    alone = agreement(UNIFORM, single)[0]
+    (line,) = alone.differences
+    assert alone.chi2 == pytest.approx((line.value / line.u) ** 2)
     by_summary = next(one for one in found.summary if one.incline_deg == 50.0)
     mine = by_summary.normalized_error("separation_m")
     assert mine is not None
-    assert math.copysign(1.0, mine) == math.copysign(1.0, line["normalized_error"])
-    assert line["normalized_error"] == pytest.approx(mine, rel=0.05)
+    assert math.copysign(1.0, mine) == math.copysign(1.0, line.normalized_error)
+    assert line.normalized_error == pytest.approx(mine, rel=0.05)

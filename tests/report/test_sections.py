@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import copy
-import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rig.analysis.result import Measured
 from rig.errors import InputError
+from rig.estimate.posterior import Posterior
+from rig.estimate.session import Coefficient
 from rig.report.estimate import estimate_text, page_parts
 from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, report_html
 from rig.report.pictures import pictures
 from rig.sections import Sections
+from rig.units import Quantity
 from tests.cli.lab import PROTOCOLS
 from tests.report import fake_analysis
 
@@ -41,64 +43,73 @@ def found(single):
     from rig.session.store import Session
 
     with Session.open(single, readonly=True) as session:
-        said = estimate(protocol_of(session), detailed(session)[0])
-    return {"simulated": True} | json.loads(json.dumps(said))
+        return estimate(protocol_of(session), detailed(session)[0])
 
 
 def test_a_single_chain_s_estimate_speaks_of_no_other(found):
     sections = Sections()
-    text = estimate_text(found, sections)
+    text = estimate_text(found, sections, simulated=True)
     assert "Best single α" in text
     for word in ("free chain", "Δz"):
         assert word not in text
-    drawn = estimate_pictures(found, sections)
+    drawn = estimate_pictures(found, sections, simulated=True)
     assert "Δz" not in drawn["curves"].alt + drawn["curves"].caption
     assert not sections.failed
 
 
+def changed(found, **gain):
+    """Have other speeds gained from the rods of each incline."""
+    return replace(
+        found,
+        impulses=tuple(
+            replace(one, gains=tuple(replace(each, **gain) for each in one.gains))
+            for one in found.impulses
+        ),
+    )
+
+
 def test_a_part_that_fails_takes_no_other_along(found):
-    broken = copy.deepcopy(found)
-    del broken["impulses"]["inclines"][0]["groups"]
+    broken = changed(found, eq9_m_s="much")
     sections = Sections()
     headings = [part.heading for part in page_parts(broken, sections)]
     assert "Best single α" in headings
     assert "The protocol's model" in headings
-    assert sections.failed['The section "Single impulses"'] == (
-        "The section \"Single impulses\" could not be made: KeyError: 'groups'"
+    drawn = estimate_pictures(broken, sections, simulated=True)
+    whole = estimate_pictures(found, Sections(), simulated=True)
+    assert set(drawn) == set(whole) - {"impulses"}
+    assert sections.failed["The picture of the impulses"].startswith(
+        "The picture of the impulses could not be made: TypeError: "
     )
-    drawn = estimate_pictures(broken, sections)
-    assert set(drawn) == set(estimate_pictures(found, Sections())) - {"impulses"}
-    assert "The picture of the impulses" in sections.failed
 
 
 @pytest.mark.filterwarnings("error")
 def test_impulses_may_be_nothing(found):
-    still = copy.deepcopy(found)
-    for line in still["impulses"]["inclines"]:
-        for group in line["groups"]:
-            group["eq9_m_s"] = 0.0
-            group["gain_m_s"] = {"value": -1e-4, "u": 1e-6, "U95": 2e-6}
+    still = changed(found, eq9_m_s=0.0, measured=Measured(-1e-4, 1e-6))
     sections = Sections()
-    assert "impulses" in estimate_pictures(still, sections)
+    assert "impulses" in estimate_pictures(still, sections, simulated=True)
     assert not sections.failed
 
 
 @pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
 def test_a_posterior_without_spread_has_no_picture(found, what):
-    narrow = copy.deepcopy(found)
-    narrow["parameters"] = [
-        {"name": name, "least_squares": {"value": 0.5, "u": 0.1, "U95": 0.2}}
-        for name in ("restitution", "friction")
-    ]
     nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
-    narrow["posterior"] = {
-        "names": ["restitution", "friction"],
-        "weights": [1.0 / len(nodes)] * len(nodes),
-        "means": nodes,
-        "sds": [[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes),
-    }
+    names = ("restitution", "friction")
+    told = Measured(0.5, 0.1)
+    narrow = replace(
+        found.coefficients,
+        parameters=tuple(
+            Coefficient(name, True, told, 0.5, 0.1, 0.3, 0.7, Quantity(0.5)) for name in names
+        ),
+        posterior=Posterior(
+            names,
+            np.full(len(nodes), 1.0 / len(nodes)),
+            np.array(nodes),
+            np.array([[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes)),
+        ),
+    )
     sections = Sections()
-    assert "posterior" not in estimate_pictures(narrow, sections)
+    drawn = estimate_pictures(replace(found, coefficients=narrow), sections, simulated=True)
+    assert "posterior" not in drawn
     assert not sections.failed
 
 

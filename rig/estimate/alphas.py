@@ -1,0 +1,163 @@
+"""The best single α of every run and condition, and whether they agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.result import Measured
+from rig.estimate import coefficients as of
+from rig.estimate.hypotheses import one_alpha
+from rig.estimate.hypothesis_fit import fit
+from rig.estimate.likelihood_ratio import LikelihoodRatio
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.estimate.coefficients import CoefficientProblem
+    from rig.estimate.hypothesis_fit import HypothesisFit
+    from rig.estimate.quadratic_forms import QuadraticForm
+    from rig.protocol.protocol import Condition, Protocol, Run
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionAlpha:
+    """The best single α under a condition.
+
+    Attributes
+    ----------
+    n
+        Drops it rests on.
+    model
+        By Eqs. 8 to 13 with the fitted coefficients; `None` where they say nothing of it.
+    """
+
+    condition: Condition
+    n: int
+    alpha: Measured
+    model: float | None
+
+    def json(self) -> dict[str, Any]:
+        """One of ``inclines``."""
+        said = {**self.condition.json(), "n": self.n, "alpha": self.alpha.json()}
+        return said if self.model is None else said | {"model": self.model}
+
+
+@dataclass(frozen=True, slots=True)
+class RunAlpha:
+    """The best single α of one run; `model` as in `ConditionAlpha`."""
+
+    run: Run
+    alpha: Measured
+    model: float | None
+
+    @property
+    def residual(self) -> float | None:
+        """Less that of the model, in standard uncertainties."""
+        return None if self.model is None else (self.alpha.value - self.model) / self.alpha.u
+
+    def json(self) -> dict[str, Any]:
+        """One of ``runs``."""
+        said = {
+            "run": self.run.number,
+            "incline_deg": self.run.incline_deg,
+            "impact_chain": self.run.impact,
+            "alpha": self.alpha.json(),
+        }
+        return said if self.residual is None else said | {"residual": self.residual}
+
+
+@dataclass(frozen=True, slots=True)
+class SingleAlphas:
+    """The best single α's.
+
+    Attributes
+    ----------
+    inclines, runs
+        Of each condition and of each run.
+    runs_share_alpha
+        One α for the runs of a condition against one for each; `None` with one run a condition.
+    by_model
+        Eqs. 8 to 13 with the fitted coefficients against one α a condition; `None` where that
+        leaves no degree of freedom.
+    """
+
+    inclines: tuple[ConditionAlpha, ...]
+    runs: tuple[RunAlpha, ...]
+    runs_share_alpha: LikelihoodRatio | None
+    by_model: LikelihoodRatio | None
+
+    def json(self) -> dict[str, Any]:
+        """``alpha`` and ``tests``."""
+        tests = {"runs_share_alpha": self.runs_share_alpha, "model": self.by_model}
+        return {
+            "alpha": {
+                "inclines": [one.json() for one in self.inclines],
+                "runs": [one.json() for one in self.runs],
+            },
+            "tests": {name: one.json() for name, one in tests.items() if one is not None},
+        }
+
+
+def single_alphas(
+    protocol: Protocol,
+    found: CoefficientProblem | None,
+    outcome: HypothesisFit | None,
+    forms: Sequence[QuadraticForm],
+    like: Sequence[QuadraticForm],
+) -> SingleAlphas:
+    """Fit one α to each run, and one to each condition.
+
+    Parameters
+    ----------
+    found, outcome
+        The coefficients and their fit, where there is one.
+    forms, like
+        Of each drop, and of like drops merged.
+    """
+
+    def case(one: QuadraticForm) -> Condition:
+        return protocol.condition(one.run)
+
+    by_run = fit(forms, one_alpha(forms, lambda one: one.run.number))
+    by_case = fit(like, one_alpha(like, case))
+    model: dict[Condition, float] = {}
+    by_model = None
+    if found is not None and outcome is not None:
+        model = dict(
+            zip(map(case, found.forms), _by_coefficients(protocol, found, outcome), strict=True)
+        )
+        degrees = len(set(map(case, found.forms))) - len(found.parameters)
+        if found.parameters and not found.held and degrees > 0:
+            # Without the nuisances, so that both suppose the same but for α.
+            open_ = fit(found.forms, one_alpha(found.forms, case))
+            plain = fit(found.forms, of.model(protocol, found.parameters))
+            by_model = LikelihoodRatio(plain.chi2 - open_.chi2, degrees)
+    cases = sorted(set(map(case, like)))
+    fewer = len(forms) - len(cases)
+    return SingleAlphas(
+        tuple(
+            ConditionAlpha(
+                key,
+                sum(case(one) == key for one in forms),
+                Measured(*by_case[f"α {key}"]),
+                model.get(key),
+            )
+            for key in cases
+        ),
+        tuple(
+            RunAlpha(one.run, Measured(*by_run[f"α {one.run.number}"]), model.get(case(one)))
+            for one in forms
+        ),
+        LikelihoodRatio(by_case.chi2 - by_run.chi2, fewer) if fewer > 0 else None,
+        by_model,
+    )
+
+
+def _by_coefficients(
+    protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
+) -> list[float]:
+    """α of each form by the model with the fitted coefficients."""
+    model = of.model(protocol, found.parameters)
+    values = outcome.values[: len(found.parameters)]
+    return [float(model.targets(one, values)[0][: one.alphas.size].mean()) for one in found.forms]
