@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from rig import __version__
 from rig.boards import BOARDS
 from rig.errors import RigError
+from rig.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,7 +79,7 @@ def _open_streams() -> None:
 
 def _say(what: object) -> None:
     with suppress(OSError):  # nobody listens any more
-        print(what, file=sys.stderr, flush=True)
+        print(printable(str(what)), file=sys.stderr, flush=True)
 
 
 def _silence_stdout() -> None:

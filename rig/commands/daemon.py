@@ -15,6 +15,7 @@ from rig.daemon.listener import notify_systemd
 from rig.daemon.server import serve
 from rig.daemon.socket_path import default_socket
 from rig.link.port import check_url
+from rig.printable import printable
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -39,7 +40,7 @@ class StderrHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write a line when it can be written; when too many wait, never."""
         with suppress(queue.Full):
-            self._lines.put_nowait(self.format(record))
+            self._lines.put_nowait(printable(self.format(record)))
 
     def close(self) -> None:
         """Let the last lines go out."""

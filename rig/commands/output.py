@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rig.files import write_atomic
+from rig.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +23,7 @@ VOID = 3
 def say(line: str) -> None:
     """Tell the user something that is no result."""
     with suppress(OSError):  # a campaign does not end because nobody listens any more
-        print(line, file=sys.stderr, flush=True)
+        print(printable(line), file=sys.stderr, flush=True)
 
 
 def progress(what: str) -> Callable[[int, int], None]:

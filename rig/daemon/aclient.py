@@ -7,7 +7,15 @@ import threading
 from typing import TYPE_CHECKING, Any, Self
 
 from rig.daemon import rpc
-from rig.daemon.client_protocol import ClientProtocol, Replica, gone, hello
+from rig.daemon.client_protocol import (
+    HELLO_PATIENCE_S,
+    ClientProtocol,
+    Replica,
+    gone,
+    hello,
+    silent,
+    turned_away,
+)
 from rig.daemon.socket_path import reach
 from rig.errors import DeviceError
 
@@ -16,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from rig.errors import RigError
 
 _CHUNK = 1 << 16
 _HUNG_UP = "it hung up"
@@ -68,6 +77,7 @@ class AsyncClient:
         self.lost = asyncio.Event()
         self._writer = writer
         self._protocol = ClientProtocol()
+        self._turned_away: dict[str, Any] | None = None
         self._open: dict[int, asyncio.Future[Any]] = {}
         self._listening = asyncio.get_running_loop().create_task(self._listen(reader))
 
@@ -93,7 +103,11 @@ class AsyncClient:
         line.setblocking(False)
         client = cls(*await asyncio.open_connection(sock=line))
         try:
-            await client.call("hello", **hello(name, token))
+            async with asyncio.timeout(HELLO_PATIENCE_S):
+                await client.call("hello", **hello(name, token))
+        except TimeoutError:
+            await client.close()
+            raise silent(path) from None
         except BaseException:
             await client.close()
             raise
@@ -142,6 +156,9 @@ class AsyncClient:
             self._end()
 
     def _answered(self, message: dict[str, Any]) -> None:
+        if turned_away(message):
+            self._turned_away = message
+            raise gone(_HUNG_UP)
         answer = self._open.pop(message["id"], None)
         result = message.get("result")
         if isinstance(result, dict) and "state" in result:
@@ -156,8 +173,11 @@ class AsyncClient:
 
     def _end(self) -> None:
         self.lost.set()
+        why: RigError = gone(_HUNG_UP)
+        if self._turned_away is not None:
+            why = rpc.error_of(self._turned_away)
         for answer in self._open.values():
             if not answer.done():
-                answer.set_exception(gone(_HUNG_UP))
+                answer.set_exception(why)
         self._open.clear()
         self.changed()

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon import rpc
-from rig.daemon.client_protocol import ClientProtocol, gone, hello
+from rig.daemon.client_protocol import (
+    HELLO_PATIENCE_S,
+    ClientProtocol,
+    gone,
+    hello,
+    silent,
+    turned_away,
+)
 from rig.daemon.lease import LEASE_S, ControlError
 from rig.daemon.socket_path import reach
 from rig.errors import DeviceError, DeviceTimeoutError
@@ -56,7 +63,12 @@ class Client:
         self._socket, token = reach(path)
         self._socket.settimeout(_LOOK_S)
         try:
-            self.daemon: dict[str, Any] = self.call("hello", **hello(name, token))
+            self.daemon: dict[str, Any] = self.call(
+                "hello", patience=HELLO_PATIENCE_S, **hello(name, token)
+            )
+        except DeviceTimeoutError:
+            self._socket.close()
+            raise silent(path) from None
         except BaseException:
             self._socket.close()
             raise
@@ -83,7 +95,8 @@ class Client:
         while True:
             with self._interrupts.held():
                 for message in self._receive():
-                    if message.get("id") == number and "method" not in message:
+                    ours = message.get("id") == number and "method" not in message
+                    if ours or turned_away(message):
                         return rpc.result_of(message)
             if time.monotonic() > until:
                 raise DeviceTimeoutError(

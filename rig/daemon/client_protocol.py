@@ -6,7 +6,10 @@ import json
 from typing import Any
 
 from rig.daemon import rpc
-from rig.errors import DeviceError
+from rig.errors import DeviceError, DeviceTimeoutError
+
+HELLO_PATIENCE_S = 10.0
+"""How long a client waits for the answer to `hello`."""
 
 
 class ClientProtocol:
@@ -89,6 +92,11 @@ class Replica:
             self.change(params)
 
 
+def turned_away(message: dict[str, Any]) -> bool:
+    """Whether a message is an error that answers no request: the daemon hangs up after it."""
+    return "error" in message and message.get("id") is None
+
+
 def hello(name: str, token: str) -> dict[str, Any]:
     """Give the parameters of the first request, see API.md.
 
@@ -107,4 +115,12 @@ def gone(why: object) -> DeviceError:
     return DeviceError(
         f"the daemon is gone: {why}",
         "start it again (rig daemon), then give the same command: a drop that fell is fetched",
+    )
+
+
+def silent(path: object) -> DeviceTimeoutError:
+    """Make the error that says that a daemon takes connections and answers nothing."""
+    return DeviceTimeoutError(
+        f"the daemon at {path} did not answer within {HELLO_PATIENCE_S:g} s",
+        "the computer is very busy, or it hangs: try again, or stop it and start it again",
     )

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rig.daemon import rpc
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
+
+    from rig.errors import RigError
+
+    _Reply: TypeAlias = Callable[[bytes | None], None]
 
 
 class Connection:
@@ -49,8 +53,12 @@ class Connection:
         self._urgent: set[asyncio.Task[None]] = set()
 
     def send(self, line: bytes) -> None:
-        """Send one message, some time."""
-        if not self._writer.is_closing():
+        """Send one message, some time; to a client that reads nothing no more of them."""
+        if self._writer.is_closing():
+            return
+        if self.waiting() > 2 * rpc.MESSAGE_LIMIT:
+            self._writer.transport.abort()
+        else:
             self._writer.write(line)
 
     def waiting(self) -> int:
@@ -63,14 +71,19 @@ class Connection:
         if self.waiting():
             self._writer.transport.abort()
 
+    def turn_away(self, why: RigError) -> None:
+        """Say why, and hang up."""
+        self.send(rpc.failure(None, why))
+        self.close()
+
     async def serve(self) -> None:
         """Answer until the client goes."""
         # One request is answered after the other. A stop and the sign of life go past the one
-        # that is being worked on, so lines are read all the time, into a queue that is short.
-        lines: asyncio.Queue[rpc.Request | rpc.RpcError] = asyncio.Queue(maxsize=8)
-        answering = asyncio.get_running_loop().create_task(self._answer_all(lines))
+        # that is being worked on, so lines are read all the time.
+        waiting: asyncio.Queue[_Asked] = asyncio.Queue(rpc.BATCH_LIMIT)
+        answering = asyncio.get_running_loop().create_task(self._answer_all(waiting))
         try:
-            await self._read(lines)
+            await self._read(waiting)
         except (ConnectionError, ValueError, asyncio.IncompleteReadError):
             pass  # gone, or a line without an end
         finally:
@@ -78,39 +91,89 @@ class Connection:
             for task in self._urgent:
                 task.cancel()
 
-    async def _read(self, lines: asyncio.Queue[rpc.Request | rpc.RpcError]) -> None:
+    async def _read(self, waiting: asyncio.Queue[_Asked]) -> None:
         while line := await self._reader.readline():
             self._heard(self)
-            try:
-                request = rpc.read_request(line)
-            except rpc.RpcError as error:
-                await lines.put(error)
-                continue
-            if request.method == "renew" and request.id is None:
-                continue
-            if request.method in {"stop", "renew"} and self.name and len(self._urgent) < 8:
-                task = asyncio.get_running_loop().create_task(self._answer(request))
-                self._urgent.add(task)
-                task.add_done_callback(self._urgent.discard)
+            found = rpc.read_line(line)
+            if isinstance(found, list):
+                reply = _Together(self.send, len(found)).add
+                for one in found:
+                    self._take(one, reply, waiting)
             else:
-                await lines.put(request)
+                self._take(found, self._send_any, waiting)
 
-    async def _answer_all(self, lines: asyncio.Queue[rpc.Request | rpc.RpcError]) -> None:
+    def _take(
+        self, one: rpc.Request | rpc.RpcError, reply: _Reply, waiting: asyncio.Queue[_Asked]
+    ) -> None:
+        """Have one message answered in its turn, or at once where it overtakes."""
+        asked = _Asked(one, reply)
+        method = one.method if isinstance(one, rpc.Request) else ""
+        if method in {"stop", "renew"} and self.name and len(self._urgent) < 8:
+            task = asyncio.get_running_loop().create_task(self._answer(asked))
+            self._urgent.add(task)
+            task.add_done_callback(self._urgent.discard)
+        elif waiting.full() and isinstance(one, rpc.Request):
+            # Refused, not kept back: a stop behind it must be read.
+            busy = rpc.BusyError(
+                f"{rpc.BATCH_LIMIT} requests of this client wait already", "wait for their answers"
+            )
+            reply(None if one.notification else rpc.failure(one.id, busy))
+        elif waiting.full():
+            reply(None)
+        else:
+            waiting.put_nowait(asked)
+
+    async def _answer_all(self, waiting: asyncio.Queue[_Asked]) -> None:
         while True:
-            request = await lines.get()
-            if isinstance(request, rpc.RpcError):
-                self.send(rpc.failure(request.request_id, request))
-            else:
-                await self._answer(request)
+            await self._answer(await waiting.get())
             await self._writer.drain()
             if not self.name:
                 self.close()
                 return
 
-    async def _answer(self, request: rpc.Request) -> None:
+    async def _answer(self, asked: _Asked) -> None:
+        one, reply = asked
+        if isinstance(one, rpc.RpcError):
+            reply(None if one.silent else rpc.failure(one.request_id, one))
+            return
         try:
-            line = rpc.answer(request.id, await self._do(self, request))
+            line = rpc.answer(one.id, await self._do(self, one))
         except Exception as error:
-            line = rpc.failure(request.id, error)
-        if request.id is not None:
+            line = rpc.failure(one.id, error)
+        reply(None if one.notification else line)
+
+    def _send_any(self, line: bytes | None) -> None:
+        if line is not None:
             self.send(line)
+
+
+class _Asked(NamedTuple):
+    """What a client sent, and where its answer goes: `None` for none."""
+
+    message: rpc.Request | rpc.RpcError
+    reply: _Reply
+
+
+class _Together:
+    """The answers to a batch, sent when all are there.
+
+    Parameters
+    ----------
+    send
+        Takes the line.
+    count
+        How many messages the batch has.
+    """
+
+    def __init__(self, send: Callable[[bytes], None], count: int) -> None:
+        self._send = send
+        self._left = count
+        self._answers: list[bytes] = []
+
+    def add(self, line: bytes | None) -> None:
+        """Take the answer to one of them, `None` for a notification."""
+        self._left -= 1
+        if line is not None:
+            self._answers.append(line.rstrip(b"\n"))
+        if not self._left and self._answers:
+            self._send(b"[" + b",".join(self._answers) + b"]\n")

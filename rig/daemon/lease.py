@@ -34,6 +34,8 @@ class Lease:
         self._holder: object = None
         self._name = ""
         self._until = 0.0
+        self._overtaken: dict[object, float] = {}  # when those were heard who lost control
+        self._silences: dict[object, float] = {}  # and for how long they were not, s
 
     @property
     def holder(self) -> object:
@@ -60,6 +62,9 @@ class Lease:
                     f"{self._name} has control",
                     "let it finish, or close it; watching and STOP work meanwhile",
                 )
+            if self._holder not in {None, client}:
+                self._overtaken[self._holder] = self._until - LEASE_S
+            self._silences.pop(client, None)
             self._holder, self._name, self._until = client, name, self._now() + LEASE_S
 
     def heard(self, client: object) -> None:
@@ -67,10 +72,19 @@ class Lease:
         with self._guard:
             if self._holder is client:
                 self._until = self._now() + LEASE_S
+            elif client in self._overtaken:
+                self._silences[client] = self._now() - self._overtaken.pop(client)
+
+    def silence(self, client: object) -> float:
+        """How long nothing has been heard from the client in control, s; 0 for any other."""
+        with self._guard:
+            return max(0.0, self._now() - self._until + LEASE_S) if self._holder is client else 0.0
 
     def release(self, client: object) -> bool:
         """Take control away from a client; `False` when it did not have it."""
         with self._guard:
+            self._overtaken.pop(client, None)
+            self._silences.pop(client, None)
             if self._holder is not client:
                 return False
             self._holder, self._name, self._until = None, "", 0.0
@@ -86,6 +100,12 @@ class Lease:
         """
         if self.holder is not client:
             name = self._name or "nobody"
+            if (silence := self._silences.get(client)) is not None:
+                raise ControlError(
+                    f"control was lost: nothing was heard from this program for {silence:.1f} s, "
+                    f"and {name} has it now",
+                    "when that one has finished, give the same command again: it goes on from here",
+                )
             raise ControlError(
                 f"this needs control, and {name} has it",
                 "take control first; where somebody else has it, let them finish",

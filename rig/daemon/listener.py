@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import socket
@@ -15,25 +14,26 @@ from rig.errors import InputError
 from rig.files import write_atomic
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
     from pathlib import Path
 
-    Serve = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
-
 _PROBE_S = 1.0
+_BACKLOG = 1024  # that many may come at once; the kernel has a limit of its own besides
 
 
-async def listen(path: Path, serve: Serve, token: str) -> asyncio.Server:
+def listen(path: Path, token: str) -> socket.socket:
     """Let clients come.
 
     Parameters
     ----------
     path
         The Unix socket; the file that stands for TCP is beside it.
-    serve
-        Called for each client.
     token
         What a client over TCP must know; empty for the socket.
+
+    Returns
+    -------
+    socket
+        Which listens, and does not block.
 
     Raises
     ------
@@ -48,16 +48,19 @@ async def listen(path: Path, serve: Serve, token: str) -> asyncio.Server:
         )
     for left_by_a_killed_one in (path, token_file(path)):
         left_by_a_killed_one.unlink(missing_ok=True)
-    if not token:
-        server = await asyncio.start_unix_server(serve, str(path), limit=rpc.REQUEST_LIMIT)
+    if token:
+        listener = socket.create_server(("127.0.0.1", 0), backlog=_BACKLOG)
+        file, port = token_file(path), listener.getsockname()[1]
+        file.touch(mode=0o600)
+        write_atomic(file, json.dumps({"port": port, "token": token}))
+        file.chmod(0o600)
+    else:
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        listener.bind(str(path))
         path.chmod(0o600)
-        return server
-    server = await asyncio.start_server(serve, "127.0.0.1", 0, limit=rpc.REQUEST_LIMIT)
-    file, port = token_file(path), server.sockets[0].getsockname()[1]
-    file.touch(mode=0o600)
-    write_atomic(file, json.dumps({"port": port, "token": token}))
-    file.chmod(0o600)
-    return server
+        listener.listen(_BACKLOG)
+    listener.setblocking(False)
+    return listener
 
 
 def leave(path: Path, token: str) -> None:
@@ -73,6 +76,8 @@ def _answers_at_socket(path: Path) -> bool:
             probe.connect(str(path))
         except (FileNotFoundError, ConnectionRefusedError):
             return False
+        except (BlockingIOError, TimeoutError):
+            return True  # so many wait that it does not come to us
         except OSError as error:
             raise InputError(
                 f"cannot listen at {path}: {error}", "name another place with --socket"

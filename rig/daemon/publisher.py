@@ -29,7 +29,7 @@ class Publisher:
     Attributes
     ----------
     connections
-        All clients.
+        All clients that have said hello.
     """
 
     def __init__(self, published: PublishedState) -> None:

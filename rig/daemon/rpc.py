@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn, TypeAlias
 
 from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, DeviceTimeoutError, InputError, RigError, SessionError
@@ -22,6 +22,12 @@ MESSAGE_LIMIT = 1 << 24
 """Bytes of a line from the daemon: a snapshot with the edges of a very long drop."""
 PARSE, INVALID, NO_METHOD, BAD_PARAMS = -32700, -32600, -32601, -32602
 FAILURE = -32000
+BATCH_LIMIT = 64
+"""Requests of one connection that may wait for their answers, in a batch or one by one."""
+
+
+class BusyError(DeviceError):
+    """So many clients are there, or so many requests wait, that no more is taken."""
 
 
 class VersionError(RigError):
@@ -33,10 +39,13 @@ class VersionError(RigError):
 class RpcError(Exception):
     """A line that is no proper request, with JSON-RPC's own code."""
 
-    def __init__(self, code: int, message: str, request_id: object = None) -> None:
+    def __init__(
+        self, code: int, message: str, request_id: object = None, *, silent: bool = False
+    ) -> None:
         super().__init__(message)
         self.code = code
         self.request_id = request_id
+        self.silent = silent  # of a notification, which is never answered
 
 
 _KINDS: dict[str, type[RigError]] = {
@@ -47,6 +56,7 @@ _KINDS: dict[str, type[RigError]] = {
         SessionError,
         DeviceError,
         DeviceTimeoutError,
+        BusyError,
         ControlError,
         StoppedError,
         VersionError,
@@ -54,37 +64,62 @@ _KINDS: dict[str, type[RigError]] = {
 }
 
 
+RequestId: TypeAlias = "int | float | str | None"
+
+
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request, or a notification when `id` is `None`."""
+    """A request, or a notification, which gets no answer."""
 
     method: str
     params: dict[str, Any]
-    id: int | str | None
+    id: RequestId
+    notification: bool = False
+
+
+def read_line(line: bytes) -> Request | RpcError | list[Request | RpcError]:
+    """Read one line from a client: a message, or a batch of them."""
+    try:
+        message = json.loads(line, parse_constant=_no_number)
+    except (ValueError, RecursionError):
+        return RpcError(PARSE, "not JSON")
+    if not isinstance(message, list):
+        return _read_one(message)
+    if not 0 < len(message) <= BATCH_LIMIT:
+        return RpcError(INVALID, f"a batch has 1 to {BATCH_LIMIT} requests")
+    return [_read_one(one) for one in message]
 
 
 def read_request(line: bytes) -> Request:
-    """Read one line from a client.
+    """Read one request.
 
     Raises
     ------
     RpcError
-        It is no request.
+        It is none.
     """
-    try:
-        message = json.loads(line)
-    except (ValueError, RecursionError):
-        raise RpcError(PARSE, "not JSON") from None
+    found = read_line(line)
+    if isinstance(found, Request):
+        return found
+    raise found if isinstance(found, RpcError) else RpcError(INVALID, "not a request")
+
+
+def _read_one(message: Any) -> Request | RpcError:
     if not isinstance(message, dict):
-        raise RpcError(INVALID, "not a request")
+        return RpcError(INVALID, "not a request")
     number, method, params = message.get("id"), message.get("method"), message.get("params", {})
-    if isinstance(number, bool) or not isinstance(number, int | str | None):
-        raise RpcError(INVALID, "an id is a number or a text")
+    if isinstance(number, bool) or not isinstance(number, int | float | str | None):
+        return RpcError(INVALID, "an id is a number or a text")
     if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
-        raise RpcError(INVALID, "not a request of JSON-RPC 2.0", number)
+        return RpcError(INVALID, "not a request of JSON-RPC 2.0", number)
+    notification = "id" not in message
     if not isinstance(params, dict):
-        raise RpcError(BAD_PARAMS, "parameters have names here", number)
-    return Request(method, params, number)
+        return RpcError(BAD_PARAMS, "parameters have names here", number, silent=notification)
+    return Request(method, params, number, notification)
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(text)
 
 
 def request(method: str, params: dict[str, Any], number: int | None) -> bytes:
@@ -116,12 +151,17 @@ def result_of(message: dict[str, Any]) -> Any:
     RigError
         What the daemon raised.
     """
-    error = message.get("error")
-    if error is None:
+    if message.get("error") is None:
         return message.get("result")
+    raise error_of(message)
+
+
+def error_of(message: dict[str, Any]) -> RigError:
+    """Make the error of an answer that is one."""
+    error = message["error"]
     if isinstance(error.get("data"), dict):
-        raise error_from_data(error["data"])
-    raise RigError(
+        return error_from_data(error["data"])
+    return RigError(
         f"the daemon does not understand: {error.get('message')}", "are both of one version?"
     )
 
@@ -131,7 +171,10 @@ def known(error: Exception) -> RigError:
     if isinstance(error, RigError):
         return error
     log.error("unexpected", exc_info=error)
-    return RigError(f"unexpected: {error!r}", "a fault of this program: please report it")
+    return RigError(
+        "this failed in a way that nobody foresaw",
+        "a fault of this program: please report it, with what stands in the daemon's log",
+    )
 
 
 def error_to_data(error: RigError) -> dict[str, Any]:
@@ -163,4 +206,5 @@ def error_from_data(data: dict[str, Any]) -> RigError:
 
 
 def _line(message: dict[str, Any]) -> bytes:
-    return json.dumps(message, separators=(",", ":"), ensure_ascii=False).encode() + b"\n"
+    # Escaped, for a file's name may have bytes that are no text, and then UTF-8 cannot hold it.
+    return json.dumps(message, separators=(",", ":")).encode("ascii") + b"\n"

@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import resource
 import secrets
 import signal
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.daemon import rpc
+from rig.daemon.admission import HELLO_S, Admission
 from rig.daemon.connection import Connection
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import leave, listen
@@ -24,11 +27,15 @@ from rig.ports import is_simulated
 from rig.recorder.published import PublishedState
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import Callable
     from pathlib import Path
 
 log = logging.getLogger(__name__)
 _SWITCH_S = 1e-3
+_AGAIN_S = 0.05
+_DESCRIPTORS = 1024
+"""Files and connections that may be open: all clients, and what port and session need."""
 
 
 class Server:
@@ -62,11 +69,15 @@ class Server:
         self._token = secrets.token_hex(32) if tcp else ""
         self._lease = Lease()
         self._worker = Worker(url, self.published, self._lease)
-        self._service = Service(url, self._token, self._worker, self._lease, self.publisher)
+        self._admission = Admission()
+        self._service = Service(
+            url, self._token, self._worker, self._lease, self.publisher, self._admission
+        )
         self._idle_s = idle_s
         self._left_at = 0.0  # when the last client went
         self._serving: set[asyncio.Task[None]] = set()
         self._over = asyncio.Event()
+        self._failed: RigError | None = None
 
     async def run(self, ready: Callable[[], None]) -> None:
         """Serve until a signal comes, or until nobody needs it.
@@ -80,57 +91,109 @@ class Server:
         ------
         InputError
             Another daemon is there, or the socket's folder cannot be trusted.
+        RigError
+            A part of it failed: clients that went on would see nothing any more.
         """
         # The worker may be busy with a burst of edges: clients wait no 5 ms for their turn.
         sys.setswitchinterval(_SWITCH_S)
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self.end)
-        listener = await listen(self.path, self._serve, self._token)
+        _allow_descriptors()
+        listener = listen(self.path, self._token)
         self.published.set(
             daemon={"version": __version__, "pid": os.getpid(), "api": rpc.API},
             port={"url": self.url, "simulated": is_simulated(self.url), "path": self.url},
         )
-        tasks = [loop.create_task(self.publisher.run()), loop.create_task(self._watch_lease())]
+        parts = [self._accept(listener), self.publisher.run(), self._watch_lease()]
         if self._idle_s is not None:
-            tasks.append(loop.create_task(self._watch_clients(self._idle_s)))
+            parts.append(self._watch_clients(self._idle_s))
+        tasks = [loop.create_task(part) for part in parts]
+        for task in tasks:
+            task.add_done_callback(self._ended)
+
+        def died(error: BaseException) -> None:
+            loop.call_soon_threadsafe(self._fail, error)
+
+        self._worker.died = died
         ready()  # said before whatever the worker has to say
         self._worker.start()
         try:
             await self._over.wait()
         finally:
-            listener.close()
             self._worker.end()
             await loop.run_in_executor(None, self._worker.join)
-            self.publisher.spread()  # the last state, for whoever still looks
+            with suppress(Exception):
+                self.publisher.spread()  # the last state, for whoever still looks
             for task in tasks:
                 task.cancel()
-            for connection in list(self.publisher.connections):
+            listener.close()
+            for connection in self._admission:
                 connection.close()
             if self._serving:  # they end by themselves; to be cancelled would be told on stderr
                 await asyncio.wait(self._serving, timeout=1.0)
             leave(self.path, self._token)
+        if self._failed is not None:
+            raise self._failed
 
     def end(self) -> None:
         """End as a signal would."""
         self._over.set()
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if peer_uid(writer.get_extra_info("socket")) not in {None, os.getuid()}:
-            writer.close()
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        """See that no part of the daemon dies in silence."""
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._fail(error)
+
+    def _fail(self, error: BaseException) -> None:
+        log.error("a part of the daemon failed, so it ends", exc_info=error)
+        self._failed = RigError(
+            "a part of the daemon failed, so it ended",
+            "a fault of this program: please report it, with what stands above; start it again, "
+            "and the same commands go on",
+        )
+        self.end()
+
+    async def _accept(self, listener: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                line, _ = await loop.sock_accept(listener)
+            except ConnectionError:
+                continue
+            except OSError:  # no descriptor is left
+                if not self._admission.make_room():
+                    await asyncio.sleep(_AGAIN_S)
+            else:
+                task = loop.create_task(self._serve(line))
+                self._serving.add(task)
+                task.add_done_callback(self._serving.discard)
+            await asyncio.sleep(0)  # who came before is heard before more come
+
+    async def _serve(self, line: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        if peer_uid(line) not in {None, os.getuid()}:
+            line.close()
             return
+        reader, writer = await asyncio.open_connection(sock=line, limit=rpc.REQUEST_LIMIT)
         connection = Connection(reader, writer, self._service.do, self._lease.heard)
-        task = asyncio.current_task()
-        assert task is not None
-        self._serving.add(task)
-        self.publisher.add(connection)
+        self._admission.arrived(connection)
+        late = loop.call_later(HELLO_S, self._hurry, connection)
         try:
             await connection.serve()
         finally:
-            self._left_at = asyncio.get_running_loop().time()
+            late.cancel()
+            self._left_at = loop.time()
             self._service.left(connection)
             connection.close()
-            self._serving.discard(task)
+
+    def _hurry(self, connection: Connection) -> None:
+        if self._admission.late(connection):
+            connection.turn_away(
+                rpc.BusyError(
+                    f"nothing of use was asked for {HELLO_S:g} s", "say hello as soon as connected"
+                )
+            )
 
     async def _watch_lease(self) -> None:
         """See that control lapses also when its holder says nothing."""
@@ -157,6 +220,13 @@ class Server:
             elif not self.publisher.connections:
                 log.info("no client for %g s, and nothing armed, falling or unsaved", idle_s)
                 self.end()
+
+
+def _allow_descriptors() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
 def serve(

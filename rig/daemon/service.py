@@ -5,15 +5,20 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+from inspect import signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.daemon import rpc
+from rig.printable import encodable, one_line
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
+    from inspect import Signature
 
+    from rig.daemon.admission import Admission
     from rig.daemon.connection import Connection
     from rig.daemon.lease import Lease
     from rig.daemon.publisher import Publisher
@@ -39,16 +44,25 @@ class Service:
         Who is in control.
     publisher
         Shows everything.
+    admission
+        Who is let in.
     """
 
     def __init__(
-        self, url: str, token: str, worker: Worker, lease: Lease, publisher: Publisher
+        self,
+        url: str,
+        token: str,
+        worker: Worker,
+        lease: Lease,
+        publisher: Publisher,
+        admission: Admission,
     ) -> None:
         self._url = url
         self._token = token
         self._worker = worker
         self._lease = lease
         self._publisher = publisher
+        self._admission = admission
         self._published = publisher.published
         self._methods: dict[str, Callable[..., Awaitable[Any]]] = {
             "hello": self._hello,
@@ -81,17 +95,16 @@ class Service:
         """
         method = self._methods.get(request.method)
         if method is None:
-            raise rpc.RpcError(rpc.NO_METHOD, f"no method {request.method}")
+            raise rpc.RpcError(rpc.NO_METHOD, f"no method {one_line(request.method, 80)}")
         if not client.name and request.method != "hello":
             raise rpc.RpcError(rpc.INVALID, "hello comes first")
-        try:
-            work = method(client, **request.params)
-        except TypeError as error:
-            raise rpc.RpcError(rpc.BAD_PARAMS, f"{request.method}: {error}") from None
-        return await work
+        self._admission.check(client, request.method)
+        _check_names(request.method, signature(method), request.params)
+        return await method(client, **request.params)
 
     def left(self, client: Connection) -> None:
         """Note that a client is gone: what it had armed is disarmed."""
+        self._admission.left(client)
         self._publisher.discard(client)
         self._release(client)
 
@@ -110,7 +123,7 @@ class Service:
     async def _hello(
         self, who: Connection, /, api: object, client: object, token: object = ""
     ) -> dict[str, Any]:
-        if api != rpc.API:
+        if isinstance(api, bool) or api != rpc.API:
             raise rpc.VersionError(
                 f"this client speaks version {api} of the daemon's interface, rig {__version__}'s "
                 f"daemon version {rpc.API}",
@@ -118,7 +131,11 @@ class Service:
             )
         if self._token and token != self._token:
             raise rpc.RpcError(rpc.INVALID, "wrong token")
-        who.name = _text(client, "client")[:80] or "a client"
+        name = one_line(_text(client, "client"), 80) or "a client"
+        if not who.name:
+            self._admission.welcome(who)
+            self._publisher.add(who)
+        who.name = name
         return {
             "api": rpc.API,
             "version": __version__,
@@ -147,14 +164,14 @@ class Service:
         return {"disk_s": self._worker.disk_s()}  # every line is a sign of life
 
     async def _stop(self, who: Connection, /, reason: object = "") -> dict[str, Any]:
-        said = _text(reason, "reason")[:200] or f"stopped by {who.name}"
+        said = one_line(_text(reason, "reason"), 200) or f"stopped by {who.name}"
         await asyncio.wrap_future(self._worker.stop(said))
         return {}
 
     async def _open_session(
         self, who: Connection, /, protocol: object, session: object, seed: object = None
     ) -> dict[str, Any]:
-        names = _text(protocol, "protocol"), _text(session, "session")
+        names = _path(protocol, "protocol"), _path(session, "session")
         chosen = None if seed is None else _whole(seed, "seed")
 
         def work(controller: Controller) -> dict[str, Any]:
@@ -167,7 +184,9 @@ class Service:
         return await self._ask(who, lambda controller: controller.close_session(), writes=False)
 
     async def _wait(self, who: Connection, /, seconds: object) -> dict[str, Any]:
-        if not isinstance(seconds, _ANY_NUMBER) or not 0.0 <= seconds <= 3600.0:
+        if isinstance(seconds, bool) or not isinstance(seconds, _ANY_NUMBER):
+            raise rpc.RpcError(rpc.BAD_PARAMS, "seconds: a number")
+        if not 0.0 <= seconds <= 3600.0:
             raise rpc.RpcError(rpc.BAD_PARAMS, "seconds: from 0 to 3600")
         return await self._ask(who, lambda controller: controller.wait(float(seconds)))
 
@@ -196,11 +215,13 @@ class Service:
         which = _whole(run, "run"), _whole(attempt, "attempt")
         if not isinstance(reasons, list):
             raise rpc.RpcError(rpc.BAD_PARAMS, "reasons: a list")
-        why = tuple(_text(reason, "reasons") for reason in reasons)
+        why = tuple(encodable(_text(reason, "reasons")) for reason in reasons)
         try:
             new = RunState(_text(state, "state"))
         except ValueError:
-            raise rpc.RpcError(rpc.BAD_PARAMS, f"state: {state} is none") from None
+            raise rpc.RpcError(
+                rpc.BAD_PARAMS, f"state: {one_line(str(state), 80)} is none"
+            ) from None
         return await self._ask(who, lambda controller: controller.log_state(*which, new, why))
 
     async def _unblind(self, who: Connection, /) -> dict[str, Any]:
@@ -226,3 +247,31 @@ def _text(value: object, name: str) -> str:
     if not isinstance(value, str):
         raise rpc.RpcError(rpc.BAD_PARAMS, f"{name}: a text")
     return value
+
+
+def _path(value: object, name: str) -> str:
+    text = _text(value, name)
+    try:
+        fit = b"\0" not in os.fsencode(text) and Path(text).is_absolute()
+    except UnicodeEncodeError:
+        fit = False
+    if not fit:
+        raise rpc.RpcError(rpc.BAD_PARAMS, f"{name}: a path from the root, as in /home/ada/drops")
+    return text
+
+
+def _check_names(method: str, accepted: Signature, given: dict[str, Any]) -> None:
+    """See that each parameter is one, and that those are there that must be.
+
+    Raises
+    ------
+    RpcError
+        In words.
+    """
+    known = [one for one in accepted.parameters.values() if one.kind is not one.POSITIONAL_ONLY]
+    unknown = sorted(given.keys() - {one.name for one in known})
+    missing = [one.name for one in known if one.default is one.empty and one.name not in given]
+    for names, what in ((unknown, "no such parameter"), (missing, "it needs")):
+        if names:
+            told = one_line(", ".join(names), 200)
+            raise rpc.RpcError(rpc.BAD_PARAMS, f"{method}: {what}: {told}")

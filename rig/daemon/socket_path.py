@@ -6,12 +6,15 @@ import json
 import os
 import socket
 import struct
+import time
 from pathlib import Path
 
+from rig.daemon.rpc import BusyError
 from rig.errors import DeviceError, InputError
 
 _SECRET = 0o077  # what the group and others may not have
 _REACH_S = 5.0
+_AGAIN_S = 0.02
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
 
@@ -92,6 +95,8 @@ def reach(path: Path) -> tuple[socket.socket, str]:
     ------
     DeviceError
         Nobody answers there, or somebody else.
+    BusyError
+        Too many want to be let in.
     """
     tcp, token = token_file(path), ""
     line: socket.socket | None = None
@@ -104,7 +109,14 @@ def reach(path: Path) -> tuple[socket.socket, str]:
         else:
             line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             line.settimeout(_REACH_S)
-            line.connect(str(path))
+            _connect(line, path)
+    except (BlockingIOError, TimeoutError) as error:
+        if line is not None:
+            line.close()
+        raise BusyError(
+            f"the daemon at {path} is busy: for {_REACH_S:g} s it took no new client",
+            "try again; if it stays so, stop it and start it again",
+        ) from error
     except (OSError, ValueError) as error:
         if line is not None:
             line.close()
@@ -113,3 +125,17 @@ def reach(path: Path) -> tuple[socket.socket, str]:
         line.close()
         raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")
     return line, token
+
+
+def _connect(line: socket.socket, path: Path) -> None:
+    """Connect, and try again while more want to be let in than the kernel keeps waiting."""
+    until = time.monotonic() + _REACH_S
+    while True:
+        try:
+            line.connect(str(path))
+        except BlockingIOError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(_AGAIN_S)
+        else:
+            return

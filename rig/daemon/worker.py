@@ -57,6 +57,13 @@ class Worker:
         Where everything is shown.
     lease
         Who may keep a drop armed.
+
+    Attributes
+    ----------
+    controller
+        Used by the worker's own thread only.
+    died
+        Called, in that thread, with what it did not survive.
     """
 
     def __init__(self, url: str, published: PublishedState, lease: Lease) -> None:
@@ -76,6 +83,7 @@ class Worker:
         self._troubled: object = None  # the session that was open then
         self._retry_at = 0.0
         self._looked_at = self._next_ping = self._next_commit = self._next_statistics = 0.0
+        self.died: Callable[[BaseException], None] = lambda _: None
         self.controller = Controller(url, published=published, halted=self._halted, keep_port=True)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
@@ -165,6 +173,13 @@ class Worker:
         return self._holder is not None and self._lease.holder is self._holder
 
     def _run(self) -> None:
+        try:
+            self._work()
+        except BaseException as error:
+            self._drain(known(RuntimeError("the worker died")))
+            self.died(error)
+
+    def _work(self) -> None:
         if not is_simulated(self._url):
             self._trying(self.controller.connect)
         while not self._ending:
@@ -228,7 +243,12 @@ class Worker:
         if reason:
             self._drain(StoppedError(reason))
         elif armed and not self._held:
-            reason = _LOST
+            silence = self._lease.silence(self._holder)
+            reason = (
+                f"nothing was heard from {self._lease.name} for {silence:.1f} s, so it lost control"
+                if silence
+                else _LOST
+            )
         if reason:
             self._trying(lambda: self.controller.stop(reason))
         with self._guard:

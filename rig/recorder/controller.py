@@ -459,7 +459,9 @@ class Controller:
         if recorder is None:
             return
         armed = recorder.armed
-        self._unarmed = StoppedError(reason, "arm again when all is well")
+        self._unarmed = StoppedError(
+            reason, "arm again when all is well; a rig run goes on by the same command"
+        )
         try:
             recorder.abort()
         finally:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rig import __version__
 from rig.errors import SessionError
+from rig.printable import encodable
 from rig.session.database import build, check_free, check_place, connect
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
@@ -80,9 +81,9 @@ class Session(Reader):
                 "python_version": platform.python_version(),
                 "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
                 "simulated": "true" if simulated else "false",
-                "origin": origin,
+                "origin": encodable(origin),
             }
-            build(place, meta, protocol_source, protocol_text)
+            build(place, meta, encodable(protocol_source), protocol_text)
             return cls(place, connect(place, readonly=False), lock)
         except BaseException:
             lock.release()
@@ -261,7 +262,7 @@ class Session(Reader):
             Statement(
                 'INSERT INTO "drop" VALUES '
                 "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                [(*head, *fields, faults, host_ns, provenance, *tail)],
+                [(*head, *fields, encodable(faults), host_ns, encodable(provenance), *tail)],
             ),
             Statement(
                 "INSERT INTO edge VALUES (?, ?, ?, ?, ?)",
@@ -276,9 +277,10 @@ class Session(Reader):
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[str] = ()
     ) -> None:
         """Add one line to the log of run states."""
+        told = json.dumps(list(reasons), ensure_ascii=False)
         self._add(
             "INSERT INTO run_state (run, attempt, state, reasons, host_ns) VALUES (?, ?, ?, ?, ?)",
-            (run, attempt, str(state), json.dumps(list(reasons), ensure_ascii=False), host_ns),
+            (run, attempt, str(state), encodable(told), host_ns),
         )
 
     def unblind(self) -> None:

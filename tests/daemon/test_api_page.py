@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from unittest.mock import Mock
 
-from rig.daemon import rpc
+from rig.daemon import admission, rpc
 from rig.daemon.lease import LEASE_S
 from rig.daemon.service import Service
 from rig.recorder.published import PublishedState
@@ -20,7 +20,7 @@ def rows(heading):
 
 
 def test_every_method_is_on_the_page():
-    assert rows("Methods") == list(Service("sim://", "", Mock(), Mock(), Mock())._methods)
+    assert rows("Methods") == list(Service("sim://", "", *[Mock()] * 4)._methods)
 
 
 def test_every_section_is_on_the_page():
@@ -37,5 +37,11 @@ def test_every_kind_of_error_is_on_the_page():
 def test_the_page_has_the_numbers():
     assert f"Version {rpc.API}." in PAGE
     assert f"not heard for {LEASE_S:g} s" in PAGE
+    assert f"within {admission.HELLO_S:g} s, or" in PAGE
+    assert f"at most {admission.STRANGERS} are kept" in PAGE
+    assert f"| {admission.CLIENTS}; {admission.RESERVE} more" in PAGE
+    assert f"batch of up to {rpc.BATCH_LIMIT} requests" in PAGE
+    assert f"| {rpc.BATCH_LIMIT}; more get" in PAGE
+    assert f"read | {2 * rpc.MESSAGE_LIMIT >> 20} MiB" in PAGE
     assert rpc.REQUEST_LIMIT == 64 << 10
     assert rpc.MESSAGE_LIMIT == 16 << 20

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from functools import partial
 
@@ -9,7 +10,7 @@ import pytest
 
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
-from rig.daemon.lease import ControlError
+from rig.daemon.lease import ControlError, Lease
 from rig.errors import DeviceError, InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
@@ -104,7 +105,26 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     processes.await_phase(Phase.IDLE)
     until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
     with Session.open(processes.session, readonly=True) as session:
-        assert session.latest_state(1).reasons == ("the client in control was lost",)
+        (reason,) = session.latest_state(1).reasons
+    assert re.fullmatch(r"nothing was heard from one for \d\.\d s, so it lost control", reason)
+    one, token = armed
+    with pytest.raises(StoppedError, match=reason):
+        one.fire(token)
+
+
+def test_who_was_silent_too_long_is_told_that_another_has_control():
+    now = [0.0]
+    lease = Lease(lambda: now[0])
+    lease.take("runner", "rig run 1")
+    now[0] = 5.0
+    lease.take("other", "a tui")
+    now[0] = 7.5
+    lease.heard("runner")
+    with pytest.raises(ControlError, match=r"nothing was heard .* for 7\.5 s, and a tui has it"):
+        lease.require("runner")
+    lease.release("other")
+    lease.take("runner", "rig run 1")
+    lease.require("runner")
 
 
 def test_a_device_that_disarms_itself_is_noticed(processes, armed):

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import unicodedata
 from typing import TypeAlias
 
 from textual.content import Content
 from textual.widgets import Static
 
+from rig.printable import is_hidden
+
 LONGEST = 400
 """Characters of one text from outside that are shown; nobody reads more on a screen."""
-_HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
-"""Categories that print nothing, or change what is printed around them."""
 
 
 def plain(text: object, limit: int = LONGEST) -> str:
@@ -34,7 +33,7 @@ def plain(text: object, limit: int = LONGEST) -> str:
 def _shown(character: str) -> str:
     if character in "\n\r\t":
         return " "
-    if unicodedata.category(character) in _HIDDEN:
+    if is_hidden(character):
         return "\N{REPLACEMENT CHARACTER}"
     return character
 

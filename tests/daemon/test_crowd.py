@@ -1,0 +1,313 @@
+"""A crowd at the door: silent connections, too many clients, and names that are no text."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import resource
+import socket
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from bench.process_fixture import FENCE
+from rig.daemon import admission, rpc
+from rig.daemon.aclient import AsyncClient
+from rig.daemon.client import Client
+from rig.daemon.server import Server
+from rig.errors import RigError
+from rig.session.store import Session
+from tests.waiting import PATIENCE_S
+
+HELLO = rpc.request("hello", {"api": rpc.API, "client": "t"}, 1)
+FEW = 200  # descriptors that the daemon may have: fewer than come
+
+
+@pytest.fixture
+def daemon(tmp_path):
+    """Start a daemon of a simulated port, with few descriptors."""
+    tmp_path.chmod(0o700)
+    path = tmp_path / "rig.sock"
+    started = subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "rig", "daemon", "--port", "sim://",
+         "--socket", path],
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert started.stderr.readline().startswith("rig daemon: sim://")
+        resource.prlimit(started.pid, resource.RLIMIT_NOFILE, (FEW, FEW))
+        yield path, started
+    finally:
+        started.terminate()
+        started.communicate(timeout=PATIENCE_S)
+
+
+def test_a_silent_crowd_keeps_nobody_out(daemon):
+    path, _ = daemon
+    with contextlib.ExitStack() as crowd:
+        for number in range(2 * FEW):
+            line = crowd.enter_context(socket.socket(socket.AF_UNIX))
+            line.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                line.connect(str(path))
+                line.send(b"{" * (number % 2))  # some begin a line
+        client = Client(path, "the one that means it")
+        client.stop("enough")
+        client.close()
+
+
+def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
+    path, started = daemon
+    clients = []
+
+    def come(number):
+        try:
+            clients.append(Client(path, f"client {number}"))
+        except rpc.BusyError as busy:
+            return str(busy)
+        return ""
+
+    with ThreadPoolExecutor(160) as pool:
+        told = list(pool.map(come, range(160)))
+    assert sum(not one for one in told) == len(clients) >= admission.CLIENTS
+    assert all(not one or "clients are connected" in one for one in told)
+    for client in clients:
+        client.close()
+    assert started.poll() is None
+
+
+@pytest.fixture
+def door(tmp_path):
+    """Run a test inside the daemon's own loop."""
+
+    def within(test):
+        async def run():
+            path = tmp_path / "door" / "rig.sock"
+            server, ready = Server("sim://", path), asyncio.Event()
+            serving = asyncio.create_task(server.run(ready.set))
+            await asyncio.wait_for(ready.wait(), PATIENCE_S)
+            try:
+                await asyncio.wait_for(test(server, path, serving), PATIENCE_S)
+            finally:
+                server.end()
+                await asyncio.gather(serving, return_exceptions=True)
+
+        asyncio.run(run())
+
+    return within
+
+
+def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):
+    monkeypatch.setattr(admission, "CLIENTS", 2)
+    monkeypatch.setattr(admission, "RESERVE", 1)
+
+    async def test(server, path, _):
+        clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
+        with pytest.raises(rpc.BusyError, match="only stop is done"):
+            await clients[2].call("subscribe")
+        assert await clients[2].call("stop") == {}
+        with pytest.raises(rpc.BusyError, match="2 clients are connected"):
+            await AsyncClient.connect(path, "one more")
+        await clients[0].close()
+        while len(server.publisher.connections) > 2:
+            await asyncio.sleep(0)
+        await (await AsyncClient.connect(path, "in its place")).close()
+        for client in clients:
+            await client.close()
+
+    door(test)
+
+
+def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
+    monkeypatch.setattr("rig.daemon.server.HELLO_S", 0.05)
+
+    async def test(server, path, _):
+        reader, writer = await asyncio.open_unix_connection(path)
+        told = json.loads(await reader.readline())
+        assert (told["id"], told["error"]["data"]["kind"]) == (None, "BusyError")
+        assert await reader.read() == b""
+        writer.close()
+        client = await AsyncClient.connect(path, "who says hello stays")
+        await asyncio.sleep(0.1)
+        assert await client.call("renew") == {"disk_s": 0.0}
+        await client.close()
+
+    door(test)
+
+
+NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
+
+
+def test_whatever_a_client_is_called_all_see_it(door):
+    async def test(server, path, _):
+        watcher = await AsyncClient.connect(path, "watcher")
+        await watcher.subscribe()
+        for name in NAMES:
+            client = await AsyncClient.connect(path, name)
+            await client.call("take_control")
+            while watcher.replica.state["control"] is None:
+                await asyncio.sleep(0)
+            shown = watcher.replica.state["control"]["client"]
+            assert shown.isprintable()
+            assert 0 < len(shown) <= 80
+            assert await client.call("stop", reason=name) == {}
+            await client.close()
+            while watcher.replica.state["control"] is not None:
+                await asyncio.sleep(0)
+        await watcher.close()
+
+    door(test)
+
+
+def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog):
+    async def test(server, path, serving):
+        def broken():
+            raise ArithmeticError("of a kind that nobody foresaw")
+
+        monkeypatch.setattr(server.publisher, "spread", broken)
+        server.published.set(error={"message": "anything"})
+        with pytest.raises(RigError, match="a part of the daemon failed"):
+            await serving
+        assert "a part of the daemon failed" in caplog.text
+
+    door(test)
+
+
+def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
+    async def test(server, path, serving):
+        def broken():
+            raise SystemError
+
+        monkeypatch.setattr(server._worker, "_attend", broken)
+        server._worker.lost()
+        with pytest.raises(RigError, match="a part of the daemon failed"):
+            await serving
+
+    door(test)
+
+
+def spoken(path, *lines):
+    """Send lines behind a hello and give the answers to them, until one to `end` comes."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(str(path))
+        end = rpc.request("unsubscribe", {}, 999)
+        line.sendall(HELLO + b"".join(lines) + end)
+        with line.makefile("rb") as answers:
+            assert json.loads(answers.readline())["id"] == 1
+            found = []
+            while (one := json.loads(answers.readline())) != json.loads(rpc.answer(999, {})):
+                found.append(one)
+            return found
+
+
+def test_batches_and_ids_are_as_json_rpc_has_them(door):
+    async def test(server, path, _):
+        batch = [
+            {"jsonrpc": "2.0", "id": "a", "method": "renew"},
+            {"jsonrpc": "2.0", "method": "renew"},
+            {"jsonrpc": "2.0", "id": 1.5, "method": "dance"},
+            7,
+            {"jsonrpc": "2.0", "id": None, "method": "unsubscribe"},
+            {"jsonrpc": "2.0", "id": 3, "method": "unsubscribe", "params": {"from": 1}},
+        ]
+        silent = [{"jsonrpc": "2.0", "method": "dance"}, {"jsonrpc": "2.0", "method": "renew"}]
+        lines = [
+            json.dumps(batch).encode() + b"\n",
+            json.dumps(silent).encode() + b"\n",
+            b'{"jsonrpc":"2.0","method":"dance","params":[1]}\n',
+            b'{"jsonrpc":"2.0","id":null,"method":"renew"}\n',
+        ]
+        answers, last = await asyncio.to_thread(spoken, path, *lines)
+        codes = {one["id"]: one["error"]["code"] for one in answers if "error" in one}
+        assert codes == {1.5: rpc.NO_METHOD, None: rpc.INVALID, 3: rpc.BAD_PARAMS}
+        assert [one["id"] for one in answers if "result" in one] in (["a", None], [None, "a"])
+        assert last == {"jsonrpc": "2.0", "id": None, "result": {"disk_s": 0.0}}
+        told = {one["id"]: one["error"]["message"] for one in answers if "error" in one}
+        assert told[3] == "unsubscribe: no such parameter: from"
+
+    door(test)
+
+
+def test_no_error_speaks_of_python(door):
+    async def test(server, path, _):
+        lines = [
+            rpc.request(method, params, number)
+            for number, (method, params) in enumerate(
+                (method, params)
+                for method in server._service._methods
+                for params in ({}, {"x": 1}, {"reason": 1, "seed": "x"})
+            )
+        ]
+        for found in await asyncio.to_thread(spoken, path, *lines):
+            told = json.dumps(found.get("error", ""))
+            assert not any(word in told for word in ("__", "Error(", "argument", "self", "None"))
+
+    door(test)
+
+
+def test_a_stop_is_read_behind_any_number_of_requests(door):
+    async def test(server, path, _):
+        reader, writer = await asyncio.open_unix_connection(path)
+        control = rpc.request("take_control", {}, 2)
+        waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
+        writer.write(HELLO)
+        await reader.readline()
+        writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
+        told = {}
+        while 1000 not in told:
+            answer = json.loads(await reader.readline())
+            told[answer["id"]] = answer
+        assert told[1000]["result"] == {}
+        assert told[299]["error"]["data"]["kind"] == "BusyError"
+        writer.close()
+
+    door(test)
+
+
+def test_a_client_that_asks_and_never_reads_costs_no_more_than_two_messages(door, monkeypatch):
+    monkeypatch.setattr(rpc, "MESSAGE_LIMIT", 1 << 16)
+
+    async def test(server, path, _):
+        with socket.socket(socket.AF_UNIX) as line:
+            line.connect(str(path))
+            line.setblocking(False)
+            loop = asyncio.get_running_loop()
+            await loop.sock_sendall(line, HELLO)
+
+            async def ask():
+                while True:
+                    await loop.sock_sendall(line, 99 * rpc.request("renew", {}, 7))
+                    assert all(one.waiting() < 1 << 18 for one in server.publisher.connections)
+
+            with pytest.raises(ConnectionError):
+                await ask()
+
+    door(test)
+
+
+def test_names_of_files_that_are_no_text_go_through(door, tmp_path):
+    async def test(server, path, _):
+        folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
+        folder.mkdir()
+        protocol, session = (folder / os.fsdecode(name) for name in (b"\xe4.yaml", b"\xf6"))
+        protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
+        client = await AsyncClient.connect(path, "t")
+        await client.subscribe()
+        await client.call("take_control")
+        opened = await client.call("open_session", protocol=str(protocol), session=str(session))
+        assert opened["session"]["path"] == str(session)
+        token = (await client.call("arm", run=1, attempt=1))["token"]
+        await client.call("fire", token=token)
+        await client.call("collect", run=1, attempt=1)
+        await client.call("close_session")
+        await client.close()
+        with Session.open(session, readonly=True) as found:
+            assert found.drop(1, 1) is not None
+            assert found.protocol_source == "?.yaml"
+
+    door(test)
