@@ -100,9 +100,9 @@ def imported(path: Path) -> set[str]:
 def test_all_that_a_session_needs_is_a_plain_dependency():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     named = {re.match(r"[\w-]+", one).group().lower() for one in project["dependencies"]}
-    packages = {"pyserial": "serial", "pyyaml": "yaml", "textual-plot": "textual_plot"}
+    packages = {"pyserial": "serial", "pyyaml": "yaml"}
     known = {packages.get(name, name) for name in named} | sys.stdlib_module_names
-    known |= {"rig", "sim", "rich", "textual_hires_canvas"}  # the last two come with Textual's
+    known |= {"rig", "sim", "rich"}  # the last comes with Textual
     known.add("pandas")  # a table for whoever has it
     files = [path for room in ("rig", "sim") for path in ROOT.glob(f"{room}/**/*.py")]
     assert set().union(*map(imported, files)) - known == set(OPTIONAL)

@@ -60,7 +60,7 @@ def test_all_who_predict_say_the_same(name):
         assert both[0].model.arrival == pytest.approx(line["speed_m_s"], rel=1e-12)
         if scene.two_chains:
             assert curves["separation_m"][at] == line["separation_m"]
-            _, _, _, gaps = separation(both, 9.0)
+            gaps = separation(both, 9.0).model
             longer = np.subtract(*(scene.chains[one].chain.length for one in (run.free, struck)))
             assert gaps[-1] + longer == pytest.approx(line["separation_m"], rel=1e-9)
 

@@ -26,7 +26,7 @@ def main(arguments: Namespace) -> int:
 
         if options.session is None or not options.session.is_file():
             raise InputError("--pictures needs --session FILE: what they show")
-        for path in draw(options.session, Path(arguments.pictures), keys):
+        for path in draw(options.session, Path(arguments.pictures), keys, options.files):
             print(path)
         return 0
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
@@ -40,7 +40,7 @@ def _options(arguments: Namespace) -> Options:
         files: tuple[Path, ...] = (Path(arguments.protocol),)
     else:
         folders = (Path("protocols"), Path())
-        files = tuple(path for folder in folders for path in sorted(folder.glob("*.yaml")))
+        files = tuple(path for folder in folders for path in sorted(folder.glob("[!.]*.yaml")))
     offline = bool(arguments.session) and not (
         arguments.port or arguments.protocol or arguments.socket
     )

@@ -91,6 +91,10 @@ class Follower:
         self._forget(path)
         self._begin(self._read_quietly())
 
+    def look_with(self, live: LiveAnalysis) -> None:
+        """Look at a file that somebody has read already."""
+        self._path, self._live = live.path, live
+
     def _forget(self, path: Path | None = None) -> None:
         self._path, self._live, self.view, self.voids = path, None, None, Voids()
 

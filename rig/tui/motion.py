@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -119,26 +119,64 @@ def _table(edges: Table, hz: float, *, thin: bool) -> EdgeArrays:
     return EdgeArrays(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
 
 
-def separation(pair: tuple[ChainFall, ...], end_s: float) -> tuple[Array, Array, Array, Array]:
-    """Δz against time, measured and by the model: two pairs of times and metres.
+class Separation(NamedTuple):
+    """Δz against time: m and s since the release fired, measured and by the model.
 
-    Measured at the impact side's edges, the free chain's height read between its neighbours.
+    Attributes
+    ----------
+    times, gaps
+        At the impact side's edges, the free chain's height read between its neighbours.
+    curve, model
+        The same times as far as the model goes, and its Δz.
+    expected
+        The model's at `times`; empty without one.
+    """
+
+    times: Array
+    gaps: Array
+    curve: Array
+    model: Array
+    expected: Array
+
+
+def separation(
+    pair: tuple[ChainFall, ...], end_s: float, skew_s: float | None = None
+) -> Separation:
+    """Find Δz against time.
+
+    Parameters
+    ----------
+    pair
+        The chain that strikes, then the free one.
+    end_s
+        Where the model's curve ends.
+    skew_s
+        By how much the free chain left later: then Δz is what it would have been had both been let
+        go together, measured and by the model. `None` for Δz as it fell, measured and by the model.
     """
     nothing = np.empty(0)
     if len(pair) < 2:
-        return nothing, nothing, nothing, nothing
+        return Separation(nothing, nothing, nothing, nothing, nothing)
     impact, free = pair
-    times = times_in = impact.times
-    gaps = nothing
-    if free.times.size > 1 and times.size:
-        inside = (times >= free.times[0]) & (times <= free.times[-1])
-        times_in = times[inside]
-        gaps = np.interp(times_in, free.times, free.heights) - impact.heights[inside]
+    later = skew_s or 0.0
+    delay = free.delay_s if skew_s is None else impact.delay_s
+
+    def model(times: Array, heights: Array) -> Array:
+        if free.model is None:
+            return nothing
+        return free.model.heights(times - delay)[0] - heights
+
+    times, gaps = nothing, nothing
+    if free.times.size > 1 and impact.times.size:
+        at = impact.times + later
+        inside = (at >= free.times[0]) & (at <= free.times[-1])
+        times = impact.times[inside]
+        gaps = np.interp(at[inside], free.times, free.heights) - impact.heights[inside]
     if impact.model is None or free.model is None:
-        return times_in[: gaps.size], gaps, nothing, nothing
+        return Separation(times, gaps, nothing, nothing, nothing)
+    there = impact.model.heights(times - impact.delay_s)[0]
     curve, heights = impact.curve(end_s)
-    model = free.model.heights(curve - impact.delay_s)[0] - heights
-    return times_in[: gaps.size], gaps, curve, model
+    return Separation(times, gaps, curve, model(curve, heights), model(times, there))
 
 
 def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple[Array, Array]]:

@@ -1,10 +1,11 @@
-"""The main screens as SVG, drawn from a recorded session: the same file gives the same pictures."""
+"""All pages as SVG, drawn from a recorded session: the same file gives the same pictures."""
 
 from __future__ import annotations
 
 import asyncio
 import re
 from dataclasses import replace
+from html import unescape
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,6 +14,7 @@ from rig.campaign.machine import Flow
 from rig.files import make_folder
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
+from rig.tui.braille import COLUMNS, ROWS, dots_of
 from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
 from rig.tui.replay import Player, end_of
@@ -20,7 +22,7 @@ from rig.tui.state import DaemonState, state_of
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from textual.pilot import Pilot
@@ -28,7 +30,9 @@ if TYPE_CHECKING:
     from rig.records import Job
     from rig.results.live import SessionView
 
-SIZE = (120, 36)
+SIZES = ((80, 24), (120, 36), (200, 60))
+"""Columns and lines of the terminals that are drawn."""
+THEMES_DRAWN = ("dark", "light")
 _LIVE_SHARE = 0.9
 _FONT = '"DejaVu Sans Mono", "Liberation Mono", Menlo, Consolas, monospace'
 
@@ -95,15 +99,23 @@ class FakeClient(ReconnectingClient):
 
 
 class Screenshot(NamedTuple):
-    """One picture: its name, and the moment it shows."""
+    """One picture: its name, the page, and the moment it shows."""
 
     name: str
+    page: str
     flow: Flow
     state: DaemonState
 
 
-def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
-    """Draw every main screen.
+def draw(
+    session: Path,
+    folder: Path,
+    keys: Mapping[str, str],
+    files: tuple[Path, ...] = (),
+    sizes: Sequence[tuple[int, int]] = SIZES,
+    themes: Sequence[str] = THEMES_DRAWN,
+) -> list[Path]:
+    """Draw every page.
 
     Parameters
     ----------
@@ -113,19 +125,32 @@ def draw(session: Path, folder: Path, keys: Mapping[str, str]) -> list[Path]:
         Made if it is not there.
     keys
         Of every action, by name.
+    files
+        Protocols that the first page offers.
+    sizes
+        Columns and lines of each terminal.
+    themes
+        ``dark``, ``light`` or ``contrast``.
 
     Returns
     -------
     list of Path
-        The files.
+        The files: page, size and theme of each in its name.
     """
-    view = LiveAnalysis(session).read()
+    live = LiveAnalysis(session)
+    view = live.read()
+    if view.lagging:
+        live.fit_jointly(view)
+        view = live.read()
     make_folder(folder)
     written = []
     for shot in screenshots(view):
-        path = folder / f"{shot.name}.svg"
-        path.write_text(asyncio.run(_picture(shot, session, keys)), "utf-8")
-        written.append(path)
+        for size, theme, svg in asyncio.run(
+            _pictures(shot, live, Options(files, session=session), keys, sizes, themes)
+        ):
+            path = folder / f"{shot.name}-{size[0]}x{size[1]}-{theme}.svg"
+            path.write_text(svg, "utf-8")
+            written.append(path)
     return written
 
 
@@ -144,13 +169,15 @@ def screenshots(view: SessionView) -> list[Screenshot]:
     )
     said = view.results[job]
     result = Flow(Stage.RESULT, job, verdict=said.verdict, reasons=said.reasons)
+    nothing = replace(state, sections={**QUIET}, runs=())
     return [
-        Screenshot("device", Flow(Stage.DEVICE), before),
-        Screenshot("run", Flow(Stage.PREPARE, job), before),
-        Screenshot("live", Flow(Stage.LIVE, job), _falling(before, view, job)),
-        Screenshot("result", result, state),
-        Screenshot("session", Flow(Stage.DONE), state),
-        Screenshot("history", Flow(Stage.DONE), state),
+        Screenshot("protocol", "protocol", Flow(), nothing),
+        Screenshot("device", "device", Flow(Stage.DEVICE), before),
+        Screenshot("run", "run", Flow(Stage.PREPARE, job), before),
+        Screenshot("live", "run", Flow(Stage.LIVE, job), _falling(before, view, job)),
+        Screenshot("result", "result", result, state),
+        Screenshot("session", "session", Flow(Stage.DONE), state),
+        Screenshot("history", "history", Flow(Stage.DONE), state),
     ]
 
 
@@ -165,28 +192,55 @@ def _falling(state: DaemonState, view: SessionView, job: Job) -> DaemonState:
     )
 
 
-async def _picture(shot: Screenshot, session: Path, keys: Mapping[str, str]) -> str:
+async def _pictures(
+    shot: Screenshot,
+    live: LiveAnalysis,
+    options: Options,
+    keys: Mapping[str, str],
+    sizes: Sequence[tuple[int, int]],
+    themes: Sequence[str],
+) -> list[tuple[tuple[int, int], str, str]]:
+    """Draw one moment in every size and theme: each with its picture."""
     client = FakeClient(shot.state)
-    app = RigApp(Options(session=session), keys, client)
+    app = RigApp(options, keys, client)
     app.driver.flow = shot.flow
-    async with app.run_test(size=SIZE) as pilot:
-        while app.view is None or app.view.lagging or not app.indicators.known:
-            client.changed = True
-            await pilot.pause()
-        if shot.name == "history":
+    if shot.state.section("session"):
+        app.follower.look_with(live)
+    found = []
+    async with app.run_test(size=sizes[0]) as pilot:
+
+        async def until(true: Callable[[], object]) -> None:
+            while not true() and not app.return_code:  # or it has failed, which is raised then
+                client.changed = True
+                await pilot.pause(0.02)
+
+        if shot.state.section("session"):
+            await until(lambda: app.view is not None and app.indicators.known)
+        if shot.page == "history":
+            assert app.view is not None
             first = app.view.jobs[0]
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
             app.history.player = Player(0, 0.8 * end)
             app.turn("history")
-            while app.page != "history":
-                await pilot.pause()
+        await until(lambda: app.page == shot.page)
         # All edges came at once, which looks like flicker for a while.
-        while len(shot.state.edges) > sum(gate.edges for gate in app.indicators.gates) or any(
-            gate.flickers(now := monotonic()) or not gate.steady(now)
-            for gate in app.indicators.gates
-        ):
-            await pilot.pause(PAUSE_S)
-        return portable(await at_rest(app, pilot, lambda: app.export_screenshot(title="chainrig")))
+        await until(lambda: _all_counted(app, shot) and _quiet(app))
+        for size in sizes:
+            await pilot.resize_terminal(*size)
+            for theme in themes:
+                app.theme = f"rig-{theme}"
+                svg = await at_rest(app, pilot, lambda: app.export_screenshot(title="chainrig"))
+                found.append((size, theme, portable(svg)))
+    return found
+
+
+def _all_counted(app: RigApp, shot: Screenshot) -> bool:
+    return len(shot.state.edges) <= sum(gate.edges for gate in app.indicators.gates)
+
+
+def _quiet(app: RigApp) -> bool:
+    now = monotonic()
+    return all(gate.steady(now) and not gate.flickers(now) for gate in app.indicators.gates)
 
 
 async def at_rest(app: RigApp, pilot: Pilot[None], look: Callable[[], str]) -> str:
@@ -214,9 +268,32 @@ async def at_rest(app: RigApp, pilot: Pilot[None], look: Callable[[], str]) -> s
 
 
 def portable(svg: str) -> str:
-    """Take fonts from the reader's machine instead of from a server."""
+    """Take fonts from the reader's machine instead of from a server, and braille from none."""
     svg = re.sub(r"@font-face\s*\{[^}]*\}", "", svg)
     svg = re.sub(r"font-family:\s*(Fira Code|arial)[^;]*;", f"font-family: {_FONT};", svg)
     svg = svg.replace("<svg ", '<svg xml:space="preserve" ', 1)  # or leading blanks are lost
+    svg = _DOTTED.sub(_dots, svg)
     # Names in it depend on what else this program drew before.
     return re.sub(r"terminal-\d+-", "rig-", svg)
+
+
+_DOTTED = re.compile(
+    r'<text class="(?P<look>[^"]*)" x="(?P<x>[^"]*)" y="(?P<y>[^"]*)" textLength="(?P<width>[^"]*)"'
+    r"[^>]*>(?P<text>[^<]*[\u2801-\u28ff][^<]*)</text>"
+)
+_HEIGHT = 24.4  # of a line in the pictures, of which text stands on the lower end
+_ABOVE = 18.0  # of the place of a text up to the top of its line
+_DOT = 2.6
+
+
+def _dots(found: re.Match[str]) -> str:
+    """Draw the dots of braille: few fonts have them."""
+    text = unescape(found["text"])
+    x, y, wide = float(found["x"]), float(found["y"]), float(found["width"]) / len(text)
+    parts = []
+    for number, letter in enumerate(text):
+        for across, down in dots_of(letter):
+            left = x + (number + (across + 0.5) / COLUMNS) * wide - 0.5 * _DOT
+            top = y - _ABOVE + (down + 0.5) / ROWS * _HEIGHT - 0.5 * _DOT
+            parts.append(f"M{left:.1f} {top:.1f}h{_DOT}v{_DOT}h-{_DOT}z")
+    return f'<path class="{found["look"]}" d="{"".join(parts)}"/>'

@@ -8,7 +8,7 @@ from rig.analysis.result import GOOD
 from rig.measurands import GRAVITY, RELEASE_SKEW, averaged
 from rig.records import Job
 from rig.tui.motion import motions, separation
-from rig.tui.widgets.figure import Picture, Series
+from rig.tui.plotting import Picture, Series
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from rig.results.live import SessionView
     from rig.tui.motion import ChainFall, Table
 
-_MARKS = {"impact": ("•", "primary"), "free": ("+", "secondary")}
+_MARKS = {"impact": ("×", "primary"), "free": ("+", "secondary")}
 _BEFORE_S = 0.02
 _WITH_BARS = 40  # numbers in a chart: the bars of more stand in each other's way
+_MOST = 300  # marks of a chain: more would stand on each other
+_TIME = "t (ms)"
 
 
 def chain_pictures(
@@ -29,8 +31,18 @@ def chain_pictures(
     edges: Table,
     hz: float,
     matches: Mapping[int, int] | None,
+    skew_s: float | None = None,
 ) -> tuple[Picture | None, Picture | None]:
-    """Draw z(t) of each chain and Δz(t), with the model's curves; `None` for what is not there."""
+    """Draw z(t) of each chain and Δz(t), with the model's curves; `None` for what is not there.
+
+    Parameters
+    ----------
+    protocol, run, edges, hz, matches
+        As for `rig.tui.motion.motions`.
+    skew_s
+        What was measured of the release: Δz is then that of chains let go together, or else as it
+        fell; z(t) always is as it fell.
+    """
     if protocol is None or run is None or protocol.gates is None:
         return None, None
     found = motions(protocol, run, edges, hz, matches)
@@ -38,28 +50,56 @@ def chain_pictures(
         return None, None
     end = max((float(one.times[-1]) for one in found if one.times.size), default=0.0)
     end = max(end, _expected_end(found)) + _BEFORE_S
-    series: list[Series] = []
+    series, left = [], []
     for one in found:
         times, heights = one.curve(end)
-        label = "model" if one is found[-1] else ""
-        series.append(Series("line", times * 1e3, heights * 1e2, "accent", label=label))
+        series.append(Series("line", times * 1e3, heights * 1e2, "accent",
+                             label=f"model, {one.role} side"))  # fmt: skip
     for one in reversed(found):  # the struck chain above the free one
         mark, color = _MARKS[one.role]
-        series.append(Series("dots", one.times * 1e3, one.heights * 1e2, color, mark,
+        thin = slice(None, None, 1 + one.times.size // _MOST)
+        times, heights = one.times[thin], one.heights[thin]
+        series.append(Series("dots", times * 1e3, heights * 1e2, color, mark,
                              f"{one.role} side"))  # fmt: skip
-    chains = Picture("z (cm), t (ms)", tuple(series), (0.0, end * 1e3))
+        if one.model is not None and times.size:
+            off = heights - one.model.heights(times - one.delay_s)[0]
+            left.append(Series("dots", times * 1e3, off * 1e3, color, mark))
+    limits = (0.0, end * 1e3)
+    chains = Picture("z (cm) as it fell", _TIME, tuple(series), limits,
+                     residuals=tuple(left), residual_label="less the model (mm)")  # fmt: skip
     if len(found) < 2:
         return chains, None
-    t, gaps, t_model, model = separation(found, end)
+    gap = separation(found, end, skew_s)
+    how = "as it fell" if skew_s is None else "as if let go together"
+    off = gap.gaps - gap.expected if gap.expected.size else gap.expected
     apart = Picture(
-        "Δz (cm), t (ms)",
+        f"Δz (cm) {how}",
+        _TIME,
         (
-            Series("line", t_model * 1e3, model * 1e2, "accent", label="model"),
-            Series("dots", t * 1e3, gaps * 1e2, "success", "●", "measured"),
+            Series("line", gap.curve * 1e3, gap.model * 1e2, "accent", label="model"),
+            Series("dots", gap.times * 1e3, gap.gaps * 1e2, "success", "+", "measured"),
         ),
-        (0.0, end * 1e3),
+        limits,
+        residuals=(Series("dots", gap.times[: off.size] * 1e3, off * 1e3, "success", "+"),),
+        residual_label="less the model (mm)",
     )
     return chains, apart
+
+
+def drop_pictures(
+    view: SessionView, job: Job, edges: Table | None = None
+) -> tuple[Picture | None, Picture | None]:
+    """Draw a recorded drop, or its first `edges`, with rods and skew as the analysis found them."""
+    result, hz = view.results[job], view.scales[job].hz
+    skew = result.quantities.get(RELEASE_SKEW.name)
+    return chain_pictures(
+        view.protocol,
+        view.plan[job.run],
+        view.drops[job].edges if edges is None else edges,
+        hz,
+        result.matches or None,
+        None if skew is None else skew.value,
+    )
 
 
 def _expected_end(found: Sequence[ChainFall]) -> float:
@@ -73,7 +113,7 @@ def incline_pictures(view: SessionView) -> list[Picture]:
     found = []
     runs = [one for one in view.analysis.runs if one.verdict in GOOD]
     for row in averaged():
-        name, scale, title = row.name, row.scale, f"{row.symbol} ({row.unit}), incline (°)"
+        name, scale = row.name, row.scale
         curve = view.curves.get(name)
         if curve is None:
             continue
@@ -82,21 +122,28 @@ def incline_pictures(view: SessionView) -> list[Picture]:
             for one in runs
             if name in one.quantities
         ]
-        means = [
-            (line.incline_deg, line.means[name].value * scale, line.means[name].expanded * scale)
-            for line in view.analysis.summary
-            if name in line.means
-        ]
+        means = [line for line in view.analysis.summary if name in line.means]
+        inclines = [line.incline_deg for line in means]
+        bars = [line.means[name].expanded for line in means]
+        beside = [line for line in means if name in line.predicted]
+        off = [line.means[name].value - line.predicted[name].value for line in beside]
         found.append(
             Picture(
-                title,
+                f"{row.label} ({row.unit})",
+                "incline (°)",
                 (
                     *_model_lines(view.curves, name, scale),
                     Series("dots", [x for x, _ in dots], [y for _, y in dots],
                            "secondary", "·", "runs"),
-                    Series("bars", [x for x, *_ in means], [y for _, y, _ in means],
-                           "primary", "●", "mean ± U", [u for *_, u in means]),
+                    Series("bars", inclines, [line.means[name].value * scale for line in means],
+                           "primary", "●", "mean ± U", [bar * scale for bar in bars]),
                 ),
+                residuals=(
+                    Series("bars", [line.incline_deg for line in beside],
+                           [one * row.fine_scale for one in off], "primary", "●",
+                           errors=[line.means[name].expanded * row.fine_scale for line in beside]),
+                ),
+                residual_label=f"means less the model ({row.fine})",
             )
         )  # fmt: skip
     return found
@@ -132,11 +179,11 @@ def control_pictures(view: SessionView) -> list[Picture]:
         lines = ((0.0, "foreground", ""), (limit, "warning", f"limit ±{limit:g}"),
                  (-limit, "warning", ""))  # fmt: skip
         points = [(one, _point(one.quantities.get(row.name), row.scale)) for one in runs]
-        found.append(_chart(f"{row.label} ({row.unit}), run", view, lines, points))
+        found.append(_chart(f"{row.label} ({row.unit})", view, lines, points))
     points = [(one, _gravity(view, one)) for one in runs]
     if view.gravity or any(point for _, point in points):
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
-        found.append(_chart("g of the free chain (m/s²), run", view, expected, points))
+        found.append(_chart("g of the free chain (m/s²)", view, expected, points))
     return found
 
 
@@ -173,7 +220,7 @@ def _chart(
                    color, mark, label if bars else label.removesuffix(" ± U"),
                    [u for *_, u in some] if bars else ())
         )  # fmt: skip
-    return Picture(title, tuple(series), ends, x_ticks=_whole(len(view.plan)))
+    return Picture(title, "run", tuple(series), ends, x_ticks=_whole(len(view.plan)))
 
 
 def _whole(count: int) -> list[float]:

@@ -11,7 +11,7 @@ from rig.measurands import SEPARATION, SPEED, averaged
 from rig.predictions import predict_incline, predicted_parts, predicted_run
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.motion import model_fall
-from rig.tui.widgets.figure import Picture, Series
+from rig.tui.plotting import Picture, Series
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, Run
@@ -97,4 +97,4 @@ def speed_picture(view: SessionView, job: Job) -> Picture | None:
     if measured is not None:
         series.append(Series("bars", [end * 1e3], [measured.value], "primary", "●", "measured ± U",
                              [measured.expanded]))  # fmt: skip
-    return Picture("V (m/s), t (ms)", tuple(series), (0.0, 1e3 * (end + _BESIDE_S)))
+    return Picture("V (m/s)", "t (ms)", tuple(series), (0.0, 1e3 * (end + _BESIDE_S)))

@@ -51,8 +51,8 @@ def test_what_is_learned_is_what_rig_analyze_says(recorded):
 def test_both_control_charts_are_there(recorded):
     found = LiveAnalysis(recorded).read()
     skew, gravity = control_pictures(found)
-    assert "skew" in skew.title
-    assert "g of the free chain" in gravity.title
+    assert "skew" in skew.y_label
+    assert "g of the free chain" in gravity.y_label
     for chart in (skew, gravity):
         points = [x for one in chart.series if one.kind == "bars" for x in one.x]
         assert sorted(points) == [1.0, 2.0, 3.0, 4.0]

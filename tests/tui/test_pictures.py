@@ -14,11 +14,12 @@ def test_the_same_session_gives_the_same_pictures(tmp_path, fence):
     protocol.write_text(fence.replace("TITLE", "A fence"), "utf-8")
     done = rig("run", protocol, "--port", "sim://", "--session", session, "--yes")
     assert done.returncode == 0, done.stderr
-    first = draw(session, tmp_path / "one", KEYS)
-    assert [path.stem for path in first] == [
-        "device", "run", "live", "result", "session", "history"
+    how = (protocol,), [(80, 24)], ["light"]
+    first = draw(session, tmp_path / "one", KEYS, *how)
+    assert [path.stem.removesuffix("-80x24-light") for path in first] == [
+        "protocol", "device", "run", "live", "result", "session", "history"
     ]  # fmt: skip
-    for path, other in zip(first, draw(session, tmp_path / "two", KEYS), strict=True):
+    for path, other in zip(first, draw(session, tmp_path / "two", KEYS, *how), strict=True):
         text = path.read_text("utf-8")
         assert text == other.read_text("utf-8"), path.stem
         assert "SIMULATED" in text

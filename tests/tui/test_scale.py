@@ -24,7 +24,7 @@ def test_both_chains_stand_where_they_were_measured_and_the_bracket_is_their_dif
     time_s = float(falls[0].times[-1])
     lit = Indicators.of((0, 8)).seen(1 << 8, 0.0)
     found = drawing(scene, run, falls, lit, time_s)
-    gaps = separation(falls, time_s)[1]
+    gaps = separation(falls, time_s).gaps
     assert found.apart_m == pytest.approx(gaps[-1], abs=1e-6)
     by_color = {one.color: [] for one in found.strokes}
     for one in found.strokes:
@@ -62,6 +62,9 @@ def test_a_film_shows_each_rod_as_it_lies_and_the_strings_that_are_slack():
 def test_a_dot_is_as_high_as_it_is_wide_and_all_dots_are_used():
     box = [Stroke(0, 0, 1, 0, "primary"), Stroke(1, 0, 1, 1, "primary"),
            Stroke(0, 1, 1, 1, "primary"), Stroke(0, 0, 0, 1, "primary")]  # fmt: skip
-    *lines, words = painted(Drawing(tuple(box), 1.0, 0.0, 1.0, 0.123), 6, 4).plain.split("\n")
-    assert lines == ["⡏⠉⠉⠉⠉⢹", "⡇⠀⠀⠀⠀⢸", "⣇⣀⣀⣀⣀⣸"]
+    *lines, words, _ = [
+        "".join(span.text for span in row)
+        for row in painted(Drawing(tuple(box), 1.0, 0.0, 1.0, 0.123), 6, 5)
+    ]
+    assert lines == ["⡏⠉⠉⠉⠉⢹", "⡇    ⢸", "⣇⣀⣀⣀⣀⣸"]
     assert words.startswith("Δz 12.3 cm")

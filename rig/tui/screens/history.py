@@ -9,7 +9,7 @@ from textual.content import Content
 
 from rig.films import read_films
 from rig.tui.motion import motions
-from rig.tui.plots import chain_pictures
+from rig.tui.plots import drop_pictures
 from rig.tui.replay import Player, end_of, indicators_at, until
 from rig.tui.scale import drawing
 from rig.tui.screens.page import Page
@@ -137,11 +137,11 @@ class HistoryPage(Page):
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
         key = (view.path, job, hz, len(seen))
         if z.wants(key):
-            matches = view.results[job].matches or None
-            run = view.plan[job.run]
-            first, second = chain_pictures(view.protocol, run, seen, hz, matches)
+            first, second = drop_pictures(view, job, seen)
             z.show(first, key)
             dz.show(second, key)
+        for figure in (z, dz):
+            figure.point_at(self.player.time_s * 1e3)
         if self._told != (view.path, view.reading, job):
             self._told = view.path, view.reading, job
             self.query_one("#numbers", Words).say_content(number_table(view, job, wide=False))

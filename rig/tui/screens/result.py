@@ -11,7 +11,7 @@ from rig.analysis.result import normalized_error
 from rig.measurands import RELEASE_SKEW, listed
 from rig.predictions import predicted_parts, predicted_run
 from rig.report.numbers import fixed, plus_minus
-from rig.tui.plots import chain_pictures
+from rig.tui.plots import drop_pictures
 from rig.tui.screens.page import Page
 from rig.tui.why import speed_picture, stated, why_words
 from rig.tui.widgets.banner import Banner
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.model import Model
-    from rig.tui.widgets.figure import Picture
 
 
 class ResultPage(Page):
@@ -73,13 +72,6 @@ class ResultPage(Page):
             first, second = drop_pictures(view, job)
             z.show(speed_picture(view, job) or first, key)
             dz.show(second, key)
-
-
-def drop_pictures(view: SessionView, job: Job) -> tuple[Picture | None, Picture | None]:
-    """Draw a recorded drop, with the rods as the analysis found them."""
-    matches = view.results[job].matches or None
-    run, edges = view.plan[job.run], view.drops[job].edges
-    return chain_pictures(view.protocol, run, edges, view.scales[job].hz, matches)
 
 
 def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:

@@ -75,10 +75,10 @@ class SessionPage(Page):
             for figure in figures:
                 figure.show(None)
             return
-        key = (view.path, view.reading, self._chart)
+        low, wide = self.screen.has_class("-low"), self.screen.has_class("-wide")
+        key = (view.path, view.reading, self._chart, low, wide)
         if not any(figure.wants(key) for figure in figures):
             return
-        low, wide = self.screen.has_class("-low"), self.screen.has_class("-wide")
         means, charts = incline_pictures(view), control_pictures(view)
         turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
         shown = {

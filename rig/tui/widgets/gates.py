@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from rich.segment import Segment
-from textual.strip import Strip
-from textual.widget import Widget
+from rig.tui.braille import Span
+from rig.tui.widgets.spans import SpanView
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from textual.geometry import Size
 
     from rig.protocol.protocol import Gate, Protocol
     from rig.tui.indicators import Indicator, Indicators
@@ -22,61 +19,18 @@ _MOST = 8
 """Indicators above each other: more would not fit a low screen."""
 
 
-class Span(NamedTuple):
-    """Text and its component class; none for the board's own look."""
+class GateBoard(SpanView):
+    """All gates, one side beside the other."""
 
-    text: str
-    look: str = ""
-
-
-class GateBoard(Widget):
-    """All gates, one side beside the other.
-
-    Every indicator changes at every tick of a drop: lines are made of a few parts each, without the
-    wrapping and styling that other text goes through.
-    """
-
-    COMPONENT_CLASSES = {"gate--title", "gate--unknown", "gate--blocked", "gate--clear"}  # noqa: RUF012
-    DEFAULT_CSS = """
-    GateBoard { height: auto; padding: 0 1; }
-    GateBoard > .gate--title { text-style: bold; }
-    GateBoard > .gate--unknown { color: $foreground 70%; }
-    GateBoard > .gate--blocked { color: $warning; text-style: bold; }
-    GateBoard > .gate--clear { color: $success; }
-    """
-
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
-        super().__init__(id=id)
-        self._rows: list[list[Span]] = []
+    DEFAULT_CSS = "GateBoard { height: auto; padding: 0 1; }"
 
     def show(self, protocol: Protocol | None, indicators: Indicators, now_s: float) -> None:
         """Draw what the gates do now."""
-        self._take(board(protocol, indicators, now_s, self.size.width or 78))
+        self.take(board(protocol, indicators, now_s, self.size.width or 78))
 
     def clear(self) -> None:
         """Draw nothing."""
-        self._take([])
-
-    def _take(self, rows: list[list[Span]]) -> None:
-        if rows != self._rows:
-            higher = len(rows) != len(self._rows)
-            self._rows = rows
-            self.refresh(layout=higher)
-
-    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """As many lines as there are."""
-        del container, viewport, width
-        return len(self._rows)
-
-    def render_line(self, y: int) -> Strip:
-        """One line."""
-        plain, width = self.rich_style, self.size.width
-        parts = self._rows[y] if y < len(self._rows) else []
-        line = [
-            Segment(text, self.get_component_rich_style(look) if look else plain)
-            for text, look in parts
-        ]
-        return Strip(line).adjust_cell_length(width, plain)
+        self.take([])
 
 
 def board(
@@ -93,7 +47,7 @@ def board(
             title = "" if begin else f"{side} side"
             columns.append((title, gates[begin : begin + _MOST]))
     wide = width // len(columns)
-    rows = [[Span("".join(title.ljust(wide) for title, _ in columns), "gate--title")]]
+    rows = [[Span("".join(title.ljust(wide) for title, _ in columns), bold=True)]]
     for at in range(max(len(gates) for _, gates in columns)):
         row: list[Span] = []
         for _, gates in columns:
@@ -110,11 +64,11 @@ def _indicator(
     gate: Gate, indicator: Indicator | None, indicators: Indicators, now_s: float, width: int
 ) -> list[Span]:
     if indicator is None or not indicators.known:
-        symbol, look, word = "?", "gate--unknown", "unknown"
+        symbol, color, word = "?", "", "unknown"
     elif indicator.blocked:
-        symbol, look, word = "●", "gate--blocked", "BLOCKED"
+        symbol, color, word = "●", "warning", "BLOCKED"
     else:
-        symbol, look, word = "○", "gate--clear", "clear"
+        symbol, color, word = "○", "success", "clear"
     edges = 0 if indicator is None else indicator.edges
     quiet = ""
     if indicator is not None and indicators.known:
@@ -130,7 +84,7 @@ def _indicator(
         text = f" {where} ch{gate.channel:<2} {word:7}{edges:4} {quiet}"
     else:
         text = f" {where} {word:7}{edges:4}"
-    return [Span(symbol, look), Span(text[: width - 2].ljust(width - 1))]
+    return [Span(symbol, color, bold=True), Span(text[: width - 2].ljust(width - 1))]
 
 
 def named(gates: Sequence[Gate], channel: int) -> str:

@@ -1,0 +1,134 @@
+"""Drawing in braille: a character is 2 × 4 dots, all of one colour."""
+
+from __future__ import annotations
+
+import math
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+COLUMNS, ROWS = 2, 4
+"""Dots of one character."""
+BLANK = 0x2800
+_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+
+
+class Span(NamedTuple):
+    """Text in a colour of the theme; empty for the ordinary one."""
+
+    text: str
+    color: str = ""
+    bold: bool = False
+
+
+class Sheet:
+    """Characters to draw on; where several colours meet in one, the last of `colors` is taken.
+
+    Parameters
+    ----------
+    width, height
+        In characters.
+    colors
+        Of the theme, by name; an ink is a place in it.
+    """
+
+    def __init__(self, width: int, height: int, colors: Sequence[str]) -> None:
+        self.width, self.height = width, height
+        self._colors = colors
+        self._bits = np.zeros((height, width), dtype=np.int64)
+        self._inks = np.full((height, width), -1)  # none
+        self._words: dict[int, list[tuple[int, Span]]] = {}
+
+    def strokes(self, ends: NDArray[np.float64], inks: ArrayLike) -> None:
+        """Draw straight lines.
+
+        Parameters
+        ----------
+        ends
+            In dots from the top left, x before y; shape ``(lines, 2, 2)``. What is not finite is
+            left out, and what lies outside is cut off.
+        inks
+            One, or one a line.
+        """
+        inks = np.broadcast_to(np.asarray(inks), len(ends))
+        whole = np.isfinite(ends).all(axis=(1, 2))
+        ends, inks = ends[whole], inks[whole]
+        ways = ends[:, 1] - ends[:, 0]
+        share = np.linspace(0.0, 1.0, 2 + math.ceil(np.abs(ways).max(initial=0.0)))
+        dots = ends[:, None, 0] + share[:, None] * ways[:, None]
+        self.dots(dots.reshape(-1, 2), np.repeat(inks, share.size))
+
+    def dots(self, places: NDArray[np.float64], inks: ArrayLike) -> None:
+        """Set dots.
+
+        Parameters
+        ----------
+        places
+            In dots from the top left, x before y; shape ``(dots, 2)``.
+        inks
+            One, or one a dot.
+        """
+        inks = np.broadcast_to(np.asarray(inks), len(places))
+        there = np.rint(places)
+        inside = ((there >= 0) & (there < [self.width * COLUMNS, self.height * ROWS])).all(axis=1)
+        x, y = there[inside].astype(np.intp).T
+        at = y // ROWS, x // COLUMNS
+        np.bitwise_or.at(self._bits, at, _BITS[y % ROWS, x % COLUMNS])
+        np.maximum.at(self._inks, at, inks[inside])
+
+    def free(self, row: int, column: int, length: int) -> bool:
+        """Whether nothing is drawn or written in these characters, all of them on the sheet."""
+        inside = 0 <= row < self.height and column >= 0 and column + length <= self.width
+        if not inside or self._bits[row, column : column + length].any():
+            return False
+        return all(
+            column + length <= begin or begin + len(span.text) <= column
+            for begin, span in self._words.get(row, ())
+        )
+
+    def write(self, row: int, column: int, span: Span) -> None:
+        """Write over what is drawn there."""
+        self._words.setdefault(row, []).append((column, span))
+
+    def rows(self) -> list[list[Span]]:
+        """Everything, a list of spans a line of characters."""
+        return [self._row(number) for number in range(self.height)]
+
+    def _row(self, number: int) -> list[Span]:
+        spans, begin = [], 0
+        for column, span in sorted(self._words.get(number, ())):
+            spans += [*self._drawn(number, begin, column), span]
+            begin = column + len(span.text)
+        return [*spans, *self._drawn(number, begin, self.width)]
+
+    def _drawn(self, number: int, begin: int, end: int) -> list[Span]:
+        cells = zip(
+            self._inks[number, begin:end].tolist(),
+            self._bits[number, begin:end].tolist(),
+            strict=True,
+        )
+        return [
+            Span("".join(_character(bits) for _, bits in run), (*self._colors, "")[ink])
+            for ink, run in groupby(cells, key=itemgetter(0))
+        ]
+
+
+def _character(bits: int) -> str:
+    return chr(BLANK + bits) if bits else " "  # which every font has
+
+
+def dots_of(letter: str) -> list[tuple[int, int]]:
+    """List the dots of a character, column before row; none of what is no braille."""
+    bits = ord(letter) - BLANK
+    if not 0 < bits < 1 << COLUMNS * ROWS:
+        return []
+    return [
+        (x, y) for y, row in enumerate(_BITS.tolist()) for x, bit in enumerate(row) if bits & bit
+    ]
