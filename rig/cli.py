@@ -171,14 +171,26 @@ def _parser() -> argparse.ArgumentParser:
     imported = command("import", "make a session from the edges of another timer", "import_edges")
     imported.add_argument(
         "events",
-        metavar="EVENTS.csv",
-        help="columns run,channel,time_s,state, or a "
-        "data logger's table of times, with or without states",
+        metavar="EVENTS",
+        help="columns run,channel,time_s,state; any other timer's table of times; samples of a "
+        "logic analyser or an oscilloscope; a value change dump",
     )
     imported.add_argument("--protocol", required=True, metavar="FILE", help="what was dropped")
-    imported.add_argument("--session", required=True, metavar="FILE", help="the new session")
+    imported.add_argument("--session", metavar="FILE", help="the new session")
     imported.add_argument(
-        "--channel", type=int, metavar="N", help="of the gate that a data logger's times are of"
+        "--dry-run", action="store_true", help="say what is understood, and make nothing"
+    )
+    imported.add_argument(
+        "--channel", type=int, metavar="N", help="of the gate that all times of a file are of"
+    )
+    imported.add_argument(
+        "--map", metavar="D0=2,D1=5", help="which input of the file is the gate at which channel"
+    )
+    imported.add_argument(
+        "--unit", choices=("s", "ms", "us", "ns"), help="of times, where the file does not say"
+    )
+    imported.add_argument(
+        "--dark", choices=("high", "low"), help="level of a signal while its beam is blocked"
     )
     imported.add_argument(
         "--clock-uncertainty",

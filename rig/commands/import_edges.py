@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import math
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,38 +14,42 @@ from rig.errors import InputError
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
-from rig.session.edges_csv import read_edges
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.session.timer_csv import read_timer
-from rig.session.timer_table import is_logger_table
+from rig.timers.edges_csv import read_edges
+from rig.timers.timer_file import drops_of, is_edge_file, label_number, read_timer_file
 from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.protocol.protocol import Gate, Protocol
     from rig.records import Drop
+    from rig.timers.timer_file import TimerFile
 
 
 def main(arguments: Namespace) -> int:
     """Make a session from an edge file."""
     protocol = reader.read(arguments.protocol)
-    exported = is_logger_table(arguments.events)
-    if exported:
-        gate, bars = _beam(protocol, arguments.channel)
-        drops = read_timer(arguments.events, gate.channel, bars)
-    else:
-        drops = read_edges(arguments.events)
-    _fits(protocol, drops, arguments.events)
     timer: dict[str, object] = {
         "source": "imported edges",
         "file": Path(arguments.events).name,
-        "sha256": hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest(),
     }
-    if exported:
-        timer["beams"] = [gate.channel]
+    if is_edge_file(arguments.events):
+        drops = read_edges(arguments.events)
+        said = ["the project's own format: run,channel,time_s,state"]
+    else:
+        drops, channels, said = _understood(protocol, arguments)
+        timer["beams"] = sorted(set(channels.values()))
+    _fits(protocol, drops, arguments.events)
+    edges = sum(len(drop.edges) for drop in drops)
+    if arguments.dry_run:
+        print("\n".join([*said, *_told(drops)]))
+        return 0
+    if arguments.session is None:
+        raise InputError("no session is named", "--session FILE, or --dry-run to look first")
+    timer["sha256"] = hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest()
     if arguments.clock_uncertainty is not None:
         timer["clock_u"] = _relative(arguments.clock_uncertainty)
     now_ns = SystemClock().now_ns()
@@ -58,17 +64,86 @@ def main(arguments: Namespace) -> int:
         for drop in drops:
             session.add_drop(drop, host_ns=None, provenance=Path(arguments.events).name)
             session.add_state(drop.run, drop.attempt, RunState.RECORDED, now_ns)
-    edges = sum(len(drop.edges) for drop in drops)
     say(f"{edges} edges of {len(drops)} runs → {arguments.session}")
     return 0
 
 
-def _beam(protocol: Protocol, channel: int | None) -> tuple[Gate, int]:
-    """Which gate a data logger's beam was, and how many rods or bars pass it."""
+def _understood(
+    protocol: Protocol, arguments: Namespace
+) -> tuple[list[Drop], dict[str, int], list[str]]:
+    """Drops of another timer's file, which gate each input is, and what was supposed."""
+    found = read_timer_file(arguments.events, arguments.unit)
+    channels = _channels(protocol, found, arguments)
+    bars = max(one.chain.rods for one in protocol.chains.values())
+    drops = drops_of(found, channels, bars, arguments.dark)
+    said = [found.kind, *(f"  {name}: {what}" for name, what in found.columns.items())]
+    if found.period_s:
+        u = found.period_s / math.sqrt(12.0)
+        found.notes.append(
+            f"sampled every {found.period_s * 1e6:.4g} µs: an edge is known to {u * 1e6:.3g} µs at "
+            "best; state that as priors: {jitter: ...} in the protocol if it is more than 2 µs"
+        )
+    idle = [label for label in found.labels if label not in channels]
+    if idle:
+        found.notes.append(f"inputs that are no gate: {', '.join(idle)}; see --map")
+    for note in found.notes:
+        say(note)
+    said += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
+    return drops, channels, said
+
+
+def _told(drops: Sequence[Drop]) -> Iterator[str]:
+    """Describe what would be imported, a line a run."""
+    for drop in drops:
+        by_channel = Counter(edge.channel for edge in drop.edges)
+        each = ", ".join(f"{channel}: {n}" for channel, n in sorted(by_channel.items()))
+        span = (drop.edges[-1].tick - drop.edges[0].tick) / drop.tick_hz
+        yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {each}"
+
+
+def _channels(protocol: Protocol, found: TimerFile, arguments: Namespace) -> dict[str, int]:
+    """Which gate each of the file's inputs is."""
+    gates = [gate.channel for gate in protocol.gates.gates] if protocol.gates else []
+    labels = found.labels
+    if not labels:
+        return {"": _beam(protocol, arguments.channel).channel}
+    if arguments.map is not None:
+        return _mapped(arguments.map, labels, gates)
+    if len(labels) == 1 and (arguments.channel is not None or len(gates) == 1):
+        return {labels[0]: _beam(protocol, arguments.channel).channel}
+    channels = {one: n for one in labels if (n := label_number(one)) in gates and n is not None}
+    if not channels or len(set(channels.values())) < len(channels):
+        raise InputError(
+            f"{arguments.events}: its inputs {', '.join(labels)} are not the gates' channels "
+            f"{', '.join(map(str, gates))}",
+            f"say which is which: --map {labels[0]}={gates[0] if gates else 0},…",
+        )
+    return channels
+
+
+def _mapped(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[str, int]:
+    found = {}
+    for part in text.split(","):
+        label, _, channel = (one.strip() for one in part.rpartition("="))
+        if label not in labels:
+            raise InputError(
+                f"--map: the file has no input {label!r}", f"it has {', '.join(labels)}"
+            )
+        if not channel.isdecimal() or int(channel) not in gates:
+            raise InputError(
+                f"--map: {channel!r} is no gate's channel",
+                f"the protocol's gates are at {', '.join(map(str, gates))}",
+            )
+        found[label] = int(channel)
+    return found
+
+
+def _beam(protocol: Protocol, channel: int | None) -> Gate:
+    """Which gate the beam of a file was that has only one."""
     gates = protocol.gates.gates if protocol.gates else ()
     named = [gate for gate in gates if channel is None or gate.channel == channel]
     if len(named) == 1:
-        return named[0], max(one.chain.rods for one in protocol.chains.values())
+        return named[0]
     known = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
     wrong = "the file does not say which gate its times are of"
     if channel is not None:

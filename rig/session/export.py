@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
-from rig.session.edges_csv import write_edges
 from rig.text_table import csv_text
+from rig.timers.edges_csv import write_edges
 
 if TYPE_CHECKING:
     import os

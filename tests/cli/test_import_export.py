@@ -191,7 +191,8 @@ def test_every_fault_of_a_csv_file_is_located(bring, tmp_path):
     [
         ("", ":1:1: no edges in this file"),
         ("run,channel,time_s,state\n", ":1:1: no edges in this file"),
-        ("time,voltage\n0,1\n", ":1:1: the header must be run,channel,time_s,state"),
+        ("run,channel,time,state\n1,0,1,1\n", ":1:1: the header must be run,channel,time_s,state"),
+        ("time,voltage\n0,1\n", ":1:1: nothing passes in this file"),
         ('run,channel,time_s,state\n1,0,"0.1\n', ":2:1: "),
     ],
 )

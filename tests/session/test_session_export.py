@@ -8,10 +8,10 @@ import pytest
 
 from rig.errors import InputError
 from rig.records import ClockSample, Drop, Edge
-from rig.session.edges_csv import read_edges
 from rig.session.export import export_csv, flatten
 from rig.session.schema import RunState
 from rig.session.store import Session
+from rig.timers.edges_csv import read_edges
 
 ANALYSIS: dict[str, Any] = {
     "runs": [

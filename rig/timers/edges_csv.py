@@ -17,7 +17,7 @@ from rig.boards import GATES
 from rig.errors import InputError
 from rig.files import write_atomic
 from rig.records import Drop, Edge
-from rig.session.csv_lines import Lines, ProblemList
+from rig.timers.problems import Lines, ProblemList
 
 if TYPE_CHECKING:
     import os

@@ -65,14 +65,14 @@ class ProblemList:
     """Faults of one file; beyond the first `MAX_PROBLEMS` they are only counted."""
 
     def __init__(self, file: str) -> None:
-        self._file = file
+        self.file = file
         self._problems: list[Problem] = []
         self._more = 0
 
     def add(self, line: int, column: int, key: str, message: str) -> None:
         """Note a fault."""
         if len(self._problems) < MAX_PROBLEMS:
-            self._problems.append(Problem(self._file, line, column, key, message))
+            self._problems.append(Problem(self.file, line, column, key, message))
         else:
             self._more += 1
 
@@ -93,5 +93,5 @@ class ProblemList:
             return
         message = "\n".join(map(str, self._problems))
         if self._more:
-            message += f"\n{self._file}: and {self._more} more problems"
+            message += f"\n{self.file}: and {self._more} more problems"
         raise InputError(message, hint, problems=self._problems)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError, Problem
 from rig.records import Drop, Edge
-from rig.session import edges_csv
-from rig.session.edges_csv import TICK_HZ, read_edges, write_edges
+from rig.timers import edges_csv
+from rig.timers.edges_csv import TICK_HZ, read_edges, write_edges
 
 HEADER = "run,channel,time_s,state\n"
 

@@ -1,0 +1,447 @@
+"""What each column of a timer's table is: by its heading, by its unit, and by its values."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from rig.timers.table import BLOCKED, CLEAR, FALLING, NO_LEVEL, NUMBER, RISING, is_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.timers.problems import ProblemList
+    from rig.timers.table import Row, RowBlock, TableCell
+
+UNITS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sekunden", "secondes", "secondi",
+                     "segundos"), 0),
+    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds", "millisekunden"), 3),
+    **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microsecond", "microseconds",
+                     "mikrosekunden"), 6),
+    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 9),
+}  # fmt: skip
+"""Decimal power from seconds, by what a heading or a row of units says."""
+
+_UNIT = re.compile(r"[\[(]\s*([^\W\d_]+)\s*[\])]|/\s*([^\W\d_]+)\s*$|[_ ]([^\W\d_]+)\s*$")
+_RUN = re.compile(r"\brun\s*#?\s*[0-9]+|\bset\s*[0-9]+", re.IGNORECASE)
+
+_I = re.IGNORECASE
+_STATE = re.compile(r"state|status|blocked|zustand|[ée]tat|estado|\bstato\b", _I)
+_DURATION = re.compile(
+    r"interval|period|dur[aeé]|delta|Δ|dauer|differ|\blap\b|\bhalf\b|"
+    r"(?:time|zeit|tempo)\s+(?:in|between|btw)|(?:gate|pulse)\s+time", _I)  # fmt: skip
+_TIME = re.compile(
+    r"(?<![a-z])(?:times?|zeit|zeiten|temps|tiempo|tempo|tempi|tijd|tid|time ?stamps?)(?![a-z])|"
+    r"^t$|^t[\s_/(\[0-9]|^(?:micros|millis)\b", _I)  # fmt: skip
+_NUMBERED_RUN = re.compile(r"^(?:run|trial|versuch|lauf|drop|prova|essai|set)\b", _I)
+_EDGE = re.compile(r"\bedge|flanke|\bkante|transition|slope|polarity|fronte\b|^level$", _I)
+_VOLTS = re.compile(r"volt|[\[(]\s*m?V\s*[\])]|spannung|tension|potential", _I)
+_INPUT = re.compile(
+    r"^(?:d|ch|chan|channel|digital|pin|gate|input|in|beam|sensor|di|dio|kanal|logic)?"
+    r"[\s_#:-]*([0-9]+)$", _I)  # fmt: skip
+_CHANNEL = re.compile(
+    r"channel|kanal|\bpin\b|(?:photo)?gate|\bbeam|\binput\b|sensor|\bport\b|canale|\bvoie\b|"
+    r"lichtschranke|barri[eè]r|fotocellula|\bch\b", _I)  # fmt: skip
+_COUNTER = re.compile(r"event|ereignis|index|count|^n$|^nr\b|^no\b|^#$|number|sample|^i$", _I)
+_DERIVED = re.compile(
+    r"dist|pos|vel|speed|accel|height|angle|weg|strecke|geschwindigkeit|omega|^v[a-z]?$|^a[a-z]?$|"
+    r"^[dsxyz]$|^[xyz]\b|latitude|error|note|remark|comment", _I)  # fmt: skip
+_WHOLE = re.compile(r"[0-9]{1,4}")
+_NAME = re.compile(r"[A-Za-z_]+[ _-]?[0-9]+")
+_STATES = (BLOCKED | CLEAR) - RISING - FALLING
+_WORTH = 200  # rows that are looked at
+_SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
+_SAID = {
+    "state": "states, blocked or clear",
+    "duration": "durations, not used",
+    "time": "times",
+    "time of an input": "times",
+    "edge": "edges, up or down",
+    "volts": "volts",
+    "level": "levels of an input",
+    "run": "run",
+    "channel": "which gate",
+    "counter": "counts rows, not used",
+    "other": "not used",
+}
+
+
+@dataclass(slots=True)
+class TimeColumn:
+    """Times of one run, or of all of them.
+
+    Attributes
+    ----------
+    at
+        Which column, from 0.
+    power
+        Decimal power from seconds.
+    state
+        The column of states that belongs to it.
+    label
+        The input that all of them are of; empty where other columns say that.
+    """
+
+    at: int
+    power: int
+    state: int | None = None
+    label: str = ""
+
+
+@dataclass(slots=True)
+class Columns:
+    """What the columns of a block are; the numbers are columns from 0.
+
+    Attributes
+    ----------
+    times
+        One, or one a run where runs stand side by side.
+    states
+        Say whether the beam is blocked, and belong to the only column of times.
+    edge
+        Which way a signal went, which is not yet whether the beam is blocked.
+    channel, run
+        Which gate and which run a row is of.
+    levels
+        Samples of inputs, by the name of the input: 0 and 1.
+    volts
+        Samples in volts, by heading.
+    unused
+        Headings of all others.
+    derived
+        Whether places or speeds stand beside the times.
+    said
+        What each column was taken for, in words, by its heading or number.
+    """
+
+    times: list[TimeColumn] = field(default_factory=list)
+    edge: int | None = None
+    channel: int | None = None
+    run: int | None = None
+    levels: dict[int, str] = field(default_factory=dict)
+    volts: dict[int, str] = field(default_factory=dict)
+    unused: list[str] = field(default_factory=list)
+    derived: bool = False
+    said: dict[str, str] = field(default_factory=dict)
+
+
+def columns_of(block: RowBlock, separator: str, unit: str | None, problems: ProblemList) -> Columns:
+    """Find out what the columns of a block are.
+
+    Parameters
+    ----------
+    unit
+        Of the times where the file does not say, a key of `UNITS`.
+    problems
+        Where it is noted, at its place, if that cannot be found out.
+    """
+    width = max(len(row.cells) for row in block.rows[:_WORTH])
+    values = [_values(block, n) for n in range(width)]
+    heading = _heading(block, width)
+    if heading is None:
+        return _by_values(block, values, separator, unit, problems)
+    return _by_heading(block, heading, values, separator, unit, problems)
+
+
+def _values(block: RowBlock, n: int) -> list[str]:
+    cells = (row.cells[n].text for row in block.rows[:_WORTH] if n < len(row.cells))
+    return [text for text in cells if text]
+
+
+def _heading(block: RowBlock, width: int) -> Row | None:
+    """The row with most cells that are known; below it may stand symbols and units."""
+
+    def known(row: Row) -> int:
+        return sum(
+            any(one.search(text) for one in (_TIME, _STATE, _VOLTS, _CHANNEL, _EDGE, _INPUT))
+            for text in row.texts
+        )
+
+    rows = [row for row in block.headings if len(row.cells) > 1 or width == 1]
+    named = [row for row in rows if known(row)]
+    return max(named, key=known) if named else None
+
+
+def _by_heading(
+    block: RowBlock,
+    heading: Row,
+    values: Sequence[list[str]],
+    separator: str,
+    unit: str | None,
+    problems: ProblemList,
+) -> Columns:
+    found = Columns()
+    durations = []
+    for n, cell in enumerate(heading.cells):
+        text = cell.text
+        here = values[n] if n < len(values) else []
+        kind = _kind(text, here)
+        said = _SAID[kind]
+        if kind == "state" and not _STATE.search(text):
+            heading.cells[n] = cell._replace(text=f"{text} state")
+        elif kind == "duration":
+            durations.append(cell)
+        elif kind in {"time", "time of an input"}:
+            power = _power(block, heading, n, here, unit, problems)
+            label = "" if kind == "time" else text
+            found.times.append(TimeColumn(n, power, label=label))
+            said = f"times in {_SYMBOLS[power]}"
+        elif kind == "volts":
+            found.volts[n] = text
+        elif kind == "level":
+            found.levels[n] = text
+        elif kind in {"edge", "channel", "run"}:
+            setattr(found, kind, n)
+        elif kind == "other" and (text or here):
+            found.unused.append(text or f"column {n + 1}")
+            _check_unused(heading.line, cell, here, problems)
+        if text or here:
+            found.said[text or f"column {n + 1}"] = said
+    found.derived = any(_DERIVED.search(name) for name in found.unused)
+    _pair_states(found, heading)
+    _check_gate(found, heading, values, problems)
+    _one_clock(found, block, separator)
+    if not (found.times or found.levels or found.volts):
+        if durations:
+            problems.add(
+                heading.line, durations[0].column, "",
+                f"{durations[0].text!r:.40} are durations: wanted are the times of passages",
+            )  # fmt: skip
+        else:
+            problems.add(
+                heading.line, heading.cells[0].column, "", "no column of this heading is a time"
+            )
+    return found
+
+
+def _check_unused(line: int, cell: TableCell, here: Sequence[str], problems: ProblemList) -> None:
+    """Leave nothing out that may say what an edge is of."""
+    if not _DERIVED.search(cell.text) and _few_whole(here):
+        problems.add(
+            line, cell.column, cell.text,
+            f"{cell.text!r:.40} might say which gate or run a row is of, or its state; name it "
+            "channel, run or state, or leave it out",
+        )  # fmt: skip
+
+
+def _check_gate(
+    found: Columns, heading: Row, values: Sequence[list[str]], problems: ProblemList
+) -> None:
+    """Do not guess whether a lone column of 0 and 1 is a gate's number or its state."""
+    n = found.channel
+    stated = found.edge is not None or any(one.state is not None for one in found.times)
+    if n is not None and not stated and set(values[n]) <= {"0", "1"}:
+        cell = heading.cells[n]
+        problems.add(
+            heading.line, cell.column, cell.text,
+            f"{cell.text!r:.40} may be a gate's number or its state; name it channel or state",
+        )  # fmt: skip
+
+
+def _kind(text: str, here: Sequence[str]) -> str:
+    """What a column is, by its heading and its values."""
+    levels = _levels(here)
+    match = _UNIT.search(text)
+    timed = match is not None and (match[1] or "").lower() in UNITS
+    by_heading = (
+        ("state", _STATE, True),
+        ("duration", _DURATION, True),
+        ("time", _TIME, True),
+        ("time of an input", _CHANNEL, timed and not levels),
+        ("edge", _EDGE, levels),
+        ("volts", _VOLTS, True),
+        ("level", _INPUT, levels),
+        ("run", _NUMBERED_RUN, _whole(here)),
+        ("state", _CHANNEL, levels and not _digits(here)),  # a gate that is blocked or clear
+        ("channel", _CHANNEL, bool(here) and not _fractions(here)),
+        ("counter", _COUNTER, True),
+    )
+    for kind, pattern, fits in by_heading:
+        if fits and pattern.search(text):
+            return kind
+    return "counter" if _counts(here) else "other"
+
+
+def _pair_states(found: Columns, heading: Row) -> None:
+    """Give each column of times the states that stand behind it, or before the first."""
+    if not found.times:
+        return
+    states = [n for n, text in enumerate(heading.texts) if _STATE.search(text)]
+    for one, end in zip(found.times, [*(t.at for t in found.times[1:]), len(heading.cells)],
+                        strict=True):  # fmt: skip
+        behind = [n for n in states if one.at < n < end]
+        before = [n for n in states if n < one.at] if one is found.times[0] else []
+        one.state = next(iter([*behind, *before]), None)
+
+
+def _one_clock(found: Columns, block: RowBlock, separator: str) -> None:
+    """Of columns that say the same times in other units, keep the finest."""
+    if len({one.power for one in found.times}) < 2:
+        return
+    finest = max(found.times, key=lambda one: one.power)
+    same = [one for one in found.times if one is finest or _same(one, finest, block, separator)]
+    if len(same) == len(found.times):
+        state = next((one.state for one in found.times if one.state is not None), None)
+        found.times = [TimeColumn(finest.at, finest.power, state)]
+        for key, said in found.said.items():
+            if said.startswith("times in") and said != f"times in {_SYMBOLS[finest.power]}":
+                found.said[key] = "the same times, coarser; not used"
+
+
+def _same(one: TimeColumn, other: TimeColumn, block: RowBlock, separator: str) -> bool:
+    for row in block.rows[:20]:
+        if max(one.at, other.at) >= len(row.cells):
+            return False
+        texts = row.cells[one.at].text, row.cells[other.at].text
+        if not all(is_number(text, separator) for text in texts):
+            continue
+        a, b = (float(text.replace(",", ".")) for text in texts)
+        if abs(a * 10.0**-one.power - b * 10.0**-other.power) > 3.0 * 10.0**-one.power:
+            return False
+    return True
+
+
+def _power(
+    block: RowBlock,
+    heading: Row,
+    n: int,
+    here: Sequence[str],
+    stated: str | None,
+    problems: ProblemList,
+) -> int:
+    """Decimal power from seconds: by the heading, a row of units below it, or as stated."""
+    cell = heading.cells[n]
+    text = _RUN.sub("", cell.text).strip()
+    for match in _UNIT.finditer(text):
+        unit = next(one for one in match.groups() if one).lower()
+        if unit in UNITS:
+            return UNITS[unit]
+        if match[1]:
+            problems.add(
+                heading.line, cell.column, "time", f"{unit!r} is no unit of time: s, ms, µs or ns"
+            )
+            return 0
+    if text.lower() in {"micros", "millis"}:
+        return UNITS[text.lower()]
+    below = [
+        row.cells[n].text.strip("()[] ").lower()
+        for row in block.headings
+        if row.line > heading.line and n < len(row.cells)
+    ]
+    unit = next((one for one in below if one in UNITS), stated or "")
+    if unit:
+        return UNITS[unit]
+    return _bare(here, heading.line, cell.column, problems)
+
+
+def _bare(here: Sequence[str], line: int, column: int, problems: ProblemList) -> int:
+    """Take times without a unit for seconds, but not whole numbers that run into thousands."""
+    if here and all(re.fullmatch(r"[+-]?[0-9]+", text) for text in here):
+        span = abs(int(here[-1]) - int(here[0]))
+        if span > 100:
+            problems.add(
+                line, column, "time",
+                "whole numbers without a unit: seconds, or counts of a clock? say --unit ms or us",
+            )  # fmt: skip
+    return 0
+
+
+def _by_values(
+    block: RowBlock,
+    values: Sequence[list[str]],
+    separator: str,
+    unit: str | None,
+    problems: ProblemList,
+) -> Columns:
+    """Without a heading: one column of times, and others that can be nothing else."""
+    found = Columns()
+    first = block.rows[0]
+    if block.headings and not all(len(row.cells) == 1 for row in block.headings):
+        last = block.headings[-1]
+        problems.add(last.line, last.cells[0].column, "", "no column of this heading is a time")
+        return found
+    rest = [n for n, here in enumerate(values) if not _counts(here) or len(values) == 1]
+    times = [n for n in rest if not _levels(values[n]) and _rises(values[n], separator)]
+    if len(values) == 1:
+        times = [0]
+    fractional = [n for n in times if _fractions(values[n])]
+    times = fractional if len(fractional) == 1 else times
+    if len(values) == 2 and not times:
+        times = [0]  # whatever is wrong with it is said where it is read
+    others = [n for n in rest if n not in times]
+    states = [n for n in others if _levels(values[n])] if len(times) == 1 else []
+    gates = [n for n in others if n not in states and (_few_whole(values[n]) or _names(values[n]))]
+    if len(times) != 1 or len(states) > 1 or len(gates) > 1 or len(others) > len(states + gates):
+        if len(values) == 2 and len(times) == 1 and not gates:
+            states = others  # faults in it are said where they are read
+        else:
+            problems.add(
+                first.line, first.cells[min(2, len(first.cells) - 1)].column, "",
+                f"{len(first.cells)} columns without a heading, and it cannot be told which are "
+                "times; write one, such as time (s),channel,state",
+            )  # fmt: skip
+            return found
+    (at,) = times
+    power = UNITS[unit] if unit else _bare(values[at], first.line, first.cells[at].column, problems)
+    # 0 and 1 beside a gate's number are levels: which one is dark is not said.
+    state = states[0] if states else None
+    signal = bool(states and gates) and not set(map(str.lower, values[states[0]])) <= _STATES
+    found.times = [TimeColumn(at, power, None if signal else state)]
+    found.edge = state if signal else None
+    found.channel = gates[0] if gates else None
+    names = {at: f"times in {_SYMBOLS[power]}"}
+    names |= dict.fromkeys(gates, "which gate") | dict.fromkeys(states, "states")
+    for n in range(len(values)):
+        found.said[f"column {n + 1}"] = names.get(n, "counts rows, not used")
+    return found
+
+
+def _levels(here: Sequence[str]) -> bool:
+    """Whether a column holds two states, or levels, and nothing else."""
+    known = BLOCKED | CLEAR | RISING | FALLING | NO_LEVEL
+    return bool(here) and all(_plain(text) in known for text in here)
+
+
+def _plain(text: str) -> str:
+    """Write 1.0 and 0,00 as a state is written."""
+    text = text.lower()
+    return text.rstrip("0").rstrip(".,") or "0" if NUMBER.fullmatch(text) else text
+
+
+def _digits(here: Sequence[str]) -> bool:
+    return all(text[:1].isdigit() for text in here)
+
+
+def _whole(here: Sequence[str]) -> bool:
+    return bool(here) and all(_WHOLE.fullmatch(text) for text in here)
+
+
+def _names(here: Sequence[str]) -> bool:
+    return bool(here) and all(_NAME.fullmatch(text) for text in here)
+
+
+def _few_whole(here: Sequence[str]) -> bool:
+    """Whether a column holds few different whole numbers, again and again."""
+    return _whole(here) and len(here) > 2 * len(set(here))
+
+
+def _fractions(here: Sequence[str]) -> bool:
+    return any("." in text or "," in text for text in here)
+
+
+def _counts(here: Sequence[str]) -> bool:
+    """Whether a column counts its rows."""
+    if len(here) < 2 or not all(re.fullmatch("[0-9]+", text) for text in here):
+        return False
+    numbers = [int(text) for text in here]
+    return numbers[0] in {0, 1} and all(b - a == 1 for a, b in pairwise(numbers))
+
+
+def _rises(here: Sequence[str], separator: str) -> bool:
+    if not here or not all(is_number(text, separator) for text in here):
+        return False
+    numbers = [float(text.replace(",", ".")) for text in here]
+    return all(a <= b for a, b in pairwise(numbers))

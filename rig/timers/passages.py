@@ -1,0 +1,161 @@
+"""Rows of a timer's table as passages: when, at which input, and whether it got dark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.timers.edges_csv import TICK_HZ, picoseconds
+from rig.timers.table import BLOCKED, CLEAR, FALLING, NUMBER, RISING, TableCell
+
+if TYPE_CHECKING:
+    from rig.timers.columns import Columns, TimeColumn
+    from rig.timers.problems import ProblemList
+    from rig.timers.table import Row
+
+MAX_SPAN_S = 60
+"""A drop lasts half a second, and nobody waits a minute until it is recorded."""
+_MAX_RECORDING_S = 86400
+PAUSE_S = 3
+"""Drops that stand one after the other are parted by more than this."""
+
+
+class Passage(NamedTuple):
+    """One change at one input.
+
+    Attributes
+    ----------
+    tick
+        In picoseconds.
+    label
+        What the file calls the input; empty where it does not say.
+    blocked
+        Whether the beam is dark from then on; `None` where the file does not say.
+    high
+        Whether a signal is high from then on, where that is all that is said.
+    """
+
+    tick: int
+    label: str
+    blocked: bool | None = None
+    high: bool | None = None
+
+
+@dataclass(slots=True)
+class _Run:
+    """What was read of one run."""
+
+    passages: list[Passage] = field(default_factory=list)
+    last: dict[str, int] = field(default_factory=dict)
+
+
+class PassageRows:
+    """Reads rows of passages, run by run."""
+
+    def __init__(self, columns: Columns, separator: str, problems: ProblemList) -> None:
+        self._columns = columns
+        self._separator = separator
+        self._problems = problems
+        self._runs: dict[tuple[int, int], _Run] = {}
+        self._backwards = 0
+        self._rows = 0
+
+    def runs(self) -> list[tuple[int, list[Passage]]]:
+        """Return each run's number, 0 where rows have none, and its passages."""
+        return [(key[0], run.passages) for key, run in sorted(self._runs.items()) if run.passages]
+
+    @property
+    def up_and_down(self) -> bool:
+        """Whether so many times are before those above them that they are none."""
+        return self._backwards > 1 and self._backwards * 4 > self._rows
+
+    def add(self, row: Row) -> None:
+        """Read one row; runs that ended earlier have blanks."""
+        columns = self._columns
+        number = self._whole(row, columns.run, "run")
+        label = self._label(row)
+        for beside, column in enumerate(columns.times):
+            if column.label:  # side by side stand inputs, and not runs
+                self._time(row, column, (number, 0), column.label)
+            else:
+                self._time(row, column, (number, beside), label)
+
+    def _time(self, row: Row, column: TimeColumn, key: tuple[int, int], label: str) -> None:
+        cell = _cell(row, column.at)
+        if not cell.text:
+            return
+        text = cell.text if self._separator == "," else cell.text.replace(",", ".", 1)
+        time = picoseconds(text, -column.power)
+        if time is None or abs(time) >= 10**12 * TICK_HZ:
+            self._fault(row, cell, "time", f"{cell.text!r:.40} is not a time a drop can have")
+            return
+        blocked = high = None
+        if column.state is not None:
+            state = _cell(row, column.state)
+            blocked = _said(state.text, BLOCKED, CLEAR)
+            if blocked is None:
+                self._fault(
+                    row, state, "state",
+                    f"{state.text!r:.40} is no state: 1 or blocked, 0 or unblocked",
+                )  # fmt: skip
+                return
+        elif self._columns.edge is not None:
+            edge = _cell(row, self._columns.edge)
+            high = _said(edge.text, RISING, FALLING)
+            if high is None:
+                self._fault(row, edge, "edge", f"{edge.text!r:.40} is no edge: rising or falling")
+                return
+        run = self._runs.setdefault(key, _Run())
+        before = run.last.get(label, time)
+        if run.passages and time - run.passages[0].tick > _MAX_RECORDING_S * TICK_HZ:
+            self._fault(row, cell, "time", "a recording would last more than a day")
+            return
+        self._rows += 1
+        if time < before:
+            self._backwards += 1
+            self._fault(row, cell, "time", f"{cell.text} is before the time above it")
+            return
+        run.last[label] = time
+        run.passages.append(Passage(time, label, blocked, high))
+
+    def _label(self, row: Row) -> str:
+        at = self._columns.channel
+        return "" if at is None else _cell(row, at).text
+
+    def _whole(self, row: Row, at: int | None, key: str) -> int:
+        if at is None:
+            return 0
+        cell = _cell(row, at)
+        if not cell.text.isdecimal() or len(cell.text) > 6:
+            self._fault(row, cell, key, f"{cell.text!r:.40} is not a whole number")
+            return 0
+        return int(cell.text)
+
+    def _fault(self, row: Row, cell: TableCell, key: str, message: str) -> None:
+        self._problems.add(row.line, cell.column, key, message)
+
+
+def _cell(row: Row, at: int) -> TableCell:
+    return row.cells[at] if at < len(row.cells) else TableCell(1, "")
+
+
+def _said(text: str, yes: set[str], no: set[str]) -> bool | None:
+    text = text.lower()
+    text = text.rstrip("0").rstrip(".,") or "0" if NUMBER.fullmatch(text) else text
+    return True if text in yes else False if text in no else None
+
+
+def parted(passages: list[Passage]) -> list[list[Passage]]:
+    """Part drops that were recorded one after the other, at pauses longer than `PAUSE_S`.
+
+    Only where all together last too long for one.
+    """
+    ordered = sorted(passages, key=lambda one: one.tick)
+    if ordered[-1].tick - ordered[0].tick <= MAX_SPAN_S * TICK_HZ:
+        return [passages]
+    found = [[ordered[0]]]
+    for one in ordered[1:]:
+        if one.tick - found[-1][-1].tick > PAUSE_S * TICK_HZ:
+            found.append([])
+        found[-1].append(one)
+    return found

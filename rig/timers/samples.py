@@ -1,0 +1,191 @@
+"""Samples as passages: levels of a logic analyser, and volts with a threshold and hysteresis."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.timers.edges_csv import TICK_HZ, picoseconds
+from rig.timers.passages import Passage
+from rig.timers.table import FALLING, NO_LEVEL, RISING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from rig.timers.columns import Columns
+    from rig.timers.problems import ProblemList
+    from rig.timers.table import Row
+
+    Array = NDArray[np.float64]
+
+_RATE = re.compile(r"sample ?rate\s*:?\s*([0-9.,]+)\s*([kMG]?)Hz", re.IGNORECASE)
+_NAMES = re.compile(r"channels\s*(?:\([0-9/ ]+\))?\s*:\s*(.+)", re.IGNORECASE)
+_HYSTERESIS = 0.2
+"""Share of the swing between dark and bright, half of it on either side of the middle."""
+_CLEAR_SWING = 8.0
+"""Swing over the noise of each level below which there is no passage to be seen."""
+
+
+def sample_rate_hz(remarks: Sequence[str]) -> float | None:
+    """Rate that a remark of the file states; `None` without one."""
+    for remark in remarks:
+        match = _RATE.search(remark)
+        if match:
+            power = {"": 0, "k": 3, "m": 6, "g": 9}[match[2].lower()]
+            return float(match[1].replace(",", ".")) * 10.0**power
+    return None
+
+
+def input_names(remarks: Sequence[str]) -> list[str]:
+    """Names of inputs that a remark lists; none without one."""
+    for remark in remarks:
+        match = _NAMES.search(remark)
+        if match:
+            return [name.strip() for name in match[1].split(",")]
+    return []
+
+
+def level_passages(
+    rows: Sequence[Row],
+    columns: Columns,
+    times: Sequence[int],
+    problems: ProblemList,
+) -> tuple[list[Passage], dict[str, bool]]:
+    """Find the changes of levels.
+
+    Parameters
+    ----------
+    times
+        Of each row, ps.
+
+    Returns
+    -------
+    list of Passage, dict
+        Changes, and the level that each input begins with.
+    """
+    found: list[Passage] = []
+    now: dict[str, bool] = {}
+    for row, time in zip(rows, times, strict=True):
+        for at, label in columns.levels.items():
+            text = row.cells[at].text.lower() if at < len(row.cells) else "x"
+            if text in NO_LEVEL or not text:
+                continue
+            if text not in RISING | FALLING:
+                cell = row.cells[at]
+                problems.add(row.line, cell.column, label, f"{cell.text!r:.40} is no level: 0, 1")
+                continue
+            high = text in RISING
+            if label in now and now[label] is not high:
+                found.append(Passage(time, label, None, high))
+            now.setdefault(label, high)
+            now[label] = high
+    first = {label: _first(rows, at) for at, label in columns.levels.items() if label in now}
+    return found, first
+
+
+def _first(rows: Sequence[Row], at: int) -> bool:
+    texts = (row.cells[at].text.lower() for row in rows if at < len(row.cells))
+    return next(text for text in texts if text in RISING | FALLING) in RISING
+
+
+def volt_passages(
+    label: str, times: Sequence[int], volts: Array
+) -> tuple[list[Passage], bool, float] | None:
+    """Find where volts cross the middle between dark and bright, with hysteresis.
+
+    Between two samples the crossing of the middle is where a straight line has it.
+
+    Parameters
+    ----------
+    label
+        Name of the input.
+    times
+        Of each sample, ps.
+    volts
+        Shape ``(samples,)``.
+
+    Returns
+    -------
+    list of Passage, bool, float
+        Crossings, whether the input begins high, and the middle in volts. `None` where there is
+        nothing but noise.
+    """
+    middle = _middle(volts)
+    if middle is None:
+        return None
+    centre, half = middle
+    high = bool(volts[0] > centre)
+    begins = high
+    found: list[Passage] = []
+    for n in _beyond(volts, centre, half):
+        if (volts[n] > centre) is high or bool(volts[n] > centre) == high:
+            continue
+        high = not high
+        k = n  # back to where it crossed the middle
+        while k > 0 and (volts[k - 1] > centre) == high:
+            k -= 1
+        a, b = float(volts[k - 1]), float(volts[k])
+        share = (centre - a) / (b - a) if b != a else 1.0
+        found.append(
+            Passage(times[k - 1] + round(share * (times[k] - times[k - 1])), label, None, high)
+        )
+    return found, begins, centre
+
+
+def _beyond(volts: Array, centre: float, half: float) -> Iterator[int]:
+    yield from np.flatnonzero(np.abs(volts - centre) > half).tolist()
+
+
+def _middle(volts: Array) -> tuple[float, float] | None:
+    """Middle between the two levels and half the hysteresis; `None` without two levels."""
+    low, high = np.quantile(volts, [0.0, 1.0])
+    for _ in range(50):  # two means, one for each level
+        centre = 0.5 * (low + high)
+        above = volts > centre
+        if above.all() or not above.any():
+            return None
+        next_low, next_high = np.median(volts[~above]), np.median(volts[above])
+        if next_low == low and next_high == high:
+            break
+        low, high = next_low, next_high
+    above = volts > 0.5 * (low + high)
+    swing = float(high - low)
+    noise = max(
+        float(np.median(np.abs(volts[one] - np.median(volts[one])))) for one in (above, ~above)
+    )
+    if swing <= 0.0 or swing < _CLEAR_SWING * 1.4826 * noise:
+        return None
+    return 0.5 * float(low + high), 0.5 * _HYSTERESIS * swing
+
+
+def sample_times(
+    rows: Sequence[Row],
+    columns: Columns,
+    separator: str,
+    rate_hz: float | None,
+    problems: ProblemList,
+) -> list[int]:
+    """Times of samples, ps: from their column, else from the rate."""
+    if not columns.times:
+        assert rate_hz is not None
+        return [round(n * TICK_HZ / rate_hz) for n in range(len(rows))]
+    column = columns.times[0]
+    found: list[int] = []
+    for row in rows:
+        cell = row.cells[column.at] if column.at < len(row.cells) else None
+        text = "" if cell is None else cell.text
+        time = picoseconds(text if separator == "," else text.replace(",", ".", 1), -column.power)
+        if time is None:
+            problems.add(
+                row.line, 1 if cell is None else cell.column, "time", f"{text!r:.40} is not a time"
+            )
+            time = found[-1] if found else 0
+        elif found and time < found[-1]:
+            assert cell is not None
+            problems.add(row.line, cell.column, "time", f"{text} is before the time above it")
+        found.append(time)
+    return found

@@ -1,0 +1,360 @@
+"""Any other timer's file: what it is, the drops in it, and what had to be supposed.
+
+Loggers of photogates (tables of times, or of times and states), boards that print pin, edge and
+time, logic analysers (a column an input, or value change dumps) and oscilloscopes (volts). What a
+file does not say (which gate, which level is dark, what unit) is supposed where only one thing can
+be meant, told, and else asked of the caller.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.errors import InputError
+from rig.records import Edge
+from rig.timers.columns import columns_of
+from rig.timers.edges_csv import HEADER, TICK_HZ, drop_of
+from rig.timers.passages import MAX_SPAN_S, PAUSE_S, PassageRows, parted
+from rig.timers.problems import ProblemList
+from rig.timers.samples import (
+    input_names,
+    level_passages,
+    sample_rate_hz,
+    sample_times,
+    volt_passages,
+)
+from rig.timers.table import NUMBER, lines_of, read_table
+from rig.timers.vcd import is_vcd, read_vcd
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rig.records import Drop
+    from rig.timers.columns import Columns
+    from rig.timers.passages import Passage
+    from rig.timers.table import RowBlock, Table
+
+MAX_COLUMNS = 200
+_HINT = (
+    "accepted are run,channel,time_s,state; tables with a heading such as time (s), gate, state; "
+    "samples of inputs (0 and 1, or volts) with times; and value change dumps"
+)
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+
+
+@dataclass(slots=True)
+class TimerFile:
+    """What was understood of a file.
+
+    Attributes
+    ----------
+    kind
+        In words.
+    columns
+        What each column was taken for, by its heading.
+    runs
+        Passages of each, by number.
+    begins
+        The level that each input begins with, where samples say.
+    period_s
+        Of samples: no edge is known better than that; `None` for stamps.
+    notes
+        What was supposed, a sentence each.
+    """
+
+    kind: str
+    columns: dict[str, str] = field(default_factory=dict)
+    runs: dict[int, list[Passage]] = field(default_factory=dict)
+    begins: dict[str, bool] = field(default_factory=dict)
+    period_s: float | None = None
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What the file calls its inputs, in order; none where it does not say."""
+        found = {one.label for run in self.runs.values() for one in run if one.label}
+        return tuple(sorted(found, key=lambda one: (label_number(one) or 0, one)))
+
+    def add(self, passages: list[Passage], number: int = 0) -> None:
+        """Add a run, under its number or else the next one."""
+        if number < 1 or number in self.runs:
+            number = max(self.runs, default=0) + 1
+        self.runs[number] = passages
+
+
+def is_edge_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a file has the heading of the project's own format, be it with faults."""
+    lines = lines_of(path)
+    first = next((one for one in lines if one.strip() and not one.lstrip().startswith("#")), "")
+    return first.lower().replace(" ", "").startswith(",".join(HEADER[:2]))
+
+
+def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> TimerFile:
+    """Find out what a file says.
+
+    Parameters
+    ----------
+    path
+        The file.
+    unit
+        Of its times where it does not say: ``s``, ``ms``, ``us`` or ``ns``.
+
+    Raises
+    ------
+    InputError
+        Every fault of the file at its line and column.
+    """
+    problems = ProblemList(str(path))
+    lines = lines_of(path)
+    if is_vcd(lines):
+        passages, begins, scale = read_vcd(lines, problems)
+        problems.raise_if_any(_HINT)
+        found = TimerFile("a value change dump", begins=begins, period_s=scale / TICK_HZ)
+        if passages:
+            found.add(passages)
+    else:
+        table = read_table(lines)
+        if not table.blocks:
+            said = "no row of numbers: times are wanted, with or without states"
+            problems.add(1, 1, "", said if any(map(str.strip, lines)) else "no edges in this file")
+            problems.raise_if_any(_HINT)
+        found = _of_table(table, unit, problems)
+    _parted(found)
+    if not found.runs:
+        said = "; ".join(["nothing passes in this file", *found.notes])
+        problems.add_if_none(1, 1, "", said)
+    problems.raise_if_any(_HINT)
+    return found
+
+
+def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFile:
+    parts = _SEPARATORS[table.separator]
+    found = TimerFile(f"a table, its cells parted by {parts}")
+    columns: Columns | None = None
+    above = None
+    for block in table.blocks:
+        if not any(len(row.cells) > 1 or len(block.rows[0].cells) == 1 for row in block.headings):
+            block.headings = [*(above.headings if above else ()), *block.headings]
+        above = block
+        width = len(block.rows[0].cells)
+        if width > MAX_COLUMNS:
+            too_many = f"{width} columns; at most {MAX_COLUMNS} are read"
+            problems.add(block.rows[0].line, 1, "", too_many)
+            return found
+        _named_inputs(block, table)
+        columns = columns_of(block, table.separator, unit, problems)
+        problems.raise_if_any(_HINT)
+        found.columns |= columns.said
+        if columns.levels or columns.volts:
+            _samples(found, block, columns, table, problems)
+        else:
+            rows = PassageRows(columns, table.separator, problems)
+            for row in block.rows:
+                rows.add(row)
+            if rows.up_and_down:
+                raise InputError(
+                    f"{problems.file}:{block.rows[0].line}:1: these numbers go up and down: they "
+                    "are durations, or something else, and not the times of passages",
+                    "import the times themselves, as the timer counted them",
+                )
+            if columns.derived and _sampled(rows.runs(), columns):
+                raise InputError(
+                    f"{problems.file}:{block.rows[0].line}:1: places at regular times, as from "
+                    "video or a motion detector: wanted are the times at which gates change",
+                    "if these are passages nevertheless, leave the other columns out",
+                )
+            for number, passages in rows.runs():
+                found.add(passages, number)
+    assert columns is not None
+    if columns.unused:
+        found.notes.append(f"not used: {', '.join(columns.unused)}")
+    return found
+
+
+def _sampled(runs: Sequence[tuple[int, list[Passage]]], columns: Columns) -> bool:
+    """Whether all times are as far apart as in a recording at a fixed rate."""
+    if columns.edge is not None or any(one.state is not None for one in columns.times):
+        return False
+    steps = [
+        step for _, run in runs for step in np.diff([one.tick for one in run]).tolist() if run[4:]
+    ]
+    return bool(steps) and max(steps) < 1.5 * min(steps)
+
+
+def _named_inputs(block: RowBlock, table: Table) -> None:
+    """Put the inputs' names that remarks list above columns of levels that have none."""
+    names = input_names(table.remarks)
+    width = len(block.rows[0].cells)
+    rate = sample_rate_hz(table.remarks)
+    bare = not block.headings or all(
+        text.lower() in {"logic", "analog"} for text in block.headings[-1].texts
+    )
+    if rate is None or not bare:
+        return
+    row = block.rows[0]
+    labels = names if len(names) == width else [f"D{n}" for n in range(width)]
+    block.headings = [
+        row._replace(cells=[c._replace(text=_input(name)) for c, name in zip(row.cells, labels,
+                                                                            strict=True)])
+    ]  # fmt: skip
+
+
+def _input(name: str) -> str:
+    """Write a name so that it reads as that of an input."""
+    return name if label_number(name) is not None else f"input {name}"
+
+
+def _samples(
+    found: TimerFile, block: RowBlock, columns: Columns, table: Table, problems: ProblemList
+) -> None:
+    """Find the passages in samples."""
+    rate = sample_rate_hz(table.remarks)
+    if not columns.times and rate is None:
+        problems.add(
+            block.rows[0].line, 1, "time", "samples without a column of times and without a rate"
+        )
+        return
+    times = sample_times(block.rows, columns, table.separator, rate, problems)
+    problems.raise_if_any(_HINT)
+    steps = np.diff(np.array(times, dtype=float)) / TICK_HZ
+    passages: list[Passage] = []
+    if columns.levels:
+        passages, begins = level_passages(block.rows, columns, times, problems)
+        found.begins |= begins
+        found.period_s = None if rate is None else 1.0 / rate
+    for at, heading in columns.volts.items():
+        volts = _volts(block, at, table.separator, problems)
+        problems.raise_if_any(_HINT)
+        crossed = volt_passages(heading, times, volts)
+        if crossed is None:
+            found.notes.append(
+                f"{heading}: nothing passes, {volts.min():.3g} to {volts.max():.3g} V"
+            )
+            continue
+        more, found.begins[heading], middle = crossed
+        passages += more
+        found.notes.append(f"{heading}: {len(more)} crossings of {middle:.3g} V")
+        found.period_s = float(np.median(steps)) if steps.size else None
+    if passages:
+        found.add(passages)
+
+
+def _volts(
+    block: RowBlock, at: int, separator: str, problems: ProblemList
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    values = np.zeros(len(block.rows))
+    for n, row in enumerate(block.rows):
+        text = row.cells[at].text if at < len(row.cells) else ""
+        plain = text if separator == "," else text.replace(",", ".", 1)
+        if not NUMBER.fullmatch(plain) or "," in plain:
+            problems.add(row.line, 1, "volts", f"{text!r:.40} is not a number of volts")
+            continue
+        values[n] = float(plain)
+    return values
+
+
+def _parted(found: TimerFile) -> None:
+    """Part drops that stand one after the other in one recording."""
+    parts = [part for run in found.runs.values() for part in parted(run)]
+    if len(parts) > len(found.runs):
+        found.notes.append(
+            f"taken for {len(parts)} drops, parted by pauses of more than {PAUSE_S} s"
+        )
+        found.runs = dict(enumerate(parts, 1))
+    for number, run in found.runs.items():
+        span = (max(one.tick for one in run) - min(one.tick for one in run)) / TICK_HZ
+        if span > MAX_SPAN_S:
+            raise InputError(
+                f"run {number} would last {span:.0f} s without a pause of {PAUSE_S} s",
+                "are these passages of something that falls, and is the unit of time right?",
+            )
+
+
+def drops_of(
+    found: TimerFile,
+    channels: Mapping[str, int],
+    bars: int,
+    dark: str | None = None,
+) -> list[Drop]:
+    """Turn what was understood into drops.
+
+    Parameters
+    ----------
+    found
+        From `read_timer_file`.
+    channels
+        Of each label; of ``""`` where the file names no input.
+    bars
+        How many pass a gate: with no states given, more times than that are of darkening and
+        clearing in turn, and as many or fewer of darkening alone.
+    dark
+        Which level is that of a blocked beam, ``high`` or ``low``; beams are taken to be clear at
+        the beginning if not given.
+
+    Returns
+    -------
+    list of Drop
+        One a run, numbered from 1; as `rig.timers.edges_csv.read_edges` gives them.
+    """
+    high = _dark_is_high(found, dark)
+    drops = []
+    for number, run in sorted(found.runs.items()):
+        edges: list[Edge] = []
+        for label in dict.fromkeys(one.label for one in run):
+            if label in channels:
+                ours = [one for one in run if one.label == label]
+                edges += _edges(ours, channels[label], bars, high)
+        if edges:
+            drops.append(drop_of(number, edges))
+    return drops
+
+
+def _dark_is_high(found: TimerFile, dark: str | None) -> bool:
+    """Whether a signal is high where the beam is blocked."""
+    signals = [one for run in found.runs.values() for one in run if one.high is not None]
+    if not signals:
+        return True
+    if dark is None:
+        if found.begins:
+            moved = {one.label for one in signals}
+            highs = [level for label, level in found.begins.items() if label in moved]
+            clear = sum(highs) * 2 > len(highs)
+        else:  # edges: the first one of a beam darkens it
+            first = {
+                (number, one.label): one
+                for number, run in found.runs.items()
+                for one in sorted(run, key=lambda one: -one.tick)
+            }
+            clear = sum(not one.high for one in first.values() if one.high is not None) * 2 > len(
+                first
+            )
+        dark = "low" if clear else "high"
+        found.notes.append(
+            f"a {dark} signal is taken for a blocked beam, since beams are clear at the beginning "
+            f"(--dark {'high' if dark == 'low' else 'low'} says otherwise)"
+        )
+    return dark == "high"
+
+
+def _edges(run: Sequence[Passage], channel: int, bars: int, high: bool) -> Iterable[Edge]:
+    both = len(run) > bars
+    for n, one in enumerate(run):
+        if one.blocked is not None:
+            blocked = one.blocked
+        elif one.high is not None:
+            blocked = one.high is high
+        else:
+            blocked = n % 2 == 0 if both else True
+        yield Edge(one.tick, channel, blocked)
+
+
+def label_number(label: str) -> int | None:
+    """The number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3."""
+    text = re.sub(r"[\[(].*", "", label).strip()
+    match = re.search(r"([0-9]+)$", text)
+    return int(match[1]) if match else None

@@ -1,0 +1,362 @@
+"""Exports of data loggers: what they look like, and every fault at its place."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import strategies as st
+
+from rig.errors import InputError
+from rig.records import Drop
+from rig.timers.edges_csv import TICK_HZ
+from rig.timers.timer_file import drops_of, is_edge_file, label_number, read_timer_file
+from tests.examples import examples
+
+VERNIER = (
+    "Vernier Format 2\nfence.cmbl\nRun 1\nTime\tGateState\tDistance\nT\tS\tD\ns\t\tm\n\n"
+    "0.25\t1\t0\n0.26\t0\t\n0.275\t1\t0.05\n"
+)
+PASCO = (
+    '"Time (s) Run #1";"State Run #1";"Time (s) Run #2";"State Run #2"\n'
+    "0,25;1;1,5;1\n0,26;0;1,51;0\n0,275;1;;\n"
+)
+
+
+def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
+    path = tmp_path / "export.txt"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return drops_of(read_timer_file(path), {"": 3}, bars)
+
+
+def told(drop: Drop) -> list[tuple[float, bool]]:
+    assert drop.tick_hz == TICK_HZ
+    assert all(edge.channel == 3 for edge in drop.edges)
+    return [(edge.tick / TICK_HZ, edge.blocked) for edge in drop.edges]
+
+
+def test_a_vernier_table(tmp_path):
+    (drop,) = read(tmp_path, VERNIER)
+    assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
+    assert (drop.run, drop.attempt, drop.certificate) == (1, 1, None)
+
+
+def test_a_pasco_table_with_decimal_commas_and_two_runs(tmp_path):
+    first, second = read(tmp_path, PASCO)
+    assert told(first) == [(0.25, True), (0.26, False), (0.275, True)]
+    assert told(second) == [(0.5, True), (0.51, False)]
+    assert (first.run, second.run) == (1, 2)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.25,1\n0.26,0\n0.275,1\n",
+        "0.25\t1\n0.26\t0\n0.275\t1\n",
+        "0,25;1\n0,26;0\n0,275;1\n",
+        "Time (ms),Blocked?\n250,Blocked\n260,Unblocked\n275,Blocked\n",
+        "\ufeffLatest: Time (s),Latest: GateState\r\n0.25,1\r\n0.26,0\r\n0.275,1\r\n",
+        "State,Time (s)\n1,0.25\n0,0.26\n1,0.275\n",
+        '"Zeit t (s)";"Zustand"\n"0,25";"1"\n"0,26";"0"\n"0,275";"1"\n',
+        "Time\tState\ns\t\n0.25\t1.0\n0.26\t0.0\n0.275\t1.0\n",
+        "t (µs);state\n250000;1\n260000;0\n2,75e5;1\n",
+    ],
+)
+def test_what_programs_write(tmp_path, text):
+    (drop,) = read(tmp_path, text)
+    assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
+
+
+def test_utf_16_as_some_programs_on_windows_write_it(tmp_path):
+    (drop,) = read(tmp_path, PASCO.replace("Run #2", "Run #1").encode("utf-16"))[:1]
+    assert told(drop)[0] == (0.25, True)
+
+
+@pytest.mark.parametrize(
+    "text", ["0.25\n0.26\n0.275\n", "0,25\n0,26\n0,275\n", "Time (s)\n0.25\n0.26\n0.275\n"]
+)
+def test_a_column_of_times_is_of_darkening_or_of_both(tmp_path, text):
+    """As many times as bars, or fewer: the beam darkened. More: darkened and cleared in turn."""
+    (drop,) = read(tmp_path, text, bars=3)
+    assert told(drop) == [(0.25, True), (0.26, True), (0.275, True)]
+    (drop,) = read(tmp_path, text, bars=2)
+    assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
+
+
+def faults(tmp_path: Path, content: str) -> list[tuple[int, int, str]]:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, content)
+    assert caught.value.exit_code == 2
+    return [(one.line, one.column, one.key) for one in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("Time,State\n0.1,1\n0.2,maybe\n", (3, 5, "state")),
+        ("Time,State\n0.1,1\nx,0\n", (3, 1, "time")),
+        ("Time,State\n0.1,x\n0.2,0\n", (2, 5, "state")),
+        ("0.1,x\n0.2,0\n", (1, 5, "state")),
+        ("Time,State\n0.2,1\n0.1,0\n", (3, 1, "time")),
+        ("Time,State\n0.2,1\n  1e9 ,0\n", (3, 3, "time")),
+        ("Time,State\n0.2,1\n0.3\n", (3, 1, "state")),
+        ("Time (fortnights),State\n0.2,1\n", (1, 1, "time")),
+        ("Distance,State\n0.2,1\n", (1, 1, "")),
+        ("1,2,3\n", (1, 5, "")),
+        ("", (1, 1, "")),
+        ("nothing here\n", (1, 1, "")),
+        ("Time;State\n0,1;1\n0,2;0\n0,3,4;1\n", (4, 1, "time")),
+    ],
+)
+def test_faults_are_located(tmp_path, text, place):
+    assert place in faults(tmp_path, text)
+
+
+def test_a_missing_file_is_said(tmp_path):
+    with pytest.raises(InputError, match="cannot read"):
+        read_timer_file(tmp_path / "none")
+
+
+def test_own_files_are_told_from_others(tmp_path):
+    path = tmp_path / "f"
+    for text, ours in [
+        ("run,channel,time_s,state\n", True),
+        ("# remark\n Run , channel,time_s, state\n", True),
+        ("run,channel,time,state\n1,0,0.1,1\n", True),
+        ("time,voltage\n0,1\n", False),
+        ("", False),
+        (VERNIER, False),
+        ("0.1,1\n", False),
+    ]:
+        path.write_text(text)
+        assert is_edge_file(path) is ours, text
+
+
+SHAPES = st.sampled_from(["\t", ";", ","]), st.booleans(), st.integers(1, 4)
+
+
+@examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(*SHAPES, st.lists(st.integers(1, 10**7), min_size=2, max_size=20))
+def test_what_is_written_is_read(tmp_path, separator, comma, runs, steps):
+    """Any separator, decimals by comma or by point, any number of runs beside each other."""
+    comma = comma and separator != ","
+    heading = separator.join(
+        f"Time (s) Run #{n}{separator}State Run #{n}" for n in range(1, runs + 1)
+    )
+    rows, time = [heading], 0
+    for n, step in enumerate(steps):
+        time += step
+        text = f"{time / 1e6:.6f}".replace(".", "," if comma else ".")
+        rows.append(separator.join([text, str((n + 1) % 2)] * runs))
+    found = read(tmp_path, "\n".join(rows))
+    assert len(found) == runs
+    for drop in found:
+        ticks = [edge.tick for edge in drop.edges]
+        assert [b - a for a, b in pairwise(ticks)] == [step * 10**6 for step in steps[1:]]
+        assert [edge.blocked for edge in drop.edges] == [n % 2 == 0 for n in range(len(steps))]
+
+
+@examples(150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.one_of(
+        st.binary(max_size=120),
+        st.text(st.sampled_from('0123456789.,;\t\n"eE+-# TimeStaruns()'), max_size=120).map(
+            str.encode
+        ),
+    )
+)
+def test_any_file_is_read_or_refused_with_a_reason(tmp_path, content):
+    try:
+        drops = read(tmp_path, content)
+    except InputError as error:
+        drops = []
+        refused = str(error)
+    assert all(drop.edges for drop in drops)
+    assert drops or refused
+
+
+# ------------------------------------------------------- one drop, as other programs write it
+
+DROP = ((0.25, 2, True), (0.251, 5, True), (0.26, 2, False), (0.2625, 5, False), (0.275, 2, True),
+        (0.28, 2, False))  # fmt: skip
+"""Time in seconds, channel, whether the beam gets dark."""
+
+
+def levels(time: float) -> list[int]:
+    """Levels of D2 and D5 from a time on, high where dark."""
+    seen = {2: 0, 5: 0}
+    for at, channel, dark in DROP:
+        if at <= time + 1e-9:
+            seen[channel] = int(dark)
+    return [seen[2], seen[5]]
+
+
+def samples(step: float, end: float = 0.3) -> list[float]:
+    return [n * step for n in range(round(end / step))]
+
+
+def vcd() -> str:
+    marks = {2: "!", 5: '"'}
+    changes = "".join(f"#{round(t * 1e6)}\n{int(dark)}{marks[c]}\n" for t, c, dark in DROP)
+    return (
+        "$date today $end\n$version some program $end\n$timescale 1 us $end\n"
+        '$scope module m $end\n$var wire 1 ! D2 $end\n$var wire 1 " D5 $end\n$upscope $end\n'
+        f'$enddefinitions $end\n#0\n0!\n0"\n{changes}'
+    )
+
+
+def smooth(time: float, channel: int) -> float:
+    """Volts of a gate that takes 0.2 ms to change, 4.6 V where clear, and some hum."""
+    volts = 4.6
+    for at, one, dark in DROP:
+        if one == channel:
+            share = min(max((time - at) / 0.2e-3 + 0.5, 0.0), 1.0)
+            volts += (-4.4 if dark else 4.4) * share
+    return volts + 0.05 * math.sin(300.0 * time)
+
+
+FORMS = {
+    "pin, edge and time under a remark": "# made by a board\n# Pin number, Edge type, Time [s]\n"
+    + "".join(f"{c}, {int(dark)}, {t:.6f}\n" for t, c, dark in DROP),
+    "the same without a heading": "".join(f"{c},{int(dark)},{t:.6f}\n" for t, c, dark in DROP),
+    "a column Gate, and µs beside ms": "Event\tGate\tTime (ms)\tTime (us)\tState\n"
+    + "".join(
+        f"{n}\t{c}\t{t * 1e3:.0f}\t{t * 1e6:.0f}\t{'Blocked' if dark else 'Clear'}\n"
+        for n, (t, c, dark) in enumerate(DROP)
+    ),
+    "the gate's name before the time": "".join(
+        f"GATE{c} {t * 1e6:.0f} {'BLOCKED' if dark else 'CLEAR'}\n" for t, c, dark in DROP
+    ),
+    "a row of units in words": "Channel;Time;Status\n;milliseconds;\n"
+    + "".join(f"{c};{t * 1e3:.3f};{int(dark)}\n".replace(".", ",") for t, c, dark in DROP),
+    "blanks between": "pin   micros   edge\n"
+    + "".join(f" {c}  {t * 1e6:9.0f}  {'RISING' if dark else 'FALLING'}\n" for t, c, dark in DROP),
+    "a logic analyser's changes": "Time [s],Channel 2,Channel 5\n0.000000000,0,0\n"
+    + "".join(f"{t:.9f},{','.join(map(str, levels(t)))}\n" for t, _, _ in DROP),
+    "a logic analyser's samples": "; CSV, generated by some library\n"
+    "; Channels (2/8): D2, D5\n; Samplerate: 10 kHz\n"
+    + "".join(f"{','.join(map(str, levels(t)))}\n" for t in samples(1e-4)),
+    "the same with a heading": "; CSV, generated by some library\n; Channels (2/8): D2, D5\n"
+    "; Samplerate: 10 kHz\nlogic,logic\n"
+    + "".join(f"{','.join(map(str, levels(t)))}\n" for t in samples(1e-4)),
+    "another analyser's": "; Sample rate: 1 MHz\n; Sample count: 3 M Samples\nTime(s), D2, D5\n"
+    "0,0,0\n" + "".join(f"{t},{','.join(map(str, levels(t)))}\n" for t, _, _ in DROP),
+    "a value change dump": vcd(),
+    "an oscilloscope's volts": "#Date Time: 2024-01-01 15:37:18.124\n#Sample rate: 20000Hz\n\n"
+    "Time (s),Channel 2 (V),Channel 5 (V)\n"
+    + "".join(f"{t:.6f},{smooth(t, 2):.5f},{smooth(t, 5):.5f}\n" for t in samples(5e-5)),
+    "volts with decimal commas": "Zeit (ms)\tKanal 2 (V)\tKanal 5 (V)\n"
+    + "".join(
+        f"{t * 1e3:.3f}\t{smooth(t, 2):.5f}\t{smooth(t, 5):.5f}\n".replace(".", ",")
+        for t in samples(5e-5)
+    ),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_one_drop_in_every_form(tmp_path, form):
+    path = tmp_path / "export"
+    path.write_text(FORMS[form], "utf-8")
+    found = read_timer_file(path, "us" if "the gate's name" in form else None)
+    assert sorted(filter(None, map(label_number, found.labels))) == [2, 5]
+    dark = "low" if "volts" in form else None  # a clear beam lets current flow
+    (drop,) = drops_of(found, {one: label_number(one) for one in found.labels}, 8, dark)
+    first = drop.edges[0].tick
+    within = 0.1e-3 if "volts" in form else 1e-9
+    for edge, (time, channel, blocked) in zip(drop.edges, DROP, strict=True):
+        assert (edge.channel, edge.blocked) == (channel, blocked)
+        assert (edge.tick - first) / TICK_HZ == pytest.approx(time - DROP[0][0], abs=within)
+    if form not in {"pin, edge and time under a remark", "the same without a heading"}:
+        assert drops_of(found, {one: label_number(one) for one in found.labels}, 8) == [drop]
+
+
+def test_stacked_runs_are_runs_of_their_own(tmp_path):
+    lower = VERNIER.replace("Run 1", "Run 2").replace("0.25\t", "0.24\t")
+    for text in (VERNIER + lower, VERNIER + "Run 2\n0.24\t1\n0.26\t0\n0.275\t1\n"):
+        one, two = read(tmp_path, text)
+        assert (one.run, two.run) == (1, 2)
+        assert [time for time, _ in told(one)] == [0.25, 0.26, 0.275]
+        assert [time for time, _ in told(two)] == [0.24, 0.26, 0.275]
+
+
+def test_a_column_a_gate(tmp_path):
+    path = tmp_path / "export"
+    path.write_text("Photogate 1 (ms)\tPhotogate 2 (ms)\n100\t101\n110\t112\n\t115\n")
+    (drop,) = drops_of(read_timer_file(path), {"Photogate 1 (ms)": 4, "Photogate 2 (ms)": 3}, 8)
+    seen = [(edge.tick // 10**9, edge.channel) for edge in drop.edges]
+    assert seen == [(100, 4), (101, 3), (110, 4), (112, 3), (115, 3)]
+
+
+def test_runs_have_their_numbers_from_a_column(tmp_path):
+    path = tmp_path / "export"
+    path.write_text("Trial,Pin,Time (s),State\n3,2,0.1,1\n3,2,0.2,0\n1,2,0.1,1\n1,2,0.3,0\n")
+    drops = drops_of(read_timer_file(path), {"2": 0}, 8)
+    assert [(drop.run, len(drop.edges)) for drop in drops] == [(1, 2), (3, 2)]
+
+
+def test_drops_one_after_the_other_are_parted_by_the_pauses_between(tmp_path):
+    rows = [(at + n * 0.01) for at in (1.0, 31.0, 75.0) for n in range(6)]
+    drops = read(tmp_path, "time (s)\n" + "".join(f"{t:.3f}\n" for t in rows))
+    assert [len(drop.edges) for drop in drops] == [6, 6, 6]
+
+
+def test_old_windows_writes_micro_in_one_byte(tmp_path):
+    (drop,) = read(tmp_path, "t (µs);state\n250000;1\n260000;0\n".encode("cp1252"))
+    assert [edge.tick for edge in drop.edges] == [250_000_000_000, 260_000_000_000]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "places at regular times"),
+        ("1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n", "they are durations"),
+        ("Time,Gate\n0.1,1\n0.2,0\n0.3,1\n", "a gate's number or its state"),
+        ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "are durations"),
+        ("time\n1204\n2406\n9000\n", "say --unit"),
+        ("Time (s),colour,state\n" + "".join(f"0.{n},{n % 3},1\n" for n in range(1, 9)),
+         "'colour' might say"),
+        ("Time (s),Volt\n" + "".join(f"{n},{n % 2 * 1e-3 + n % 7 * 1e-3}\n" for n in range(40)),
+         "nothing passes"),
+        ("time (s)\n" + "".join(f"{n}\n" for n in range(0, 300, 2)), "without a pause"),
+        ("D0,D1\n0,1\n1,1\n0,1\n", "without a column of times"),
+        ("$timescale 3 moons $end\n", "is no unit"),
+        ("PK\x03\x04\0\0", "this is no text"),
+    ],
+)  # fmt: skip
+def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, reason):
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    assert reason in str(caught.value)
+    assert caught.value.hint
+
+
+@examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.tuples(st.integers(1, 10**5), st.integers(0, 3)), min_size=2, max_size=25),
+    st.permutations(["time", "channel", "state"]),
+    st.sampled_from([("s", 6), ("ms", 3), ("us", 0)]),
+    st.sampled_from([",", ";", "\t"]),
+)
+def test_a_long_table_is_read_in_any_order_of_columns(tmp_path, steps, order, unit, separator):
+    name, decimals = unit
+    dark = dict.fromkeys(range(4), False)
+    time, rows, wanted = 0, [], []
+    for step, channel in steps:
+        time += step
+        dark[channel] = not dark[channel]
+        cells = {
+            "time": f"{time / 10 ** (decimals):.{decimals}f}",
+            "channel": str(channel),
+            "state": str(int(dark[channel])),
+        }
+        rows.append(separator.join(cells[key] for key in order))
+        wanted.append((time * 10**6, channel, dark[channel]))
+    titles = {"time": f"Time ({name})", "channel": "Pin", "state": "State"}
+    path = tmp_path / "export"
+    path.write_text("\n".join([separator.join(titles[key] for key in order), *rows]))
+    (drop,) = drops_of(read_timer_file(path), {str(n): n for n in range(4)}, 8)
+    start = drop.edges[0].tick - wanted[0][0]
+    assert [(e.tick - start, e.channel, e.blocked) for e in drop.edges] == wanted
