@@ -56,11 +56,14 @@ def _parser() -> argparse.ArgumentParser:
 
     link = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
 
+    stop = benches.add_parser("stop", help="how long STOP takes to the wire, whatever is going on")
+    stop.add_argument("--stops", type=_count, default=50, metavar="N", help="in each condition")
+
     tui = benches.add_parser("tui", help="what the screen costs, and how late it is")
     tui.add_argument(
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
-    for one in (clock, faults, link, tui):
+    for one in (clock, faults, link, stop, tui):
         one.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser
 

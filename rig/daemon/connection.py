@@ -53,12 +53,8 @@ class Connection:
         self._urgent: set[asyncio.Task[None]] = set()
 
     def send(self, line: bytes) -> None:
-        """Send one message, some time; to a client that reads nothing no more of them."""
-        if self._writer.is_closing():
-            return
-        if self.waiting() > 2 * rpc.MESSAGE_LIMIT:
-            self._writer.transport.abort()
-        else:
+        """Send one message, some time."""
+        if not self._writer.is_closing():
             self._writer.write(line)
 
     def waiting(self) -> int:
@@ -94,6 +90,8 @@ class Connection:
     async def _read(self, waiting: asyncio.Queue[_Asked]) -> None:
         while line := await self._reader.readline():
             self._heard(self)
+            if self.waiting() > rpc.UNREAD_LIMIT:
+                await self._writer.drain()
             found = rpc.read_line(line)
             if isinstance(found, list):
                 reply = _Together(self.send, len(found)).add

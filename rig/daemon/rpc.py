@@ -20,6 +20,8 @@ REQUEST_LIMIT = 1 << 16
 """Bytes of a line to the daemon: a client that sends more is broken or worse."""
 MESSAGE_LIMIT = 1 << 24
 """Bytes of a line from the daemon: a snapshot with the edges of a very long drop."""
+UNREAD_LIMIT = 1 << 22
+"""Bytes of answers that a client leaves unread before the daemon reads no more of its requests."""
 PARSE, INVALID, NO_METHOD, BAD_PARAMS = -32700, -32600, -32601, -32602
 FAILURE = -32000
 BATCH_LIMIT = 64

@@ -19,9 +19,10 @@ from rig.daemon.connection import Connection
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import leave, listen
 from rig.daemon.publisher import Publisher
+from rig.daemon.rpc import error_to_data
 from rig.daemon.service import Service
 from rig.daemon.socket_path import peer_uid
-from rig.daemon.worker import Worker
+from rig.daemon.worker import STALL_S, Worker
 from rig.errors import RigError
 from rig.ports import is_simulated
 from rig.recorder.published import PublishedState
@@ -105,7 +106,12 @@ class Server:
             daemon={"version": __version__, "pid": os.getpid(), "api": rpc.API},
             port={"url": self.url, "simulated": is_simulated(self.url), "path": self.url},
         )
-        parts = [self._accept(listener), self.publisher.run(), self._watch_lease()]
+        parts = [
+            self._accept(listener),
+            self.publisher.run(),
+            self._watch_lease(),
+            self._watch_worker(),
+        ]
         if self._idle_s is not None:
             parts.append(self._watch_clients(self._idle_s))
         tasks = [loop.create_task(part) for part in parts]
@@ -202,6 +208,24 @@ class Server:
             if self.published.get("control") is not None and self._lease.holder is None:
                 self._worker.lost()
             self._service.show_control()
+
+    async def _watch_worker(self) -> None:
+        """Tell every client when nothing is known any more, and when it is again."""
+        told, before = None, "idle"
+        while True:
+            await asyncio.sleep(STALL_S / 10)
+            stalled = self._worker.stalled()
+            if stalled is not None:
+                if told is None:
+                    log.warning("%s (%s)", stalled.message, stalled.hint)
+                    before = self.published.get("phase")
+                told = error_to_data(stalled)
+                self.published.set(error=told, phase="trouble")
+            elif told is not None:
+                if self.published.get("error") == told:  # the worker has no trouble of its own
+                    phase = self.published.get("phase")
+                    self.published.set(error=None, phase=before if phase == "trouble" else phase)
+                told = None
 
     async def _watch_clients(self, idle_s: float) -> None:
         """End when no client was there for so long and nothing would be lost."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.daemon import rpc
+from rig.errors import DeviceTimeoutError
 from rig.printable import encodable, one_line
 from rig.session.schema import RunState
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 _ANY_NUMBER = (int, float)
+_STOP_S = 1.0  # for the board's answer; what is not known by then is said so
 
 
 class Service:
@@ -165,8 +167,16 @@ class Service:
 
     async def _stop(self, who: Connection, /, reason: object = "") -> dict[str, Any]:
         said = one_line(_text(reason, "reason"), 200) or f"stopped by {who.name}"
-        await asyncio.wrap_future(self._worker.stop(said))
-        return {}
+        done = asyncio.wrap_future(self._worker.stop(said))
+        await asyncio.wait([done], timeout=_STOP_S)
+        if not done.done():
+            stalled = self._worker.stalled()
+            raise DeviceTimeoutError(
+                "STOP went out to the board; that it was heard is not known yet"
+                + (f": {stalled.message}" if stalled else ""),
+                "a board that is not heard of switches its release off by itself, after 0.25 s",
+            )
+        return done.result() or {}
 
     async def _open_session(
         self, who: Connection, /, protocol: object, session: object, seed: object = None

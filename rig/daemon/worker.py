@@ -8,6 +8,7 @@ worker connects again, with growing pauses, and settles what was under way.
 from __future__ import annotations
 
 import logging
+import math
 import queue
 import random
 import threading
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.daemon.lease import ControlError
 from rig.daemon.rpc import error_to_data, known
+from rig.daemon.stopper import Stopper
 from rig.errors import InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
@@ -38,6 +40,8 @@ _PING_S = 0.37  # mean distance of clock samples while a session is open
 _COMMIT_S = 5.0  # so much of the idle talk may be lost with the power
 _STATISTICS_S = 1.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
+STALL_S = 1.0
+"""Held up for longer, the worker is said to be: nothing is known of the board meanwhile."""
 _LOST = "the client in control was lost"
 
 
@@ -77,6 +81,7 @@ class Worker:
         self._holder: object = None  # who armed
         self._at_work = False  # for a client
         self._ending = False
+        self._due_s = math.inf  # not begun
         self._uneven = random.Random()  # noqa: S311 - spacing, not secrets
         self._pause_s = _FIRST_PAUSE_S
         self._trouble: RigError | None = None
@@ -85,12 +90,14 @@ class Worker:
         self._looked_at = self._next_ping = self._next_commit = self._next_statistics = 0.0
         self.died: Callable[[BaseException], None] = lambda _: None
         self.controller = Controller(url, published=published, halted=self._halted, keep_port=True)
+        self._stopper = Stopper(self.controller.stop_past)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
     # ------------------------------------------------------------------ from other threads
 
     def start(self) -> None:
         """Begin to work."""
+        self._stopper.start()
         self._thread.start()
 
     def submit(
@@ -125,6 +132,7 @@ class Worker:
         with self._guard:
             self._stop = self._stop or reason
             self._stops.append(outcome)
+        self._stopper.ask()
         self._jobs.put(None)
         return outcome
 
@@ -137,6 +145,23 @@ class Worker:
         with suppress(SessionError):
             return self.controller.session.write_s
         return 0.0
+
+    def stalled(self) -> RigError | None:
+        """Say that nothing is known of the board, when the worker has been held up for long."""
+        late_s, recorder = time.monotonic() - self._due_s, self.controller.recorder
+        disk = self.disk_s() > 0.0
+        # Without a board there is nothing to know; a simulated one may take long to be made.
+        watched = disk or (recorder is not None and not is_simulated(self._url))
+        if late_s < STALL_S or not watched:
+            return None
+        what = "the disk has been at one write" if disk else "the daemon has been held up"
+        off = ""
+        if recorder is not None and recorder.armed is not None:
+            off = "; what was armed switches itself off after 0.25 s"
+        return SessionError(
+            f"{what} for {late_s:.0f} s: gates, phase and drop are not known meanwhile{off}",
+            "STOP still goes out to the board; look at the disk (full, on a network, failing?)",
+        )
 
     def at_rest(self) -> Future[bool]:
         """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
@@ -156,17 +181,23 @@ class Worker:
     def join(self) -> None:
         """Wait for the end."""
         self._thread.join()
+        self._stopper.end()
 
     # ------------------------------------------------------------------ the thread
 
     def _halted(self) -> bool:
         """Whether what is under way shall end: asked by the recorder, many times a second."""
+        self._beat()
         if self._stop:
             return True
         recorder = self.controller.recorder
         armed = recorder is not None and recorder.armed is not None
         asked = self._at_work and not self.controller.due
         return (self._ending or not self._held) and (armed or asked)
+
+    def _beat(self, patience_s: float = 0.0) -> None:
+        """Note that the thread goes on, and when it will at the latest have gone on again."""
+        self._due_s = time.monotonic() + patience_s
 
     @property
     def _held(self) -> bool:
@@ -184,7 +215,11 @@ class Worker:
             self._trying(self.controller.connect)
         while not self._ending:
             with suppress(queue.Empty):
-                self._do(self._jobs.get(timeout=self._patience()))
+                patience_s = self._patience()
+                self._beat(patience_s)
+                job = self._jobs.get(timeout=patience_s)
+                self._beat()
+                self._do(job)
             self._attend()
             self._trying(self.controller.finish)
             self._trying(self.controller.notice)
@@ -193,6 +228,7 @@ class Worker:
         self._attend()
         self._drain(StoppedError("the daemon ends", "start it again: rig daemon"))
         self._trying(self.controller.close)
+        self._due_s = math.inf
 
     def _do(self, job: _Job | None) -> None:
         if job is None or not job.outcome.set_running_or_notify_cancel():
@@ -208,7 +244,7 @@ class Worker:
             # First what follows for the link, so that a client sees it before its answer.
             if self._trouble is None:
                 self._weigh(failure)
-            stopped = isinstance(error, StoppedError) and self._stop
+            stopped = isinstance(error, StoppedError | DeviceRefusedError) and self._stop
             job.outcome.set_exception(StoppedError(self._stop) if stopped else failure)
         else:
             if self._trouble is not None and self._over():
@@ -238,6 +274,7 @@ class Worker:
         """Switch off what must not stay on."""
         recorder = self.controller.recorder
         armed = recorder is not None and recorder.armed is not None
+        self._beat()
         with self._guard:
             reason, stops = self._stop, [*self._stops]  # one that comes from here on is not lost
         if reason:
@@ -250,6 +287,7 @@ class Worker:
                 else _LOST
             )
         if reason:
+            self._stopper.taken_over()
             self._trying(lambda: self.controller.stop(reason))
         with self._guard:
             self._stops = [one for one in self._stops if one not in stops]

@@ -232,6 +232,16 @@ class Device:
         """Switch the release off, disarm, end a recording."""
         self._line.request(wire.Abort(), wire.Done, wait=_ABORT_WAIT_S)
 
+    def abort_past(self) -> None:
+        """Send ABORT from any thread, whatever is under way; nobody waits for its answer.
+
+        Raises
+        ------
+        OSError
+            The connection broke.
+        """
+        self._line.write_past(wire.Abort())
+
     def acknowledge(self, label: int, crc32: int) -> None:
         """Let the device forget a drop: call it when the drop is safe on disk, not before.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from rig.errors import DeviceError, DeviceTimeoutError
@@ -25,6 +26,8 @@ Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 _FIRST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
+_PAST_SEQ = 255
+"""Of what goes past a request that is under way, whose answer it must not be taken for."""
 _NOISE = 4096  # bytes without a delimiter that are no half of a frame any more
 
 
@@ -75,6 +78,7 @@ class Exchange:
         self._on_record = on_record
         self._seq = 0
         self._part = b""  # of a frame that has not ended yet
+        self._past: deque[tuple[int, bytes]] = deque()  # what `write_past` sent, for the tap
 
     def request(
         self,
@@ -110,7 +114,7 @@ class Exchange:
         DeviceError
             It answered something else, restarted, or the connection broke.
         """
-        self._seq = self._seq % 255 + 1
+        self._seq = self._seq % (_PAST_SEQ - 1) + 1
         seq = self._seq
         code, payload = wire.pack(message)
         data = encode(Frame(code, seq, 0, payload))
@@ -218,6 +222,22 @@ class Exchange:
         except OSError as error:
             raise _lost(error) from error
 
+    def write_past(self, message: wire.HostMessage) -> None:
+        """Send a request at once, from any thread, past one that is under way.
+
+        Nobody waits for its answer. The tap is given it before whatever comes next.
+
+        Raises
+        ------
+        OSError
+            The connection broke.
+        """
+        # The delimiter ends what another thread may be in the middle of: that is sent again.
+        code, payload = wire.pack(message)
+        data = DELIMITER + encode(Frame(code, _PAST_SEQ, 0, payload))
+        self._past.append((self.clock.now_ns(), data))
+        self._port.write(data)
+
     def waiting(self) -> int:
         """Count the bytes that have arrived and were not read yet.
 
@@ -236,7 +256,11 @@ class Exchange:
         return self._chunk("rx", part)
 
     def _chunk(self, direction: Direction, data: bytes) -> list[Record]:
-        now_ns = self.clock.now_ns()
+        while self._past:
+            self._log("tx", *self._past.popleft())
+        return self._log(direction, self.clock.now_ns(), data)
+
+    def _log(self, direction: Direction, now_ns: int, data: bytes) -> list[Record]:
         if self._tap is not None:
             self._tap(direction, now_ns, data)
         records = self.transcript.feed(direction, now_ns, data)

@@ -155,6 +155,8 @@ class Transcript:
         return self.identity.tick_hz if self.identity else 0
 
     def _sent(self, host_ns: int, frame: Frame, message: Message) -> list[Record]:
+        if isinstance(message, wire.Abort):
+            return []  # it may go past a request whose answer is still to come
         repeated = self._request == (frame.seq, message)
         self._request = (frame.seq, message)
         self._answered = repeated and self._answered

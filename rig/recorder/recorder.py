@@ -13,6 +13,7 @@ from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
 from rig.link.port import open_port, port_clock
+from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received
 from rig.ports import told
 from rig.protocol.measurable import record_ms
@@ -270,10 +271,12 @@ class Recorder:
             try:
                 with self._unless(self._go_on):
                     self.device.fire(token)
-            except StoppedError:
-                self.abort()
-                if self.held() == (run, attempt):
-                    self._armed = None  # it had heard: what fell is collected
+            except (StoppedError, DeviceRefusedError) as ended:
+                # A STOP that overtook the answer makes the device refuse the repeated request.
+                if isinstance(ended, StoppedError) or self._halted():
+                    self.abort()
+                    if self.held() == (run, attempt):
+                        self._armed = None  # it had heard: what fell is collected
                 raise
             self._armed = None  # from here on there is a recording, which `close` leaves alone
 
@@ -334,6 +337,7 @@ class Recorder:
             self._checks = ()
 
     def _give_way(self) -> None:
+        self._halted()  # also tells whoever owns this that the device is being waited for
         for check in self._checks:
             check()
 

@@ -42,6 +42,6 @@ def test_the_page_has_the_numbers():
     assert f"| {admission.CLIENTS}; {admission.RESERVE} more" in PAGE
     assert f"batch of up to {rpc.BATCH_LIMIT} requests" in PAGE
     assert f"| {rpc.BATCH_LIMIT}; more get" in PAGE
-    assert f"read | {2 * rpc.MESSAGE_LIMIT >> 20} MiB" in PAGE
+    assert f"read | {rpc.UNREAD_LIMIT >> 20} MiB" in PAGE
     assert rpc.REQUEST_LIMIT == 64 << 10
     assert rpc.MESSAGE_LIMIT == 16 << 20

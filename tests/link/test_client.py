@@ -136,7 +136,7 @@ def test_seq_wraps_around_zero(clock):
     for _ in range(300):
         one.ping()
     seqs = [frame.seq for data in port.written for frame in Decoder().feed(data)]
-    assert seqs == [n % 255 + 1 for n in range(300)]
+    assert seqs == [n % 254 + 1 for n in range(300)]
 
 
 def test_an_older_identity_is_refused(clock):

@@ -1,0 +1,128 @@
+"""How long STOP takes from a client's request to the wire, whatever holds the daemon up."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import statistics
+import time
+from contextlib import ExitStack, closing, contextmanager, suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bench.process_fixture import ProcessFixture
+from rig.daemon import rpc
+from rig.errors import RigError
+from rig.link.frames import Decoder
+from rig.link.messages import CODES, Abort
+from rig.session.store import Session
+from rig.text_table import text_table
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Callable, Iterator
+
+    from rig.daemon.client import Client
+
+_FLOOD = 60  # requests that wait in the daemon, of each of the clients that flood it
+_FLOODERS = 8
+LIMIT_S = 0.05
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Measure and print; 1 when any took longer than it may."""
+    found = {name: measured(held, arguments.stops) for name, held in CONDITIONS.items()}
+    if arguments.json:
+        print(json.dumps(found))
+    else:
+        rows = [["", "stops", "median ms", "p99 ms", "max ms"]]
+        for name, times in found.items():
+            numbers = statistics.median(times), np.quantile(times, 0.99), max(times)
+            rows.append([name, str(len(times)), *(f"{float(one) * 1e3:.2f}" for one in numbers)])
+        print("\n".join(text_table(rows, left={0}, rule=True)))
+    return int(any(max(times) > LIMIT_S for times in found.values()))
+
+
+def measured(held: Callable[[ProcessFixture], Iterator[None]], stops: int) -> list[float]:
+    """Stop an armed rig so often, and find in its log of bytes when ABORT left, s."""
+    asked = []
+    with ProcessFixture(runs=1, small_disk=True) as processes:
+        processes.start_daemon()
+        with closing(processes.client("in control")) as one, closing(processes.client()) as two:
+            one.take_control()
+            one.open_session(str(processes.protocol), str(processes.session))
+            for attempt in range(1, stops + 1):
+                _arm(one, attempt)
+                with contextmanager(held)(processes):
+                    asked.append(time.monotonic_ns())
+                    with suppress(RigError):
+                        two.stop("measured")
+                _settled(one)
+        left = _aborts(processes)
+    return [(next(at for at in left if at >= begun) - begun) * 1e-9 for begun in asked]
+
+
+def _arm(client: Client, attempt: int) -> None:
+    while True:
+        try:
+            client.arm(1, attempt)
+        except RigError:
+            _settled(client)
+        else:
+            return
+
+
+def _settled(client: Client) -> None:
+    """Wait until the daemon has no trouble any more."""
+    while client.call("subscribe")["state"]["error"] is not None:
+        time.sleep(0.05)
+    client.stop("whatever is armed still")
+
+
+def _aborts(processes: ProcessFixture) -> list[int]:
+    decoder = Decoder()
+    with Session.open(processes.session, readonly=True) as session:
+        return [
+            chunk.host_ns
+            for chunk in session.byte_log()
+            if chunk.direction == "tx"
+            if any(frame.type == CODES[Abort] for frame in decoder.feed(chunk.data))
+        ]
+
+
+def _quiet(_: ProcessFixture) -> Iterator[None]:
+    yield
+
+
+def _flood(processes: ProcessFixture) -> Iterator[None]:
+    """Have other clients ask for whole snapshots all the time."""
+    with ExitStack() as stack:
+        for number in range(_FLOODERS):
+            client = stack.enter_context(closing(processes.client(f"flood {number}")))
+            line = b"".join(rpc.request("subscribe", {}, n) for n in range(_FLOOD))
+            client._socket.sendall(line)
+        yield
+
+
+def _stalled(processes: ProcessFixture) -> Iterator[None]:
+    """Hold the session's lock, so that each write of the daemon waits 2 s."""
+    with closing(sqlite3.connect(processes.session, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with closing(processes.client("looking on")) as client:
+            while not client.call("renew")["disk_s"]:
+                pass
+            yield
+
+
+def _full(processes: ProcessFixture) -> Iterator[None]:
+    """Leave no room on the disk."""
+    assert processes.disk is not None
+    processes.disk.fill(processes.daemon)
+    try:
+        yield
+    finally:
+        processes.disk.free(processes.daemon)
+
+
+CONDITIONS = {"quiet": _quiet, "flood": _flood, "disk stalled": _stalled, "disk full": _full}
