@@ -107,7 +107,8 @@ def _flood(processes: ProcessFixture) -> Iterator[None]:
 
 def _stalled(processes: ProcessFixture) -> Iterator[None]:
     """Hold the session's lock, so that each write of the daemon waits 2 s."""
-    with closing(sqlite3.connect(processes.session, isolation_level=None)) as other:
+    # The daemon holds the lock itself until what it has logged is committed.
+    with closing(sqlite3.connect(processes.session, 60.0, isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")
         with closing(processes.client("looking on")) as client:
             while not client.call("renew")["disk_s"]:

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rig.printable import printable
 from rig.recover.drops import Fate, Recovered, recover_drops
 from rig.recover.pages import MAGIC, Pages, read_pages
 from rig.recover.rows import Rows, find_rows, gaps
@@ -85,7 +86,11 @@ def examine(path: str | os.PathLike[str]) -> Examined:
 
 
 def describe(found: Examined) -> list[str]:
-    """Say it in lines."""
+    """Say it in lines, safe for a terminal whatever stands in the file."""
+    return [printable(line).replace("\n", " ").replace("\t", " ") for line in _described(found)]
+
+
+def _described(found: Examined) -> list[str]:
     snapshot, rows = found.snapshot, found.rows
     lines = [f"{snapshot.path}: {len(snapshot.data)} bytes"]
     if snapshot.writer:
@@ -148,6 +153,8 @@ def _damage(snapshot: SessionCopy, pages: Pages, rows: Rows) -> list[str]:
         damage.append(f"{pages.missing} of {pages.expected} pages are not there: the file is torn")
     if snapshot.complaints:
         damage.append(f"SQLite cannot read it as it is: {snapshot.complaints[0]}")
+    if snapshot.unreadable:
+        damage.append(f"rig cannot read it as it is: {snapshot.unreadable}")
     if rows.bad:
         damage.append(f"{rows.bad} records cannot be read")
     orphans = len(rows.edge.keys() - rows.drop.keys())

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 from rig.recover.pages import read_cells
+from rig.session.foreign import members, texts
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rig.recover.pages import PageCell, Pages, Value
 
 Row: TypeAlias = "tuple[Value, ...]"
@@ -77,7 +79,7 @@ def _sort(rows: Rows, cell: PageCell) -> None:
             rows.protocol = rows.protocol or (source, text)
         case (None, int(), "rx" | "tx", bytes()):
             rows.bytes.setdefault(rowid, values)
-        case (None, int(), str(text)) if _json(text):
+        case (None, int(), str(text)) if _reads(members, text):
             rows.identity.setdefault(rowid, values)
         case (None, int(sent), int(received), int(tick)):
             trip = 0 <= received - sent <= _TRIP_NS and 0 <= tick < _U32
@@ -85,7 +87,7 @@ def _sort(rows: Rows, cell: PageCell) -> None:
         case (None, int(), int(), int(), int()):
             rows.reference.setdefault(rowid, values)
         case (None, int(run), int(), str(state), str(reasons), int()) if (
-            run >= 1 and state in _STATES and _json(reasons)
+            run >= 1 and state in _STATES and _reads(texts, reasons)
         ):
             rows.run_state.setdefault(rowid, values)
         case (None, int(run), int(attempt), int(hz), *_) if _is_drop(values, run, attempt, hz):
@@ -99,15 +101,16 @@ def _is_drop(values: Row, run: int, attempt: int, hz: int) -> bool:
     return (
         all(value is None or isinstance(value, int) for value in numbers)
         and isinstance(values[5], int)
+        and len({value is None for value in values[6:11]}) == 1  # of a certificate all or nothing
         and isinstance(values[11], str)
-        and _json(values[11])
+        and _reads(texts, values[11])
         and isinstance(values[13], str)
     )
 
 
-def _json(text: str) -> bool:
+def _reads(read: Callable[[str], object], text: str) -> bool:
     try:
-        json.loads(text)
-    except ValueError:
+        read(text)
+    except (TypeError, ValueError, RecursionError):
         return False
     return True

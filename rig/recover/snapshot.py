@@ -11,6 +11,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rig.errors import SessionError
+from rig.session.store import Session
+
+_TROUBLE = (sqlite3.Error, UnicodeDecodeError)
+"""What SQLite raises; where it names what is damaged by bytes that are no text, the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +35,8 @@ class SessionCopy:
         Whether this user may write it.
     complaints
         What SQLite has to say against it; empty when it is sound.
+    unreadable
+        Why this program cannot read it all the same; empty when it can.
     """
 
     path: Path
@@ -39,6 +45,7 @@ class SessionCopy:
     writer: str
     writable: bool
     complaints: tuple[str, ...]
+    unreadable: str
 
 
 def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
@@ -66,6 +73,7 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
                     logged = _fold_in(copy)
             data = copy.read_bytes()
             complaints = _complaints(copy)
+            unreadable = "" if complaints else _unreadable(copy, place)
     except SessionError:
         raise
     except OSError as error:
@@ -73,7 +81,9 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
             f"cannot read {path}: {error.strerror or error}",
             "check its name and permissions, and that there is room for a copy in TMPDIR",
         ) from error
-    return SessionCopy(place, data, logged, writer, os.access(place, os.W_OK), complaints)
+    return SessionCopy(
+        place, data, logged, writer, os.access(place, os.W_OK), complaints, unreadable
+    )
 
 
 def _writer(place: Path) -> str:
@@ -98,7 +108,7 @@ def _copy_beside_writer(place: Path, copy: Path) -> None:
             closing(sqlite3.connect(copy)) as target,
         ):
             source.backup(target)
-    except sqlite3.Error:
+    except _TROUBLE:
         copy.write_bytes(place.read_bytes())
 
 
@@ -108,7 +118,7 @@ def _fold_in(copy: Path) -> int:
         with closing(sqlite3.connect(copy)) as connection:
             connection.execute("PRAGMA writable_schema = on")  # also into one that is damaged
             _, logged, _ = connection.execute("PRAGMA wal_checkpoint").fetchone()
-    except sqlite3.Error:
+    except _TROUBLE:
         return 0
     return max(0, int(logged))
 
@@ -117,6 +127,18 @@ def _complaints(copy: Path) -> tuple[str, ...]:
     try:
         with closing(sqlite3.connect(copy)) as connection:
             said = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
-    except sqlite3.Error as error:
+    except _TROUBLE as error:
         return (str(error),)
-    return () if said == ["ok"] else tuple(line for text in said for line in text.splitlines())
+    if said != ["ok"]:
+        return tuple(line for text in said for line in text.splitlines())
+    return ()
+
+
+def _unreadable(copy: Path, place: Path) -> str:
+    """Say why `rig report` cannot read a file that is sound for SQLite; empty when it can."""
+    try:
+        with Session.open(copy, readonly=True) as session:
+            session.check()
+    except SessionError as error:
+        return error.message.replace(str(copy), place.name)
+    return ""

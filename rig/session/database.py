@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rig.errors import SessionError
 from rig.files import sync_directory
 from rig.session.faults import not_a_session, translated
+from rig.session.foreign import check_schema, guard
 from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION, UPGRADES
 
 if TYPE_CHECKING:
@@ -105,7 +106,8 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
     with translated(path):
         connection = _connect(path, _reading_mode(path) if readonly else "rw")
         try:
-            _check_format(path, connection)
+            guard(connection)
+            check_schema(path, connection, _format(path, connection))
             connection.execute("PRAGMA foreign_keys = ON")
             connection.execute("PRAGMA recursive_triggers = ON")
             if readonly:
@@ -146,7 +148,14 @@ def _reading_mode(path: Path) -> str:
     return "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
 
 
-def _check_format(path: Path, connection: sqlite3.Connection) -> None:
+def _format(path: Path, connection: sqlite3.Connection) -> int:
+    """Read the version of a session's format.
+
+    Raises
+    ------
+    SessionError
+        It is no session, or a newer one.
+    """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     if application != APPLICATION_ID:
         raise not_a_session(path, "it is another program's SQLite database")
@@ -159,3 +168,4 @@ def _check_format(path: Path, connection: sqlite3.Connection) -> None:
             f"{SCHEMA_VERSION})",
             "update rig to open it",
         )
+    return int(version)

@@ -44,6 +44,10 @@ _ADVICE = {
         "{path} is damaged",
         "rig recover says what is whole, and with -o NEW saves all that can be read",
     ),
+    sqlite3.SQLITE_INTERRUPT: (
+        "{path} takes far longer to read than any session",
+        "it was altered or is damaged: rig recover says what is whole",
+    ),
     sqlite3.SQLITE_NOTADB: ("{path} is not a session file", _NOT_A_SESSION),
     sqlite3.SQLITE_CONSTRAINT: (
         "{path} refuses this record",
@@ -62,7 +66,11 @@ def as_session_error(path: Path, error: sqlite3.Error) -> SessionError:
     code = getattr(error, "sqlite_errorcode", None)  # absent on errors of the Python wrapper
     primary = code & 0xFF if isinstance(code, int) else sqlite3.SQLITE_ERROR
     message, hint = _ADVICE.get(
-        primary, ("{path} cannot be used", "check the file with: sqlite3 FILE 'pragma quick_check'")
+        primary,
+        (
+            "{path} cannot be read",
+            "rig recover says what is whole, and with -o NEW saves all that can be read",
+        ),
     )
     return SessionError(f"{message.format(path=path)} ({error})", hint)
 
@@ -74,3 +82,5 @@ def translated(path: Path) -> Iterator[None]:
         yield
     except sqlite3.Error as error:
         raise as_session_error(path, error) from error
+    except UnicodeDecodeError as error:  # SQLite names what is damaged by bytes that are no text
+        raise SessionError(f"{path} is damaged", _ADVICE[sqlite3.SQLITE_CORRUPT][1]) from error

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import json
+import hashlib
 from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from rig.boards import GATES
 from rig.errors import SessionError
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.session.faults import translated
+from rig.session.foreign import RECOVER, fitting, limit_steps, members, readable, texts
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -23,6 +25,11 @@ Direction = Literal["rx", "tx"]
 
 UNBLINDED = "unblinded"
 """The one fact that may be added later."""
+MOST_EDGES = 1 << 22
+"""Of a drop that no certificate bounds: no timer that works gives more in an hour."""
+_ALWAYS = {"created", "rig_version", "simulated", "origin", "protocol_sha256"}
+_STATE = "iitit"  # columns of a line of the log
+_DROP = "iiiiIiIIIIItItIIIIII"  # and of a drop, see rig.session.schema
 # Names that are put into SQL are these only.
 _GROWING = ("identity", "drop", "run_state", "ping", "reference", "host_break")
 
@@ -60,8 +67,12 @@ class Reader:
         self.path = path
         self._connection: sqlite3.Connection | None = connection
         self._meta: Mapping[str, str] = MappingProxyType(
-            dict(self._rows("SELECT key, value FROM meta"))
+            dict(self._rows("SELECT key, value FROM meta", kinds="tt"))
         )
+        if missing := sorted(_ALWAYS - self._meta.keys()):
+            raise SessionError(f"{path} does not say {missing[0]}", RECOVER)
+        if self._meta["simulated"] not in {"true", "false"}:
+            raise SessionError(f"{path} does not say whether it is simulated", RECOVER)
 
     @property
     def readonly(self) -> bool:
@@ -99,28 +110,34 @@ class Reader:
     @property
     def protocol_text(self) -> str:
         """The protocol file word for word."""
-        return str(self._one("SELECT text FROM protocol"))
+        return str(self._one("SELECT text FROM protocol", "t"))
 
     @property
     def protocol_source(self) -> str:
         """The protocol file's name when the session was made."""
-        return str(self._one("SELECT source FROM protocol"))
+        return str(self._one("SELECT source FROM protocol", "t"))
 
     def identities(self) -> list[tuple[int, dict[str, Any]]]:
         """Host time and content of every identity, in order."""
-        rows = self._rows("SELECT host_ns, json FROM identity ORDER BY id")
-        return [(host_ns, json.loads(text)) for host_ns, text in rows]
+        with readable(self.path):
+            rows = self._rows("SELECT host_ns, json FROM identity ORDER BY id", kinds="it")
+            return [(host_ns, members(text)) for host_ns, text in rows]
 
     def byte_log(self) -> Iterator[ByteChunk]:
         """All bytes in both directions, in order, read as they are asked for."""
-        for row in self._rows("SELECT host_ns, direction, data FROM bytes ORDER BY id"):
+        sql = "SELECT host_ns, direction, data FROM bytes ORDER BY id"
+        for row in self._rows(sql, kinds="itb"):
+            if row[1] not in {"rx", "tx"}:
+                raise SessionError(f"{self.path} has bytes of no direction", RECOVER)
             yield ByteChunk(*row)
 
     def pings(self, after: int = 0) -> list[ClockSample]:
         """Clock samples in order, all but the first so many."""
         # Nothing is ever deleted, so rows are numbered from 1 without gaps.
         rows = self._rows(
-            "SELECT host_send_ns, host_recv_ns, tick FROM ping WHERE id > ? ORDER BY id", after
+            "SELECT host_send_ns, host_recv_ns, tick FROM ping WHERE id > ? ORDER BY id",
+            after,
+            kinds="iii",
         )
         return [ClockSample(*row) for row in rows]
 
@@ -136,11 +153,13 @@ class Reader:
 
     def drops(self) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording."""
-        yield from map(self._drop, list(self._rows('SELECT * FROM "drop" ORDER BY id')))
+        rows = list(self._rows('SELECT * FROM "drop" ORDER BY id', kinds=_DROP))
+        yield from map(self._drop, rows)
 
     def drop(self, run: int, attempt: int) -> Drop | None:
         """Return one recorded attempt; `None` when there is no such record."""
-        rows = self._rows('SELECT * FROM "drop" WHERE run = ? AND attempt = ?', run, attempt)
+        sql = 'SELECT * FROM "drop" WHERE run = ? AND attempt = ?'
+        rows = self._rows(sql, run, attempt, kinds=_DROP)
         return next(map(self._drop, list(rows)), None)
 
     def latest_drops(self, run: int | None = None) -> list[Drop]:
@@ -149,6 +168,7 @@ class Reader:
             'SELECT * FROM "drop" AS d WHERE run = ifnull(?, run) AND attempt = '
             '(SELECT max(attempt) FROM "drop" WHERE run = d.run) ORDER BY run',
             run,
+            kinds=_DROP,
         )
         return [self._drop(row) for row in list(rows)]
 
@@ -158,14 +178,17 @@ class Reader:
         rows = self._rows(
             f"SELECT run, attempt, state, host_ns, reasons FROM run_state {which} ORDER BY id",  # noqa: S608
             *values,
+            kinds=_STATE,
         )
-        return [_state(row) for row in rows]
+        with readable(self.path):
+            return [_state(row) for row in rows]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
         """Return by run and attempt when the host's log says that it was fired."""
         rows = self._rows(
             "SELECT run, attempt, host_ns FROM run_state WHERE state = ? ORDER BY id",
             RunState.FIRED,
+            kinds="iii",
         )
         return {(run, attempt): host_ns for run, attempt, host_ns in rows}
 
@@ -175,67 +198,122 @@ class Reader:
             "SELECT run, attempt, state, host_ns, reasons FROM run_state WHERE run = ? "
             "ORDER BY id DESC LIMIT 1",
             run,
+            kinds=_STATE,
         )
-        return next(map(_state, rows), None)
+        with readable(self.path):
+            return next(map(_state, rows), None)
 
     def extent(self) -> str:
         """Say how far the records go from which results follow: they are only ever added to."""
-        there = {name for (name,) in self._rows("SELECT name FROM sqlite_master")}
+        there = {name for (name,) in self._rows("SELECT name FROM sqlite_master", kinds="t")}
         ends = [
             f"{table} {last}"
             for table in _GROWING
             if table in there  # older files have fewer
-            for (last,) in self._rows(f'SELECT ifnull(max(id), 0) FROM "{table}"')  # noqa: S608
+            for (last,) in self._rows(f'SELECT ifnull(max(id), 0) FROM "{table}"', kinds="i")  # noqa: S608
         ]
         return ", ".join(ends)
 
     def results_of(self, analysis_version: str) -> list[dict[str, Any]]:
         """Return the results if they were put by this version; none if by another."""
         sql = "SELECT json FROM result WHERE analysis_version = ? ORDER BY run, attempt"
-        return [json.loads(text) for (text,) in self._rows(sql, analysis_version)]
+        with readable(self.path):
+            rows = self._rows(sql, analysis_version, kinds="t")
+            return [members(text) for (text,) in rows]
 
     def results(self) -> list[dict[str, Any]]:
         """Return derived results as last put, by run and attempt."""
-        rows = self._rows("SELECT json FROM result ORDER BY run, attempt")
-        return [json.loads(text) for (text,) in rows]
+        with readable(self.path):
+            rows = self._rows("SELECT json FROM result ORDER BY run, attempt", kinds="t")
+            return [members(text) for (text,) in rows]
+
+    def check(self) -> None:
+        """Read everything there is once.
+
+        Raises
+        ------
+        SessionError
+            Something of it cannot be read.
+        """
+        self.extent()
+        self.identities()
+        for _ in self.byte_log():
+            pass
+        self.pings()
+        self.pulses()
+        self.host_breaks()
+        self.states()
+        for _ in self.drops():
+            pass
+        self.results()
+        if hashlib.sha256(self.protocol_text.encode()).hexdigest() != self._meta["protocol_sha256"]:
+            raise SessionError(f"{self.path}: its protocol was altered", RECOVER)
+        _ = self.protocol_source
 
     def _opened(self) -> sqlite3.Connection:
         if self._connection is None:
             raise SessionError(f"{self.path} is closed", "open it again")
         return self._connection
 
-    def _rows(self, sql: str, *values: object) -> Iterator[tuple[Any, ...]]:
-        with translated(self.path):
+    def _rows(self, sql: str, *values: object, kinds: str) -> Iterator[tuple[Any, ...]]:
+        """Read rows, each looked at: see `rig.session.foreign.fitting`."""
+        with translated(self.path), readable(self.path):
+            connection = self._opened()
+            if self.readonly:
+                limit_steps(connection)
             # Not the cursor itself: it would be closed with this generator, which a traceback can
             # keep alive until after the database.
-            yield from iter(self._opened().execute(sql, values).fetchone, None)
+            for row in iter(connection.execute(sql, values).fetchone, None):
+                yield fitting(row, kinds[: len(row)])
 
     def _newer(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
         """Read a table that a file of an older format, opened read-only, does not have."""
-        if any(self._rows("SELECT 1 FROM sqlite_master WHERE name = ?", table)):
-            yield from self._rows(f"SELECT {columns} FROM {table} ORDER BY id")  # noqa: S608
+        if any(self._rows("SELECT 1 FROM sqlite_master WHERE name = ?", table, kinds="i")):
+            sql = f"SELECT {columns} FROM {table} ORDER BY id"  # noqa: S608
+            yield from self._rows(sql, kinds="iiii")
 
-    def _one(self, sql: str) -> Any:
-        return next(self._rows(sql))[0]
+    def _one(self, sql: str, kind: str) -> Any:
+        row = next(self._rows(sql, kinds=kind), None)
+        if row is None:
+            raise SessionError(f"{self.path} has lost its protocol", RECOVER)
+        return row[0]
 
     def _drop(self, row: tuple[Any, ...]) -> Drop:
         number, run, attempt, tick_hz, fire_tick, initial_state, events, *counts = row[:11]
-        edges = self._rows(
-            'SELECT tick, channel, blocked FROM edge WHERE "drop" = ? ORDER BY idx', number
+        # A file of the first format, opened read-only, has no release sense.
+        certificate = None
+        if events is not None:
+            if None in counts:
+                raise SessionError(f"{self._which(run, attempt)} has half a certificate", RECOVER)
+            certificate = Certificate(events, *counts, *row[14:])
+        # An event is a change of one gate or more.
+        most = MOST_EDGES if certificate is None else max(0, min(MOST_EDGES, GATES * events))
+        edges = list(
+            self._rows(
+                'SELECT tick, channel, blocked FROM edge WHERE "drop" = ? ORDER BY idx LIMIT ?',
+                number,
+                most + 1,
+                kinds="iii",
+            )
         )
-        return Drop(
-            run=run,
-            attempt=attempt,
-            tick_hz=tick_hz,
-            edges=tuple(Edge(tick, channel, bool(blocked)) for tick, channel, blocked in edges),
-            fire_tick=fire_tick,
-            initial_state=initial_state,
-            # A file of the first format, opened read-only, has no release sense.
-            certificate=None if events is None else Certificate(events, *counts, *row[14:]),
-            faults=tuple(json.loads(row[11])),
-        )
+        if len(edges) > most:
+            raise SessionError(f"{self._which(run, attempt)} has more than {most} edges", RECOVER)
+        with readable(self.path):
+            return Drop(
+                run=run,
+                attempt=attempt,
+                tick_hz=tick_hz,
+                edges=tuple(Edge(tick, channel, bool(blocked)) for tick, channel, blocked in edges),
+                fire_tick=fire_tick,
+                initial_state=initial_state,
+                certificate=certificate,
+                faults=texts(row[11]),
+            )
+
+    def _which(self, run: int, attempt: int) -> str:
+        return f"{self.path}: run {run}, attempt {attempt},"
 
 
 def _state(row: tuple[Any, ...]) -> StateEntry:
     run, attempt, state, host_ns, reasons = row
-    return StateEntry(run, attempt, RunState(state), host_ns, tuple(json.loads(reasons)))
+    return StateEntry(run, attempt, RunState(state), host_ns, texts(reasons))

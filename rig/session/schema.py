@@ -164,6 +164,16 @@ UPGRADES = {
 }
 """What makes a file of one version one of the next."""
 
+LATER: dict[str, tuple[tuple[int, ...], int]] = {
+    "drop": ((2, *(4 for _ in _ACCOUNT)), 1),
+    **{
+        name: ((), 3)
+        for table in ("reference", "host_break")
+        for name in (table, *(f"{table}_no_{what}" for what in ("update", "delete", "replace")))
+    },
+}
+"""Since which version a table has its last columns, and since which it is there at all."""
+
 CREATE = (
     _TABLES
     + _CLOCK_TABLES

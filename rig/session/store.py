@@ -37,11 +37,11 @@ class Session(Reader):
     """
 
     def __init__(self, path: Path, connection: sqlite3.Connection, lock: WriterLock | None) -> None:
-        super().__init__(path, connection)
         self._lock = lock
+        super().__init__(path, connection)
         self._journal = Journal(connection, path)
         # Counted here, not by SQLite, so that a commit tried again writes the same rows.
-        self._last_drop = int(self._one('SELECT coalesce(max(id), 0) FROM "drop"'))
+        self._last_drop = int(self._one('SELECT coalesce(max(id), 0) FROM "drop"', "i"))
 
     @classmethod
     def create(

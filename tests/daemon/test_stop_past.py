@@ -9,7 +9,7 @@ from rig.errors import DeviceTimeoutError
 from rig.link.frames import Decoder
 from rig.link.messages import CODES, Abort, Done, Phase
 from rig.session.store import Session
-from tests.waiting import until
+from tests.waiting import PATIENCE_S, until
 
 
 def frames(session, direction):
@@ -29,7 +29,7 @@ def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
     one.arm(1, 1)
     processes.await_phase(Phase.ARMED)
     seen = []
-    with closing(sqlite3.connect(processes.session, isolation_level=None)) as other:
+    with closing(sqlite3.connect(processes.session, PATIENCE_S, isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")  # for 2 s each of the daemon's writes waits for this
         until(lambda: two.call("renew")["disk_s"] > 0.0)
         with suppress(DeviceTimeoutError):

@@ -1,0 +1,141 @@
+"""Files that somebody sent: altered anywhere, they are read or refused in plain words."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+
+import pytest
+
+from bench.mutants import (
+    _CSV,
+    FENCE,
+    Mutants,
+    altered_text,
+    failures,
+    make_session,
+    read_text_as,
+    read_through,
+)
+from rig.cli import main
+from rig.errors import SessionError
+from rig.recover.examine import describe, examine
+from rig.session import foreign
+from rig.session.store import Session
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    return make_session(tmp_path_factory.mktemp("sound"))
+
+
+@pytest.fixture
+def mutants(sound, tmp_path):
+    return Mutants(sound, tmp_path)
+
+
+def test_two_thousand_sessions_are_read_or_refused(mutants, tmp_path):
+    path, done = tmp_path / "mutant", {}
+
+    def each(seed):
+        done[seed] = mutants.write(seed, path)
+        read_through(path)
+
+    assert [
+        f"{one} {done[int(one[5:].split(':')[0])]}" for one in failures(each, range(2000))
+    ] == []
+
+
+def test_recover_tells_of_any_session_and_calls_none_whole_that_cannot_be_read(mutants, tmp_path):
+    path = tmp_path / "mutant"
+
+    def each(seed):
+        what = mutants.write(seed, path)
+        found = examine(path)
+        assert all(line.isprintable() for line in describe(found))
+        if found.whole:
+            try:
+                read_through(path)
+            except SessionError as error:
+                raise AssertionError(what) from error
+
+    assert failures(each, range(150)) == []
+
+
+def test_two_thousand_protocols_are_read_or_refused(tmp_path):
+    path, text = tmp_path / "mutant.yaml", FENCE.replace("RUNS", "2")
+
+    def each(seed):
+        read_text_as("protocol", altered_text(text, seed), path)
+
+    assert failures(each, range(2000)) == []
+
+
+@pytest.mark.parametrize("kind", ["edges", "timer"])
+def test_a_thousand_csv_files_are_read_or_refused(kind, tmp_path):
+    def each(seed):
+        read_text_as(kind, altered_text(_CSV, seed), tmp_path / "mutant.csv")
+
+    assert failures(each, range(500)) == []
+
+
+VIEW = """
+ALTER TABLE edge RENAME TO edge_of_old;
+CREATE VIEW edge AS WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n)
+SELECT 1 AS "drop", i AS idx, i AS tick, 0 AS channel, i % 2 AS blocked FROM n;
+"""
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        VIEW,
+        "CREATE VIEW more AS SELECT 1",
+        "CREATE TABLE more (x)",
+        "CREATE TRIGGER more AFTER INSERT ON meta BEGIN SELECT 1; END",
+        "DROP TRIGGER edge_no_update",
+        "DROP INDEX run_state_by_run",
+        "ALTER TABLE ping ADD COLUMN more INTEGER GENERATED ALWAYS AS (tick + 1)",
+        "DROP TABLE reference",
+    ],
+)
+def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp_path, capsys):
+    path = tmp_path / "altered"
+    path.write_bytes(sound.read_bytes())
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(sql)
+    for readonly in (True, False):
+        with pytest.raises(SessionError, match="built or altered by another program"):
+            Session.open(path, readonly=readonly)
+    assert main(["recover", str(path)]) == SessionError.exit_code
+    assert "rig cannot read it" in capsys.readouterr().out
+
+
+def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):
+    path = tmp_path / "analysed"
+    path.write_bytes(sound.read_bytes())
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("ANALYZE")
+    read_through(path)
+
+
+def test_a_statement_that_runs_away_is_ended(sound, monkeypatch):
+    monkeypatch.setattr(foreign, "_MOST_STEPS", 10)
+    monkeypatch.setattr(foreign, "_STEPS", 10)
+    with pytest.raises(SessionError, match="far longer to read than any session"):
+        read_through(sound)
+
+
+def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
+    path = tmp_path / "more"
+    path.write_bytes(sound.read_bytes())
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(
+            'INSERT INTO edge SELECT "drop", idx + 1000, tick, channel, blocked FROM edge, '
+            "(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 40) "
+            "SELECT i * 1000 AS more FROM n) WHERE 0; "
+            "WITH RECURSIVE n(i) AS (SELECT 1000 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
+            "INSERT INTO edge SELECT 1, i, i, 0, 1 FROM n;"
+        )
+    with pytest.raises(SessionError, match="run 1, attempt 1, has more than"):
+        read_through(path)
