@@ -15,9 +15,9 @@ from bench.process_fixture import FENCE
 from rig.errors import RigError
 from rig.protocol import reader
 from rig.recorder.controller import Controller
-from rig.session.edges_csv import read_edges
 from rig.session.store import Session
-from rig.session.timer_csv import read_timer
+from rig.timers.edges_csv import read_edges
+from rig.timers.timer_file import read_timer_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -176,7 +176,7 @@ def read_text_as(kind: str, text: str, path: Path) -> None:
     elif kind == "edges":
         read_edges(path)
     else:
-        read_timer(path, 0, 8)
+        read_timer_file(path)
 
 
 def failures(each: Callable[[int], object], seeds: range) -> list[str]:
