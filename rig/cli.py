@@ -134,7 +134,13 @@ def _parser() -> argparse.ArgumentParser:
     _tui(command("tui", "the lab session in the terminal: protocol, gates, runs, results"))
 
     check = command("check", "say what a protocol's scene has and what follows from it")
-    _protocol(check)
+    _protocol(check, nargs="?")
+    check.add_argument(
+        "--keys", action="store_true", help="say what any protocol may say: every key"
+    )
+    check.add_argument(
+        "--schema", action="store_true", help="the same as a JSON Schema, for editors"
+    )
     check.add_argument("--board", choices=tuple(BOARDS), help="refuse what this kind cannot do")
 
     design = command("design", "predict what a gate layout will tell, and propose better heights")
@@ -480,8 +486,10 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def _protocol(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("protocol", metavar="PROTOCOL", help="the protocol file (YAML)")
+def _protocol(parser: argparse.ArgumentParser, nargs: str | None = None) -> None:
+    parser.add_argument(
+        "protocol", metavar="PROTOCOL", nargs=nargs, help="the protocol file (YAML)"
+    )
 
 
 def _session(parser: argparse.ArgumentParser) -> None:

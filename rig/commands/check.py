@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
+from rig.errors import InputError
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -17,11 +19,24 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Namespace) -> int:
-    """Describe a protocol."""
+    """Describe a protocol, or what any protocol may say."""
+    if arguments.keys or arguments.schema:
+        return _reference(as_schema=arguments.schema)
+    if arguments.protocol is None:
+        hint = "rig check PROTOCOL; rig check --keys lists all keys"
+        raise InputError("no protocol is named", hint)
     protocol = reader.read(arguments.protocol)
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
+    return 0
+
+
+def _reference(*, as_schema: bool) -> int:
+    """Print every key that there is, for people or for editors."""
+    from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
+
+    print(json.dumps(schema(), indent=2, ensure_ascii=False) if as_schema else page().rstrip())
     return 0
 
 

@@ -1,0 +1,347 @@
+"""Every key of a protocol file: what it may be, what it is without being written, what it means.
+
+The page `docs/protocol.md` and the JSON Schema that editors read are made from this one table, and
+tests read every example of it with the reader itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from rig.boards import GATES, RELEASES
+from rig.protocol import chains, drag, gates, masses, reader, rods, settings, spacing, surface
+from rig.protocol.fields import Range
+from rig.protocol.priors import PRIORS
+from rig.protocol.protocol import DATUM_U, Accept, Contact, Drag, Plan, Priors, ReleasePulse
+from rig.units import Dimension, Quantity, format_quantity
+
+ANY = "*"
+"""Stands in a path for names that the file chooses: of chains."""
+EACH = "[]"
+"""Stands in a path for each item of a list."""
+
+
+class Whole(NamedTuple):
+    """Whole numbers from `low` to `high`."""
+
+    low: int
+    high: int
+
+    def __str__(self) -> str:
+        between = f"{self.low} to {self.high}"
+        return f"a whole number, {between}" if self.low < self.high else str(self.low)
+
+
+class OneOf(NamedTuple):
+    """One of these words."""
+
+    words: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return ", ".join(self.words)
+
+
+class OneOrMore(NamedTuple):
+    """One value or a list of them."""
+
+    each: Range
+
+    def __str__(self) -> str:
+        return f"{self.each}; one or a list"
+
+
+class Either(NamedTuple):
+    """A value of one of these kinds."""
+
+    kinds: tuple[Accepted, ...]
+
+    def __str__(self) -> str:
+        return "; or ".join(map(str, self.kinds))
+
+
+class ListOf(NamedTuple):
+    """A list, whose items have keys of their own or are values."""
+
+    each: Range | None = None
+
+    def __str__(self) -> str:
+        return "a list" if self.each is None else f"a list of values, {self.each}"
+
+
+class Mapped(NamedTuple):
+    """Keys with values."""
+
+    def __str__(self) -> str:
+        return "keys"
+
+
+class Text(NamedTuple):
+    """Any text."""
+
+    def __str__(self) -> str:
+        return "text"
+
+
+Accepted = Range | Whole | OneOf | OneOrMore | Either | ListOf | Mapped | Text
+
+
+class Key(NamedTuple):
+    """One key.
+
+    Attributes
+    ----------
+    path
+        From the root, parts joined by dots; see `ANY` and `EACH`.
+    accepted
+        What it may be.
+    default
+        What it is where it is left out; empty where it then is not there at all.
+    meaning
+        In words.
+    example
+        As written in a file.
+    required
+        Whether it must be there.
+    """
+
+    path: str
+    accepted: Accepted
+    default: str
+    meaning: str
+    example: str
+    required: bool = False
+
+
+def _said(value: float, unit: str) -> str:
+    return format_quantity(Quantity(value), unit)
+
+
+_PLAN, _PULSE, _ACCEPT, _CONTACT = Plan(), ReleasePulse(), Accept(), Contact()
+_MAP, _TEXT = Mapped(), Text()
+
+KEYS: tuple[Key, ...] = (
+    Key("protocol", Whole(1, 1), "", "version of this format", "1", required=True),
+    Key("title", _TEXT, "the file's name", "of the session and its reports", "Two like chains"),
+    Key("notes", _TEXT, "", "for people; kept with the session", "Chains weighed in May."),
+    Key("blind", OneOf(("true", "false")), "false",
+        "whether what is measured is kept back until `rig unblind`", "true"),
+    Key("gravity", reader.GRAVITY, "",
+        "local acceleration of free fall, ± its standard uncertainty; or `site`",
+        "9.8124 m/s^2 ± 0.0002 m/s^2"),
+    Key("site", _MAP, "", "gravity from where the lab is, by WGS 84", ""),
+    Key("site.latitude", reader.LATITUDE, "", "geodetic latitude", "61.19 deg", required=True),
+    Key("site.height", reader.HEIGHT, "", "above sea level", "30 m", required=True),
+    Key("drop", reader.DROP, "0 m",
+        "height of the lowest rod's middle above the contact point before release, ±; above any "
+        "fixed level where nothing is struck", "180 mm ± 2 mm"),
+    Key("initial_speed", reader.INITIAL_SPEED, "0 m/s",
+        "downward speed with which chains are let go", "0.5 m/s"),
+
+    Key("chains", _MAP, "", "one chain or two, by the names on their labels", "", required=True),
+    Key(f"chains.{ANY}.like", _TEXT, "", "another chain: what is not written here is as there",
+        "A"),
+    Key(f"chains.{ANY}.rods", Either((Whole(2, rods.MOST_RODS), ListOf())), "",
+        "how many like rods, or groups of them from the bottom up", "25", required=True),
+    Key(f"chains.{ANY}.rods.{EACH}.count", Whole(1, rods.MOST_RODS), "1", "rods in a group", "5"),
+    Key(f"chains.{ANY}.rods.{EACH}.diameter", rods.DIAMETER, "the chain's", "of a group's rods",
+        "12.7 mm"),
+    Key(f"chains.{ANY}.rods.{EACH}.mass", rods.MASS, "the chain's", "of each rod of a group",
+        "14 g"),
+    Key(f"chains.{ANY}.length", chains.LENGTH, "",
+        "from the lowest rod's middle to the highest one's; not with listed spacing", "1165 mm"),
+    Key(f"chains.{ANY}.spacing", Either((OneOf(("equal-pitch", "equal-gaps")),
+                                         ListOf(spacing.GAP))), "equal-pitch",
+        "how rods are spread: middles evenly, gaps evenly, or listed from middle to middle",
+        "equal-gaps"),
+    Key(f"chains.{ANY}.diameter", rods.DIAMETER, "", "of the rods; gates need it", "12.7 mm"),
+    Key(f"chains.{ANY}.mass", rods.MASS, "as the cross-sections", "of each rod", "14 g"),
+    Key(f"chains.{ANY}.masses", Either((ListOf(rods.MASS), _MAP)), "",
+        "rod by rod from the bottom up, or a profile", ""),
+    Key(f"chains.{ANY}.masses.exponential", _MAP, "", "an even ratio from rod to rod", ""),
+    Key(f"chains.{ANY}.masses.exponential.bottom", rods.MASS, "", "of the lowest rod", "12 g",
+        required=True),
+    Key(f"chains.{ANY}.masses.exponential.top", rods.MASS, "", "of the highest rod", "3 g",
+        required=True),
+    Key(f"chains.{ANY}.masses.table", ListOf(), "", "points with straight lines between", ""),
+    Key(f"chains.{ANY}.masses.table.{EACH}.height", masses.HEIGHT, "", "above the lowest rod",
+        "0 mm", required=True),
+    Key(f"chains.{ANY}.masses.table.{EACH}.mass", rods.MASS, "", "of a rod there", "12 g",
+        required=True),
+    Key(f"chains.{ANY}.rod_length", chains.ROD_LENGTH, "",
+        "of every rod; for drag, and to see that ends do not touch", "310 mm"),
+    Key(f"chains.{ANY}.tilt", chains.TILT, "0 deg", "of the rods from level, alternating",
+        "10 deg"),
+    Key(f"chains.{ANY}.inertia", chains.INERTIA, "1/12, a thin rod's",
+        "moment of inertia of a rod about its middle over m L²", "0.0833"),
+    Key(f"chains.{ANY}.alpha", chains.ALPHA, "by Eqs. 8, 9 and 12",
+        "impact coefficient α of every rod, ±, in place of the surface's β and μ", "0.15 ± 0.01"),
+    Key(f"chains.{ANY}.gamma", chains.GAMMA, "by Eq. 10", "end correction γ of every rod", "0"),
+    Key(f"chains.{ANY}.position_uncertainty", chains.UNCERTAINTY,
+        "0.3 mm", "of each rod's place on the string, standard",
+        "0.2 mm"),
+    Key(f"chains.{ANY}.width_uncertainty", chains.UNCERTAINTY,
+        "0.1 mm", "of the width common to its rods, standard",
+        "0.05 mm"),
+
+    Key("surface", _MAP, "", "what the striking chain lands on; without it all fall freely", ""),
+    Key("surface.restitution", surface.RESTITUTION, "",
+        "β, ±; needed unless every chain has an alpha", "0.50 ± 0.05"),
+    Key("surface.friction", surface.FRICTION, "0", "μ, ±", "0.20 ± 0.03"),
+    Key("surface.pile", _MAP, "", "rods that gather on a board that is nearly level", ""),
+    Key("surface.pile.below", surface.BELOW, "", "inclines below this gather a pile", "30 deg",
+        required=True),
+    Key("surface.pile.restitution", surface.RESTITUTION, "",
+        "effective β there, ±; below 0 the pile gives way", "-0.37", required=True),
+    Key("contact", _MAP, "", "where rods strike, above the zero of the gates", ""),
+    Key("contact.level", reader.CONTACT, format_quantity(_CONTACT.level, "mm"),
+        "middle of an undisturbed rod as it touches, ±", "1.2 mm ± 0.5 mm"),
+    Key("contact.strike", reader.CONTACT, format_quantity(_CONTACT.strike, "mm"),
+        "how far above that the highest rod strikes, on those that lie there, ±", "8 mm ± 5 mm"),
+
+    Key("drag", _MAP, "", "air that is known, with one of the two keys", ""),
+    Key("drag.coefficient", drag.COEFFICIENT, "", "C of a rod across the flow, ±", "1.1 ± 0.2"),
+    Key("drag.air_density", drag.DENSITY, _said(Drag().air_density, "kg/m^3"),
+        "with the coefficient", "1.15 kg/m^3"),
+    Key("drag.terminal_speed", drag.TERMINAL_SPEED, "", "of every part of a chain, ±",
+        "25 m/s ± 2 m/s"),
+
+    Key("gates", _MAP, "", "photogates; without them a scene is only predicted", ""),
+    Key("gates.impact", ListOf(), "", "on the side of the surface", ""),
+    Key("gates.free", ListOf(), "", "on the side of free fall", ""),
+    *(
+        key
+        for side in ("impact", "free")
+        for key in (
+            Key(f"gates.{side}.{EACH}.channel", Whole(0, GATES - 1), "", "input of the board", "3",
+                required=True),
+            Key(f"gates.{side}.{EACH}.height", gates.HEIGHT, "",
+                "of the beam above the contact point", "25 mm", required=True),
+        )
+    ),
+    Key("gates.height_uncertainty", gates.HEIGHT_UNCERTAINTY, "0.3 mm",
+        "of each beam above its post's zero, standard", "0.2 mm"),
+    Key("gates.datum_uncertainty", gates.HEIGHT_UNCERTAINTY,
+        _said(DATUM_U, "mm"),
+        "of each post's zero above the contact point, standard", "0.1 mm"),
+    Key("reference", reader.REFERENCE, "0.1 ppm",
+        "of a 1 Hz reference that is wired to the board, relative standard uncertainty", "0.5 ppm"),
+
+    Key("release", _MAP, "", "the actuator", ""),
+    Key("release.channel", Whole(0, RELEASES - 1), str(_PULSE.channel), "output of the board",
+        "1"),
+    Key("release.pulse", settings.PULSE, _said(_PULSE.pulse, "ms"), "length of the pulse",
+        "60 ms"),
+    Key("plan", _MAP, "", "how runs are laid out", ""),
+    Key("plan.incline", OneOrMore(settings.INCLINE), "0 deg", "of the surface", "40 deg"),
+    Key("plan.repeats", Whole(1, settings.MOST_REPEATS), str(_PLAN.repeats),
+        "runs at each incline", "12"),
+    Key("plan.order", OneOf(("ABBA", "alternate", "fixed")), _PLAN.order,
+        "which chain strikes in turn", "alternate"),
+    Key("plan.randomize", OneOf(("none", "incline", "all")), _PLAN.randomize,
+        "shuffle the inclines, or all runs", "incline"),
+    Key("plan.seed", Whole(0, settings.LARGEST_SEED), str(_PLAN.seed), "of that shuffle", "7"),
+    Key("plan.settle", settings.SETTLE, _said(_PLAN.settle, "s"),
+        "for chains to come to rest before each release", "20 s"),
+    Key("accept", _MAP, "", "limits beyond which a run is void, fixed beforehand", ""),
+    Key("accept.release_skew", settings.RELEASE_SKEW, _said(_ACCEPT.release_skew, "ms"),
+        "between the two releases", "3 ms"),
+    Key("accept.missed_edges", settings.MISSED_EDGES, _said(_ACCEPT.missed_edges, "%"),
+        "of all expected edges", "2 %"),
+
+    Key("priors", _MAP, "", "what nobody measured, as standard deviations; see docs/priors.md", ""),
+    *(
+        Key(f"priors.{name}", row.accepted, _said(getattr(Priors(), name), row.accepted.unit),
+            row.words, _said(getattr(Priors(), name), row.accepted.unit))
+        for name, row in PRIORS.items()
+    ),
+)  # fmt: skip
+"""In the order in which a file is written."""
+
+
+def page() -> str:
+    """Write the reference as Markdown."""
+    lines = [
+        "# The protocol file",
+        "",
+        "YAML, one file an experiment. Quantities have a unit (`48.5 mm`) and, where ± is said, a",
+        "standard uncertainty (`180 mm ± 2 mm`, `9.8124(2) m/s^2`). `rig check FILE` reads one and",
+        "says what follows from it; `rig check --schema` prints a JSON Schema for editors, and",
+        "`rig check --keys` this page, which is made from the table that the program itself has.",
+        "Ready protocols are in [protocols/](../protocols).",
+        "",
+        "A `*` stands for the name of a chain, and `[]` for each item of a list. Keys in bold must",
+        "be there, if what they belong to is.",
+        "",
+        "| key | accepted | without it | meaning | example |",
+        "|---|---|---|---|---|",
+    ]
+    for key in KEYS:
+        name = f"**`{key.path}`**" if key.required else f"`{key.path}`"
+        example = f"`{key.example}`" if key.example else ""
+        lines.append(f"| {name} | {key.accepted} | {key.default} | {key.meaning} | {example} |")
+    return "\n".join(lines) + "\n"
+
+
+def schema() -> dict[str, Any]:
+    """Make the JSON Schema (draft 2020-12) of a protocol file."""
+    found = _object("", "A protocol of falling chains and photogates")
+    found["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return found
+
+
+def _object(prefix: str, description: str) -> dict[str, Any]:
+    """Schema of the mapping at a path."""
+    start = f"{prefix}." if prefix else ""
+    inner = {key.path[len(start) :]: key for key in KEYS if key.path.startswith(start)}
+    own = {name: key for name, key in inner.items() if "." not in name}
+    found: dict[str, Any] = {"type": "object", "description": description}
+    if any(name.startswith(f"{ANY}.") for name in inner):
+        found["additionalProperties"] = _object(f"{start}{ANY}", "a chain")
+        return found | {"minProperties": 1, "maxProperties": 2}
+    found["properties"] = {name: _one(key) for name, key in own.items()}
+    found["additionalProperties"] = False
+    required = [name for name, key in own.items() if key.required]
+    # What a chain is like another one in, it need not say again.
+    return found | ({"required": required} if required and not prefix.endswith(ANY) else {})
+
+
+def _one(key: Key) -> dict[str, Any]:
+    said = f"{key.meaning}; {key.accepted}" if not isinstance(key.accepted, Mapped) else key.meaning
+    if key.default:
+        said += f"; without it: {key.default}"
+    examples = {"examples": [key.example]} if key.example else {}
+    return {"description": said, **_kind(key.path, key.accepted), **examples}
+
+
+def _kind(path: str, accepted: Accepted) -> dict[str, Any]:
+    """Schema of what a key may be."""
+    found: dict[str, Any]
+    match accepted:
+        case Range():
+            found = _quantity(accepted)
+        case Whole(low, high):
+            found = {"type": "integer", "minimum": low, "maximum": high}
+        case OneOf(words):
+            # YAML reads a bare true as a boolean.
+            plain = [word == "true" for word in words] if "true" in words else []
+            found = {"enum": [*words, *plain]}
+        case OneOrMore(each):
+            one = _quantity(each)
+            found = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
+        case Either(kinds):
+            found = {"anyOf": [_kind(path, kind) for kind in kinds]}
+        case ListOf(each):
+            items = _object(f"{path}.{EACH}", "an item") if each is None else _quantity(each)
+            found = {"type": "array", "items": items, "minItems": 1}
+        case Mapped():
+            found = _object(path, "")
+            del found["description"]
+        case Text():
+            found = {"type": "string"}
+    return found
+
+
+def _quantity(accepted: Range) -> dict[str, Any]:
+    """Schema of a quantity: a text with a unit, or a number where none is needed."""
+    kinds = ["string", "number"] if accepted.dimension is Dimension.NUMBER else ["string"]
+    return {"type": kinds}
