@@ -144,9 +144,12 @@ class Explainer:
         else:
             reading = weighed(fit)
             stated = self._absolute(self.setting, reading.evidence)
-            ranked = np.argsort(self._gains(fit))[::-1][:_TRIED]
+            gains, well = np.array(self._gains(fit)), well_read(reading)
+            ranked = np.argsort(gains)[::-1][:_TRIED]
+            # Of a good reading the score tells beforehand which search would end in vain.
+            ranked = ranked[gains[ranked] > 0.0] if well else ranked
             found += [self._sought(self.steady[n], 0.0, reading, stated) for n in ranked]
-            others = [one for one in self.faults if one.shift is None or not well_read(reading)]
+            others = [one for one in self.faults if one.shift is None or not well]
         found += [self._afresh(one, size, stated) for one, size in self._voted(others)]
         likelier = [one for one in found if one is not None and one.log_odds > 0.0]
         # What was found in both ways counts once.
