@@ -118,14 +118,15 @@ def run_protocol(
         fetched = rig.open_session(source, session_path, seed)
         if fetched is not None:
             operator.say("fetching run {}, attempt {}, from the device".format(*fetched))
-        Campaign(protocol, rig, operator, interrupts).carry_out()
+        campaign = Campaign(protocol, rig, operator, interrupts)
+        campaign.carry_out()
         rig.close_session()
     finally:
         rig.close()
     # The owner of the port has let go of the file: results are the runner's own business.
     with Session.open(session_path) as session:
         operator.say("analysing the session …")
-        found = results(session)
+        found = results(session, known=campaign.live.identified)
         with interrupts.held():
             keep(session, found)
             session.commit()
@@ -164,7 +165,7 @@ class Campaign:
         self._left = deque(self.plan)  # runs that are not done yet
         self._unjudged: deque[Job] = deque()
         self._effects: deque[Effect] = deque()
-        self._live = LiveAnalysis(self.session.path)
+        self.live = LiveAnalysis(self.session.path)
         self._clock_u: float | None = None
         self._drop: Drop | None = None  # collected last
         self._result: DropResult | None = None  # of the drop judged last
@@ -234,7 +235,7 @@ class Campaign:
     def _rest_s(self) -> float:
         """How long the chains rest; a clock once known well enough stays so."""
         if rest_s(0.0, self._clock_u) > 0.0:
-            clock = self._live.clock(self.session).device
+            clock = self.live.clock(self.session).device
             self._clock_u = None if clock is None else clock.u
         return rest_s(self.protocol.plan.settle, self._clock_u)
 
@@ -299,7 +300,7 @@ class Campaign:
     def _judge(self, job: Job) -> None:
         if self._drop is None or job != (self._drop.run, self._drop.attempt):
             self._drop = self.rig.collect(*job)
-        result = self._result = self._live.judge(self.session, self._drop)
+        result = self._result = self.live.judge(self.session, self._drop)
         self._take(Judged(self.flow.ticket, result.verdict, result.reasons))
 
     def _stop(self, why: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
@@ -11,17 +11,20 @@ from rig.analysis.diagnoses import silent
 from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise, faults
+from rig.analysis.fit import timed
 from rig.analysis.identify import identify
 from rig.analysis.last_passages import last_passages
 from rig.analysis.quantities import quantities
 from rig.analysis.result import Audit, DropResult
 from rig.analysis.verdict import SUPPORT, judge, pattern_faults
+from rig.records import Job
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import MutableMapping, Sequence
 
     from rig.analysis.fit import Fit
+    from rig.analysis.identify import Identification
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
@@ -52,6 +55,27 @@ def analyze_drop(
     return fit_drop(protocol, run, drop, scale, components)[0]
 
 
+class Identified(NamedTuple):
+    """Which rods a drop's edges are, at a round time scale.
+
+    The session's clock is known a little better with each further drop; which edge is which rod
+    stays.
+
+    Attributes
+    ----------
+    scale
+        At which it was found out.
+    found
+        With the unknowns adjusted at that scale.
+    reasons
+        What else than the protocol would explain edges that are like no fall; `None` if not sought.
+    """
+
+    scale: TimeScale
+    found: Identification
+    reasons: tuple[str, ...] | None = None
+
+
 @one_thread
 def fit_drop(
     protocol: Protocol,
@@ -61,6 +85,7 @@ def fit_drop(
     components: Components | None = None,
     *,
     explain: bool = True,
+    known: MutableMapping[Job, Identified] | None = None,
 ) -> tuple[DropResult, Fit | None]:
     """Like `analyze_drop`; keep what a joint fit begins with, too.
 
@@ -69,6 +94,9 @@ def fit_drop(
     explain
         Whether to seek what else than the protocol would explain a drop that is void as it is: it
         takes many times as long as all the rest. Of others it is sought where they ask for it.
+    known
+        What was found out before about drops of this session, and is found out here. Results are
+        the same with it and without.
     """
     components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
@@ -78,21 +106,27 @@ def fit_drop(
     if drop.certificate is not None:
         lost = drop.certificate.overflows
     blank = Audit(received, 0, expected, received, lost)
-    window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
-    identified = identify(protocol, records, scale.u, components, window)
+    job, known = Job(drop.run, drop.attempt), {} if known is None else known
+    rough = scale.rounded()
+    if job not in known or known[job].scale != rough:
+        known[job] = _identified(protocol, run, drop, rough, components)
+    identified = known[job].found
     unlike = pattern_faults(identified)
     said = dict.fromkeys([*unlike.values(), *(silent(protocol, records) if unlike else ())])
     early = judge(protocol, run, drop, said, blank, {}, None)
     if early.verdict == "void" or identified.fit is None:
         reasons = early.reasons
         if unlike and explain:
-            poor = {one for one, share in identified.shares.items() if share < SUPPORT}
-            assert protocol.gates is not None
-            strange = [n for n, gate in enumerate(protocol.gates.gates) if gate.side in poor]
-            weigh = _explainer(protocol, run, drop, scale, components, strange)
-            reasons = (*reasons, *explained(weigh.explain(None)))
+            if known[job].reasons is None:
+                poor = {one for one, share in identified.shares.items() if share < SUPPORT}
+                assert protocol.gates is not None
+                strange = [n for n, gate in enumerate(protocol.gates.gates) if gate.side in poor]
+                weigh = _explainer(protocol, run, drop, rough, components, strange)
+                why = tuple(explained(weigh.explain(None)))
+                known[job] = known[job]._replace(reasons=why)
+            reasons = (*reasons, *(known[job].reasons or ()))
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
-    fit = identified.fit
+    fit = timed(identified.fit, records, rough, scale)
     audit = blank.after(fit.matched)
     found = quantities(fit.model, fit.estimate)
     alone = last_passages(fit)
@@ -102,7 +136,7 @@ def fit_drop(
         weigh = _explainer(protocol, run, drop, scale, components, end.suspects)
         if end.odd or weigh.asked(fit):
             whole = [one for one in weigh.explain(fit) if one.whole]
-            if why := explained(whole, end.accused):
+            if why := tuple(explained(whole, end.accused)):
                 verdict = "void"
                 reasons = (*(one for one in reasons if one not in end.accused), *why)
     result = DropResult(
@@ -118,6 +152,14 @@ def fit_drop(
         last_passages=alone,
     )
     return result, fit
+
+
+def _identified(
+    protocol: Protocol, run: Run, drop: Drop, scale: TimeScale, components: Components
+) -> Identified:
+    window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
+    records = chain_records(protocol, run, drop, scale.hz)
+    return Identified(scale, identify(protocol, records, scale.u, components, window))
 
 
 def _explainer(

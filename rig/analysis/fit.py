@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.analysis.adjust import STEPS, Estimate, adjust
 from rig.analysis.align import align
+from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.drop_model import DropModel
+    from rig.analysis.chain_records import ChainRecord
+    from rig.clock.calibration import TimeScale
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -101,6 +103,23 @@ def settle(
         if round_ and estimate.beyond(x) < _SAME:
             break
     return Fit(model, matches, estimate)
+
+
+def timed(fit: Fit, records: Sequence[ChainRecord], rough: TimeScale, scale: TimeScale) -> Fit:
+    """Adjust once more at another time scale that is near by, each edge staying the rod it is.
+
+    Parameters
+    ----------
+    records
+        The chains with their trains at the new scale.
+    rough, scale
+        The one before, and the new one.
+    """
+    known = fit.model
+    model = DropModel(known.protocol, records, known.guesses, scale.u, known.components)
+    x, clock = fit.x.copy(), model.unknowns["clock"]
+    x[clock] = (1.0 + x[clock]) * scale.hz / rough.hz - 1.0
+    return Fit(model, fit.matches, adjust(model, fit.matches, x))
 
 
 def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:

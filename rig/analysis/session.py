@@ -19,14 +19,15 @@ from rig.protocol.plan import runs as planned_runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
 
+    from rig.analysis.drop import Identified
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol
-    from rig.records import Drop
+    from rig.records import Drop, Job
 
     Progress = Callable[[int, int], None]
 
@@ -96,6 +97,7 @@ def analyze(
     scale: Callable[[Drop], TimeScale],
     rejected: Mapping[tuple[int, int], Sequence[str]] | None = None,
     progress: Progress | None = None,
+    known: MutableMapping[Job, Identified] | None = None,
 ) -> Analysis:
     """Analyse every drop and sum up.
 
@@ -111,6 +113,8 @@ def analyze(
         Causes by (run, attempt), for drops that the operator rejected.
     progress
         Called with the number of drops done and the number of all.
+    known
+        As `rig.analysis.drop.fit_drop` takes it.
 
     Raises
     ------
@@ -135,7 +139,9 @@ def analyze(
             )
         # What is wrong with a rig is wrong in drop after drop: some of them tell it.
         told = sum(one.verdict == "void" for one in results) >= _EXPLAINED
-        result, fit = fit_drop(protocol, planned[drop.run], drop, scale(drop), explain=not told)
+        result, fit = fit_drop(
+            protocol, planned[drop.run], drop, scale(drop), explain=not told, known=known
+        )
         results.append(overruled(result, rejected.get((drop.run, drop.attempt))))
         fits.append(fit)
         if progress is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import floor, hypot, log2, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -25,6 +25,8 @@ HOST_U = 50e-6 / sqrt(3)
 """Of a computer's clock, relative: ±50 ppm for its quartz with temperature and age; a steered one
 (NTP) is better, but nothing here knows. Virtual time is exact."""
 _UNKNOWN = RESONATOR_TOLERANCE / sqrt(3)
+_ROUGH = 1e-4
+"""Of a time scale, relative: 0.1 mm in a metre, far less than from rod to rod."""
 _FIRED_S = 1.0  # FIRED is logged before the request leaves; the device waits 0.25 s at most
 
 
@@ -33,6 +35,11 @@ class TimeScale(NamedTuple):
 
     hz: float
     u: float
+
+    def rounded(self) -> TimeScale:
+        """Return a scale near by, good enough to tell rods apart: further samples leave it."""
+        step = 2.0 ** floor(log2(_ROUGH * self.hz))
+        return TimeScale(step * round(self.hz / step), max(self.u, _ROUGH))
 
 
 class ClockLog(Protocol):

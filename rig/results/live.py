@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from rig.analysis.drop import Identified
     from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
@@ -132,6 +133,8 @@ class LiveAnalysis:
     path: Path
     done: int = 0
     """Drops that were read and analysed, for who waits for the first reading."""
+    identified: dict[Job, Identified] = field(default_factory=dict)
+    """Which rods the edges of each drop are, for `rig.results.results`."""
     _known: dict[Job, _Analysed] = field(default_factory=dict)
     _log: Sequence[StateEntry] | None = None
     _drops: dict[Job, Drop] = field(default_factory=dict)
@@ -148,7 +151,7 @@ class LiveAnalysis:
         return self._calibrator.look(session, protocol.reference_u)
 
     def judge(self, session: Reader, drop: Drop) -> DropResult:
-        """Find out what one drop says by itself, as `read` does, and keep nothing of it.
+        """Find out what one drop says by itself, as `read` does.
 
         Parameters
         ----------
@@ -158,7 +161,8 @@ class LiveAnalysis:
             Recorded in it.
         """
         protocol, plan = self._planned(session)
-        found = fit_drop(protocol, plan[drop.run], drop, self.clock(session).scale(drop))[0]
+        scale, known = self.clock(session).scale(drop), self.identified
+        found, _ = fit_drop(protocol, plan[drop.run], drop, scale, known=known)
         return veiled_drop(found) if kept_back(session, protocol) else found
 
     def read(self) -> SessionView:
@@ -243,7 +247,7 @@ class LiveAnalysis:
     ) -> None:
         known = self._known.get(job)
         if known is None or abs(known.hz / scale.hz - 1.0) > _SAME_SCALE:
-            result, fit = fit_drop(protocol, run, drop, scale)
+            result, fit = fit_drop(protocol, run, drop, scale, known=self.identified)
             falls = result.verdict in GOOD and protocol.drag is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)

@@ -14,13 +14,14 @@ from rig.results.blind import check_open, kept_back, veiled
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, MutableMapping
 
+    from rig.analysis.drop import Identified
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
-    from rig.records import Drop
+    from rig.records import Drop, Job
     from rig.session.reading import Reader
     from rig.session.store import Session
 
@@ -104,7 +105,11 @@ def calibration(session: Reader) -> Calibration:
     return Calibrator().look(session, protocol_of(session).reference_u)
 
 
-def results(session: Reader, progress: Progress | None = None) -> SessionResults:
+def results(
+    session: Reader,
+    progress: Progress | None = None,
+    known: MutableMapping[Job, Identified] | None = None,
+) -> SessionResults:
     """Analyse a session.
 
     Parameters
@@ -113,9 +118,11 @@ def results(session: Reader, progress: Progress | None = None) -> SessionResults
         Open, for reading at least.
     progress
         Called with the number of drops done and the number of all.
+    known
+        What was found out before about its drops, as `rig.analysis.drop.fit_drop` takes it.
     """
     protocol = protocol_of(session)
-    found, clock, drops = _analysed(session, protocol, progress)
+    found, clock, drops = _analysed(session, protocol, progress, known)
     by_key = {(drop.run, drop.attempt): drop for drop in drops}
     cases = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
     blind = kept_back(session, protocol)
@@ -158,13 +165,16 @@ def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysi
 
 
 def _analysed(
-    session: Reader, protocol: Protocol, progress: Progress | None
+    session: Reader,
+    protocol: Protocol,
+    progress: Progress | None,
+    known: MutableMapping[Job, Identified] | None = None,
 ) -> tuple[Analysis, Calibration, list[Drop]]:
     with session.snapshot():
         clock = Calibrator().look(session, protocol.reference_u)
         drops = list(session.drops())
         causes = rejected(session)
-    found = analyze(protocol, drops, clock.scale, causes, progress)
+    found = analyze(protocol, drops, clock.scale, causes, progress, known)
     return found, clock, drops
 
 

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import pytest
 
+from rig.analysis.diagnoses import diagnose
 from rig.analysis.drop import fit_drop
 from rig.analysis.faults import upside_down
 from rig.analysis.result import GOOD
@@ -105,6 +106,20 @@ def test_a_good_rig_has_no_faults(scene):
     for seed in range(1, 6):
         result = case(SCENES[scene], MILD, seed=seed).analyze()
         assert (result.verdict, result.reasons) == ("accepted", ())
+
+
+def test_rods_missed_at_one_gate_and_a_flicker_at_another_make_no_exchange():
+    """Both gave as many edges as the other should have; but it is no rod at an end that lacks."""
+    one = case(UNIFORM, Dials.quiet(), incline=40.0)
+    low, high = ([edge for edge in one.drop.edges if edge.channel == channel] for channel in (3, 4))
+    flicker = [high[9]._replace(tick=high[9].tick + n, blocked=n % 200 != 0) for n in (100, 200)]
+    spoiled = {*one.drop.edges, *flicker} - {*low[20:22]}
+    assert not odd(one.with_edges(spoiled))
+    assert odd(one.with_edges({*one.drop.edges, *flicker} - {*low[:2]}))
+
+
+def odd(one: Case) -> bool:
+    return diagnose(one.identify().fit).odd
 
 
 FEW = under(KINDS[2], (0.2, 0.65), (0.18, 0.6))

@@ -12,6 +12,8 @@ from itertools import count
 import pytest
 from serial import SerialException
 
+from rig.analysis import drop
+from rig.analysis.identify import identify
 from rig.commands import analyze
 from rig.records import ClockSample
 from rig.replay import replay
@@ -82,6 +84,13 @@ def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
     assert [line.split()[1] for line in told] == ["1/4", "2/4", "3/4", "4/4"]
     assert "run " not in out
     assert_whole(finished.session, 4)
+
+
+def test_a_drop_is_read_once(run, monkeypatch):
+    seen = []
+    monkeypatch.setattr(drop, "identify", lambda *given: seen.append(0) or identify(*given))
+    assert run().code == 0
+    assert len(seen) == 2
 
 
 def test_the_truth_is_apart_from_the_session(finished):

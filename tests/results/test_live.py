@@ -6,9 +6,11 @@ import shutil
 
 import pytest
 
+from rig.analysis import drop as one_drop
 from rig.analysis.joint_fit import FEWEST
+from rig.clock.calibration import TimeScale
 from rig.records import Job
-from rig.results import detailed
+from rig.results import detailed, results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -73,3 +75,19 @@ def test_a_drop_is_judged_as_it_is_read(session):
     with Session.open(session, readonly=True) as opened:
         for job, drop in view.drops.items():
             assert live.judge(opened, drop).json() == view.results[job].json()
+
+
+def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monkeypatch):
+    """And says what it says to who never saw it before, to the last bit."""
+    live = LiveAnalysis(session)
+    view = live.read()
+    known = {}
+    for job, drop in view.drops.items():
+        hz, u = view.scales[job]
+        young = TimeScale(hz * (1.0 + 3e-6), 20.0 * u)
+        one_drop.fit_drop(view.protocol, view.plan[job.run], drop, young, known=known)
+    with Session.open(session, readonly=True) as opened:
+        cold = results(opened).json()
+        monkeypatch.setattr(one_drop, "identify", None)
+        for before in (known, live.identified):
+            assert results(opened, known=before).json() == cold
