@@ -179,13 +179,13 @@ def _counts_crossed(one: _Seen, other: _Seen) -> bool:
     The one that gave too few then did not see a rod at an end; those that leave no trace by chance
     are anywhere.
     """
-    fewer, more = sorted((one, other), key=lambda gate: gate.extra)
-    if not fewer.unseen & fewer.ends or more.extra < _PAIR:
-        return False
     came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
     own = abs(came[0] - due[0]) + abs(came[1] - due[1])
     crossed = abs(came[0] - due[1]) + abs(came[1] - due[0])
-    return own - crossed >= 2 * _PAIR
+    if own - crossed < 2 * _PAIR:
+        return False
+    fewer, more = sorted((one, other), key=lambda gate: gate.extra)
+    return bool(fewer.unseen & fewer.ends) and more.extra >= _PAIR
 
 
 def _buried(protocol: Protocol, gates: Sequence[_Seen]) -> list[_Seen]:

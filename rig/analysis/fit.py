@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.adjust import STEPS, Estimate, adjust
+from rig.analysis.adjust import DONE, STEPS, Estimate, adjust
 from rig.analysis.align import align
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
@@ -88,21 +88,35 @@ def settle(
     rounds, steps
         How often at most, and how many steps each adjustment may take.
     x
-        Unknowns to begin with, if not as the guesses have them.
+        Unknowns to begin with, if not as the guesses have them; with `matches` too, they bend
+        already to what they should.
     """
+    begun = x is not None and matches is not None
     x = model.first() if x is None else x
-    stiff = model.stiff()
+    stiff = model if begun else model.stiff()
     if matches is None:
         matches = match(model, x, _COARSE)
-    # Not to the end: the matches are about to change.
-    estimate = adjust(stiff, matches, x, done=_NEAR, steps=steps)
+    # Not to the end where the matches are about to change.
+    estimate = adjust(stiff, matches, x, done=DONE if begun else _NEAR, steps=steps)
+    last = model if begun else None
     for round_ in range(rounds):
-        x = estimate.x
+        x, before = estimate.x, matches
         matches = without_strays(model, x, match(model, x), estimate.scatter)
-        estimate = adjust(model if round_ else stiff, matches, x, steps=steps)
+        now = model if round_ else stiff
+        if now is last and _alike(matches, before):
+            break
+        estimate, last = adjust(now, matches, x, steps=steps), now
         if round_ and estimate.beyond(x) < _SAME:
             break
     return Fit(model, matches, estimate)
+
+
+def _alike(one: Matches, other: Matches) -> bool:
+    return all(
+        np.array_equal(mine, its)
+        for role, found in one.items()
+        for mine, its in zip(found, other[role], strict=True)
+    )
 
 
 def timed(fit: Fit, records: Sequence[ChainRecord], rough: TimeScale, scale: TimeScale) -> Fit:

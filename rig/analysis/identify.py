@@ -34,11 +34,15 @@ from rig.analysis.pattern import guesses as votes
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.pattern import Span
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol
+
+    Array = NDArray[np.float64]
 
 MISSED = 0.02
 """Share of expected edges that leave no trace, as far as one can know beforehand."""
@@ -66,6 +70,19 @@ _INSTANTS = 12  # at which two falls are compared
 _SAME = 1.0  # how far apart they may be, in what a vote may be off
 _TAIL = 8.0  # standard deviations beyond which a normal distribution's tail is its first term
 _ROUNDS, _STEPS = 3, 15  # of matching and of adjusting them
+_OWN = {
+    "datum",
+    "beams",
+    "ripple",
+    "rods",
+    "width",
+    "impulses",
+    "contact",
+    "strike",
+    "top",
+    "strings",
+}
+"""Unknowns that a side tells which is read by itself; each beam and post is of one side."""
 _CLOCKS = (-2.0, -1.0, 1.0, 2.0)  # standard uncertainties of the clock that are tried
 
 
@@ -430,15 +447,16 @@ def _together(
     tried: list[Reading] = []
     for pair in close:
         if len(pair) == 1:
-            # One side is all there is: the same again, to the end.
-            tried.append(weighed(settle(pair[0].fit.model)))
+            # One side is all there is: the same, to the end.
+            fit = pair[0].fit
+            tried.append(weighed(settle(fit.model, fit.matches, x=fit.x)))
             continue
         begin: dict[str, Guess] = {
             role: adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)
         }
         matches = {role: one.fit.matches[role] for role, one in zip(roles, pair, strict=True)}
         model = DropModel(protocol, records, begin, clock_u, components)
-        tried.append(weighed(settle(model, matches)))
+        tried.append(weighed(settle(model, matches, x=_begun(model, pair))))
     best, *rest = _best(tried)
     if not best.evidence > 0.0:
         return Identification(None, _shares(best.fit))
@@ -448,6 +466,17 @@ def _together(
     fit = _relaxed(best.fit)
     other = rest[0].fit if rest else None
     return Identification(fit, _shares(fit), odds, best.evidence, other)
+
+
+def _begun(model: DropModel, sides: Sequence[Reading]) -> Array:
+    """Unknowns of both sides together, as far as each side tells its own; the rest is guessed."""
+    x = model.first()
+    for side in sides:
+        own = side.fit.model.unknowns
+        for name, block in own.blocks.items():
+            if name.removeprefix(f"{next(iter(side.fit.matches))} ") in _OWN:
+                x[model.unknowns[name]] += side.fit.x[block]
+    return x
 
 
 def weighed(fit: Fit) -> Reading:

@@ -17,6 +17,7 @@ At κ = 0 every number is that of `rig.model.fall`.
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 from itertools import accumulate
 from math import atanh, cos, exp, expm1, inf, log, log1p, radians, sinh, sqrt, tanh
 from typing import TYPE_CHECKING
@@ -44,10 +45,13 @@ def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
         Shape ``(rods,)``, each correctly rounded: where all rods are alike so are all κ, and the
         two chains' difference is not touched by rounding (see `drag_fall`).
     """
-    falling = [
-        list(accumulate(map(Fraction, reversed(each))))[::-1] for each in (drags, chain.masses)
-    ]
-    return [float(drag / mass) for drag, mass in zip(*falling, strict=True)]
+    return [*_per_mass(tuple(drags), chain.masses)]
+
+
+@lru_cache(maxsize=64)  # fractions take their time, and there are few chains
+def _per_mass(drags: tuple[float, ...], masses: tuple[float, ...]) -> tuple[float, ...]:
+    falling = [list(accumulate(map(Fraction, reversed(each))))[::-1] for each in (drags, masses)]
+    return tuple(float(drag / mass) for drag, mass in zip(*falling, strict=True))
 
 
 def cylinder_drag(
