@@ -126,9 +126,10 @@ def run_protocol(
     # The owner of the port has let go of the file: results are the runner's own business.
     with Session.open(session_path) as session:
         operator.say("analysing the session …")
-        found = results(session, known=campaign.live.identified)
+        known = campaign.live.identified
+        found = results(session, known=known)
         with interrupts.held():
-            keep(session, found)
+            keep(session, found, known)
             session.commit()
         return found
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import silent
+from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise, faults
 from rig.analysis.fit import timed
-from rig.analysis.identify import identify
+from rig.analysis.identified import Identified, identified
 from rig.analysis.last_passages import last_passages
 from rig.analysis.quantities import quantities
 from rig.analysis.result import Audit, DropResult
-from rig.analysis.verdict import SUPPORT, judge, pattern_faults
+from rig.analysis.verdict import judge
 from rig.records import Job
 from rig.threads import one_thread
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import MutableMapping, Sequence
 
     from rig.analysis.fit import Fit
-    from rig.analysis.identify import Identification
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
@@ -53,27 +53,6 @@ def analyze_drop(
         How much everything scatters; as the protocol states it if not given.
     """
     return fit_drop(protocol, run, drop, scale, components)[0]
-
-
-class Identified(NamedTuple):
-    """Which rods a drop's edges are, at a round time scale.
-
-    The session's clock is known a little better with each further drop; which edge is which rod
-    stays.
-
-    Attributes
-    ----------
-    scale
-        At which it was found out.
-    found
-        With the unknowns adjusted at that scale.
-    reasons
-        What else than the protocol would explain edges that are like no fall; `None` if not sought.
-    """
-
-    scale: TimeScale
-    found: Identification
-    reasons: tuple[str, ...] | None = None
 
 
 @one_thread
@@ -108,25 +87,25 @@ def fit_drop(
     blank = Audit(received, 0, expected, received, lost)
     job, known = Job(drop.run, drop.attempt), {} if known is None else known
     rough = scale.rounded()
-    if job not in known or known[job].scale != rough:
-        known[job] = _identified(protocol, run, drop, rough, components)
-    identified = known[job].found
-    unlike = pattern_faults(identified)
-    said = dict.fromkeys([*unlike.values(), *(silent(protocol, records) if unlike else ())])
+    one = known.get(job)
+    if one is None or one.scale != rough:
+        one = known[job] = identified(protocol, run, drop, rough, components)
+    said = dict.fromkeys([*one.unlike.values(), *(silent(protocol, records) if one.unlike else ())])
     early = judge(protocol, run, drop, said, blank, {}, None)
-    if early.verdict == "void" or identified.fit is None:
+    if early.verdict == "void" or one.begun is None:
         reasons = early.reasons
-        if unlike and explain:
-            if known[job].reasons is None:
-                poor = {one for one, share in identified.shares.items() if share < SUPPORT}
+        if one.unlike and explain:
+            if one.explained is None:
                 assert protocol.gates is not None
-                strange = [n for n, gate in enumerate(protocol.gates.gates) if gate.side in poor]
+                gates = enumerate(protocol.gates.gates)
+                strange = [n for n, gate in gates if gate.side in one.poor]
                 weigh = _explainer(protocol, run, drop, rough, components, strange)
-                why = tuple(explained(weigh.explain(None)))
-                known[job] = known[job]._replace(reasons=why)
-            reasons = (*reasons, *(known[job].reasons or ()))
+                one = replace(one, explained=tuple(explained(weigh.explain(None))))
+                known[job] = one
+            reasons = (*reasons, *(one.explained or ()))
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
-    fit = timed(identified.fit, records, rough, scale)
+    model = DropModel(protocol, records, one.begun.guesses, scale.u, components)
+    fit = timed(model, one.begun, scale.hz / rough.hz)
     audit = blank.after(fit.matched)
     found = quantities(fit.model, fit.estimate)
     alone = last_passages(fit)
@@ -152,14 +131,6 @@ def fit_drop(
         last_passages=alone,
     )
     return result, fit
-
-
-def _identified(
-    protocol: Protocol, run: Run, drop: Drop, scale: TimeScale, components: Components
-) -> Identified:
-    window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
-    records = chain_records(protocol, run, drop, scale.hz)
-    return Identified(scale, identify(protocol, records, scale.u, components, window))
 
 
 def _explainer(

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.analysis.adjust import DONE, STEPS, Estimate, adjust
 from rig.analysis.align import align
-from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.analysis.chain_records import ChainRecord
-    from rig.clock.calibration import TimeScale
+    from rig.analysis.drop_model import DropModel
+    from rig.analysis.pattern import Guess
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -119,21 +118,27 @@ def _alike(one: Matches, other: Matches) -> bool:
     )
 
 
-def timed(fit: Fit, records: Sequence[ChainRecord], rough: TimeScale, scale: TimeScale) -> Fit:
-    """Adjust once more at another time scale that is near by, each edge staying the rod it is.
+class Begun(NamedTuple):
+    """A drop adjusted at some time scale: all that is needed to adjust it at another."""
+
+    guesses: Mapping[str, Guess]
+    matches: Matches
+    x: Array
+
+
+def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
+    """Adjust once more at a time scale that is near by, each edge staying the rod it is.
 
     Parameters
     ----------
-    records
-        The chains with their trains at the new scale.
-    rough, scale
-        The one before, and the new one.
+    model
+        At that time scale, with the guesses of `begun`.
+    rate
+        Ticks in a second by it, over those by the other one.
     """
-    known = fit.model
-    model = DropModel(known.protocol, records, known.guesses, scale.u, known.components)
-    x, clock = fit.x.copy(), model.unknowns["clock"]
-    x[clock] = (1.0 + x[clock]) * scale.hz / rough.hz - 1.0
-    return Fit(model, fit.matches, adjust(model, fit.matches, x))
+    x, clock = begun.x.copy(), model.unknowns["clock"]
+    x[clock] = (1.0 + x[clock]) * rate - 1.0
+    return Fit(model, begun.matches, adjust(model, begun.matches, x))
 
 
 def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:

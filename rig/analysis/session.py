@@ -21,8 +21,8 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
 
-    from rig.analysis.drop import Identified
     from rig.analysis.fit import Fit
+    from rig.analysis.identified import Identified
     from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale

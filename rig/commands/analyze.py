@@ -15,6 +15,9 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from argparse import Namespace
 
+    from rig.analysis.identified import Identified
+    from rig.records import Job
+
 
 def main(arguments: Namespace) -> int:
     """Compute the results of a session and keep them in it."""
@@ -24,7 +27,8 @@ def main(arguments: Namespace) -> int:
         return budget.main(arguments)
     with Session.open(arguments.session, readonly=True) as session:
         extent = session.extent()
-        found = results(session, progress("analysing run"))
+        known: dict[Job, Identified] = {}
+        found = results(session, progress("analysing run"), known)
     more: dict[str, Any] = {}
     if arguments.session_trials is not None:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - likewise
@@ -37,7 +41,7 @@ def main(arguments: Namespace) -> int:
     # A session that is being written, or on a read-only disk, is analysed all the same.
     with suppress(SessionError), Session.open(arguments.session) as session:
         if session.extent() == extent:  # else it went on meanwhile, and these are out of date
-            keep(session, found)
+            keep(session, found, known)
     code = print_results(found, as_json=arguments.json, more=more)
     if not arguments.json:
         asked = [scatter_part(found.analysis.summary)] if arguments.scatter else []

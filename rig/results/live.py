@@ -21,7 +21,7 @@ from rig.clock.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
 from rig.results.blind import kept_back, veiled, veiled_drop
-from rig.results.whole import protocol_of, rejected
+from rig.results.whole import kept_identified, protocol_of, rejected
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from rig.analysis.drop import Identified
     from rig.analysis.fit import Fit
+    from rig.analysis.identified import Identified
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.clock.calibration import Calibration, TimeScale
@@ -175,6 +175,8 @@ class LiveAnalysis:
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
             with session.snapshot():
+                if not self._readings:
+                    self.identified = kept_identified(session) | self.identified
                 protocol, plan = self._planned(session)
                 clock, states = self.clock(session), tuple(session.states())
                 if states != self._log:  # records are only added, and that is logged

@@ -7,21 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.analysis.gravity import check_gravity
+from rig.analysis.identified import Identified
 from rig.analysis.session import analyze
 from rig.clock.calibration import Calibrator
 from rig.protocol import reader
+from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
+from rig.session.reading import BESIDE
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, MutableMapping
 
-    from rig.analysis.drop import Identified
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
-    from rig.records import Drop, Job
+    from rig.records import Drop
     from rig.session.reading import Reader
     from rig.session.store import Session
 
@@ -73,9 +75,28 @@ class SessionResults:
         return head | {"calibration": self.calibration} | said
 
 
-def keep(session: Session, found: SessionResults) -> None:
-    """Keep results in the session that they are of, as it stands."""
-    session.put_results(found.records(), _version(session))
+def keep(
+    session: Session, found: SessionResults, known: Mapping[Job, Identified] | None = None
+) -> None:
+    """Keep results in the session that they are of, as it stands.
+
+    Parameters
+    ----------
+    known
+        What was found out about its drops, for the next who opens it.
+    """
+    records = found.records()
+    for one in records:
+        job = Job(one["run"], one["attempt"])
+        if known and job in known and not found.blind:  # else it would tell what is kept back
+            one[BESIDE] = known[job].json()
+    session.put_results(records, _version(session))
+
+
+def kept_identified(session: Reader) -> dict[Job, Identified]:
+    """Return what is kept of which rods edges are; nothing of another version of the program."""
+    found = session.beside_results(__version__)
+    return {Job(*job): Identified.read(one) for job, one in found.items()}
 
 
 def kept(session: Reader) -> list[dict[str, Any]]:

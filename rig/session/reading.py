@@ -52,6 +52,10 @@ class ByteChunk(NamedTuple):
     data: bytes
 
 
+BESIDE = "beside"
+"""Member of a stored result that is not told: what makes it quick to work out the next ones."""
+
+
 class Reader:
     """Everything that can be asked of an open session.
 
@@ -219,13 +223,24 @@ class Reader:
         sql = "SELECT json FROM result WHERE analysis_version = ? ORDER BY run, attempt"
         with readable(self.path):
             rows = self._rows(sql, analysis_version, kinds="t")
-            return [members(text) for (text,) in rows]
+            return [_told(text) for (text,) in rows]
 
     def results(self) -> list[dict[str, Any]]:
         """Return derived results as last put, by run and attempt."""
         with readable(self.path):
             rows = self._rows("SELECT json FROM result ORDER BY run, attempt", kinds="t")
-            return [members(text) for (text,) in rows]
+            return [_told(text) for (text,) in rows]
+
+    def beside_results(self, program: str) -> dict[tuple[int, int], Any]:
+        """Return what a version of the program put beside its results, by run and attempt."""
+        sql = "SELECT run, attempt, analysis_version, json FROM result"
+        with readable(self.path):
+            put = {
+                (run, attempt): members(text).get(BESIDE)
+                for run, attempt, version, text in self._rows(sql, kinds="iitt")
+                if version.startswith(f"{program} ")
+            }
+        return {job: found for job, found in put.items() if found is not None}
 
     def check(self) -> None:
         """Read everything there is once.
@@ -312,6 +327,12 @@ class Reader:
 
     def _which(self, run: int, attempt: int) -> str:
         return f"{self.path}: run {run}, attempt {attempt},"
+
+
+def _told(text: str) -> dict[str, Any]:
+    found = members(text)
+    found.pop(BESIDE, None)
+    return found
 
 
 def _state(row: tuple[Any, ...]) -> StateEntry:

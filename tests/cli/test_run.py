@@ -12,7 +12,7 @@ from itertools import count
 import pytest
 from serial import SerialException
 
-from rig.analysis import drop
+from rig.analysis import identified
 from rig.analysis.identify import identify
 from rig.commands import analyze
 from rig.records import ClockSample
@@ -88,7 +88,7 @@ def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
 
 def test_a_drop_is_read_once(run, monkeypatch):
     seen = []
-    monkeypatch.setattr(drop, "identify", lambda *given: seen.append(0) or identify(*given))
+    monkeypatch.setattr(identified, "identify", lambda *given: seen.append(0) or identify(*given))
     assert run().code == 0
     assert len(seen) == 2
 
@@ -431,8 +431,8 @@ def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
     session = finished.copy(tmp_path)
     compute = analyze.results
 
-    def slowly(opened, progress):
-        found = compute(opened, progress)
+    def slowly(opened, *given):
+        found = compute(opened, *given)
         with Session.open(session) as writer:
             writer.add_ping(ClockSample(1, 2, 3))
             writer.put_results([], "a later one")

@@ -6,12 +6,14 @@ import shutil
 
 import pytest
 
-from rig.analysis import drop as one_drop
+from rig.analysis import identified
+from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import FEWEST
 from rig.clock.calibration import TimeScale
 from rig.records import Job
 from rig.results import detailed, results
 from rig.results.live import LiveAnalysis
+from rig.results.whole import kept_identified
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import rig, short
@@ -85,9 +87,26 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
     for job, drop in view.drops.items():
         hz, u = view.scales[job]
         young = TimeScale(hz * (1.0 + 3e-6), 20.0 * u)
-        one_drop.fit_drop(view.protocol, view.plan[job.run], drop, young, known=known)
+        fit_drop(view.protocol, view.plan[job.run], drop, young, known=known)
     with Session.open(session, readonly=True) as opened:
         cold = results(opened).json()
-        monkeypatch.setattr(one_drop, "identify", None)
+        monkeypatch.setattr(identified, "identify", None)
         for before in (known, live.identified):
             assert results(opened, known=before).json() == cold
+
+
+def test_what_a_run_found_out_about_its_drops_is_not_found_out_again(
+    session, tmp_path, monkeypatch
+):
+    bare = shutil.copy(session, tmp_path / "bare.session")
+    with Session.open(bare) as opened:
+        opened.put_results([], "none")
+        opened.commit()
+    anew = LiveAnalysis(bare).read()
+    monkeypatch.setattr(identified, "identify", None)
+    kept = LiveAnalysis(session).read()
+    assert {job: one.json() for job, one in kept.results.items()} == {
+        job: one.json() for job, one in anew.results.items()
+    }
+    with Session.open(session, readonly=True) as opened:
+        assert opened.results() == results(opened, known=kept_identified(opened)).records()
