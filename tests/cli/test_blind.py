@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import rig as door
+from rig.session.store import Session
 from tests.cli.lab import rig, short
 
 
@@ -33,6 +34,9 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(tmp_path)
         done = rig(*refused)
         assert done.returncode != 0
         assert "is blind" in done.stderr
+    with Session.open(session, readonly=True) as opened:
+        assert opened.results()
+        assert not opened.beside_results(door.__version__), "where chains fell tells all"
     first = rig("unblind", session)
     assert first.returncode == 0, first.stderr
     again = rig("unblind", session)
@@ -40,4 +44,6 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(tmp_path)
     after = json.loads(rig("analyze", session, "--json").stdout)
     assert "blind" not in after
     assert all("separation_m" in run for run in after["runs"])
+    with Session.open(session, readonly=True) as opened:
+        assert len(opened.beside_results(door.__version__)) == 4
     assert rig("replay", session).returncode == 0
