@@ -175,14 +175,14 @@ class LiveAnalysis:
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
             with session.snapshot():
-                if not self._readings:
-                    self.identified = kept_identified(session) | self.identified
                 protocol, plan = self._planned(session)
                 clock, states = self.clock(session), tuple(session.states())
                 if states != self._log:  # records are only added, and that is logged
                     self._drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
                     self._log = states
                 causes, blind = rejected(session), kept_back(session, protocol)
+                if not self._readings:
+                    self.identified = kept_identified(session, self._drops) | self.identified
             drops = self._drops
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
             for job, drop in drops.items():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
@@ -86,17 +88,31 @@ def keep(
         What was found out about its drops, for the next who opens it.
     """
     records = found.records()
-    for one in records:
-        job = Job(one["run"], one["attempt"])
-        if known and job in known and not found.blind:  # else it would tell what is kept back
-            one[BESIDE] = known[job].json()
+    if known and not found.blind:  # else it would tell what is kept back
+        drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
+        for one in records:
+            job = Job(one["run"], one["attempt"])
+            if job in known:
+                text = json.dumps(known[job].json())
+                one[BESIDE] = [_seal(text, drops[job]), text]
     session.put_results(records, _version(session))
 
 
-def kept_identified(session: Reader) -> dict[Job, Identified]:
-    """Return what is kept of which rods edges are; nothing of another version of the program."""
-    found = session.beside_results(__version__)
-    return {Job(*job): Identified.read(one) for job, one in found.items()}
+def kept_identified(session: Reader, drops: Mapping[Job, Drop]) -> dict[Job, Identified]:
+    """Return what is kept of which rods the edges of drops are.
+
+    Nothing of another version of the program, or that is not as it was written.
+    """
+    found = {}
+    for at, beside in session.beside_results(__version__).items():
+        match Job(*at), beside:
+            case job, [seal, str(text)] if job in drops and seal == _seal(text, drops[job]):
+                found[job] = Identified.read(json.loads(text))
+    return found
+
+
+def _seal(text: str, drop: Drop) -> str:
+    return sha256(f"{json.dumps(drop.edges)}\n{text}".encode()).hexdigest()
 
 
 def kept(session: Reader) -> list[dict[str, Any]]:

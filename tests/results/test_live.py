@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 
 import pytest
 
+from rig import __version__
 from rig.analysis import identified
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import FEWEST
@@ -14,6 +16,7 @@ from rig.records import Job
 from rig.results import detailed, results
 from rig.results.live import LiveAnalysis
 from rig.results.whole import kept_identified
+from rig.session.reading import BESIDE
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import rig, short
@@ -109,4 +112,23 @@ def test_what_a_run_found_out_about_its_drops_is_not_found_out_again(
         job: one.json() for job, one in anew.results.items()
     }
     with Session.open(session, readonly=True) as opened:
-        assert opened.results() == results(opened, known=kept_identified(opened)).records()
+        assert (
+            opened.results() == results(opened, known=kept_identified(opened, kept.drops)).records()
+        )
+
+
+@pytest.mark.parametrize("altered", [None, 7, ["", "{}"], ["", 7], {}, "more edges"])
+def test_what_is_not_as_it_was_kept_is_found_out_anew(session, altered):
+    view = LiveAnalysis(session).read()
+    drops = dict(view.drops)
+    with Session.open(session) as opened:
+        beside = opened.beside_results(__version__)
+        assert beside.keys() == drops.keys()
+        if altered == "more edges":
+            drops[Job(1, 1)] = replace(drops[Job(1, 1)], edges=drops[Job(1, 1)].edges[1:])
+        else:
+            rows = opened.results()
+            for row in rows:
+                row[BESIDE] = altered if row["run"] == 1 else beside[row["run"], 1]
+            opened.put_results(rows, f"{__version__} of another extent")
+        assert kept_identified(opened, drops).keys() == drops.keys() - {Job(1, 1)}
