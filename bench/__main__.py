@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 INTERRUPTED = 130
+BOARDS = ["sim", "emu", "bought"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,12 +47,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     faults.add_argument("--jobs", type=_count, default=6, metavar="N", help="rigs side by side")
     faults.add_argument(
-        "--board", dest="boards", nargs="+", choices=["sim", "emu"], default=["sim", "emu"],
-        help="virtual, or real firmware in an emulator",
+        "--board", dest="boards", nargs="+", choices=BOARDS, default=BOARDS,
+        help="virtual, real firmware in an emulator, or that behind Arduino's boot loader",
     )  # fmt: skip
     faults.add_argument(
         "--kind", dest="kinds", nargs="+", metavar="KIND", help="only these",
-        choices=["daemon", "runner", "cable", "reset", "disk", "noise", "race", "deaf"],
+        choices=["daemon", "runner", "cable", "reset", "brownout", "disk", "noise", "busy", "race",
+                 "deaf"],
     )  # fmt: skip
 
     link = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")

@@ -25,13 +25,15 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable
 
-KINDS = ("daemon", "runner", "cable", "reset", "disk")
-"""What can be disturbed: processes killed, the cable pulled for a moment, the board reset, the
-disk filled for a moment."""
+KINDS = ("daemon", "runner", "cable", "reset", "brownout", "disk")
+"""What can be disturbed: processes killed, the cable pulled for a moment, the board reset, its
+supply's voltage sunk, the disk filled for a moment."""
 CONTENTION = {"race": raced, "deaf": deaf}
 """What clients can do to each other: two that want control at once, some that never read."""
 NOISE = {"corrupt": "0.01", "lose": "0.005"}
 """Of each byte, in both directions."""
+BUSY = 0.5
+"""Of each byte while both directions are under way: some USB chips do so from 230,400 baud."""
 OFF_S = 0.25
 """Within this time after whatever happened, nothing is armed or on any more."""
 _RUNS = 6  # in a session
@@ -44,13 +46,16 @@ _COUNTS = {
         "runner": 50,
         "cable": 100,
         "reset": 40,
+        "brownout": 40,
         "disk": 40,
         "noise": 8,
+        "busy": 4,
         "race": 10,
         "deaf": 4,
     },
     # The emulator takes a good part of a core for each rig.
-    "emu": {"daemon": 40, "runner": 10, "cable": 20, "reset": 10, "noise": 2},
+    "emu": {"daemon": 40, "runner": 10, "cable": 20, "reset": 10, "brownout": 10, "noise": 2},
+    "bought": {"daemon": 10, "cable": 10, "reset": 5, "brownout": 10, "noise": 1, "busy": 1},
 }
 _DOWN = (0, DeviceError.exit_code)
 _FULL = (*_DOWN, SessionError.exit_code)
@@ -64,6 +69,7 @@ def disturbed(
     runs: int = _RUNS,
     dials: dict[str, str] | None = None,
     board: str = "sim",
+    busy: float = 0.0,
 ) -> FaultTally:
     """Make sessions, with so many disturbances at random moments.
 
@@ -80,13 +86,20 @@ def disturbed(
     dials
         Of the simulation, such as `NOISE`.
     board
-        ``sim``, or ``emu`` for real firmware in an emulator.
+        ``sim``, ``emu`` or ``bought``, see `ProcessFixture`.
+    busy
+        See there, too.
     """
     tally, chance = FaultTally(), random.Random(f"{kind} {seed}")  # noqa: S311 - moments, not secrets
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
         with ProcessFixture(
-            runs, seed + tally.sessions, dials, board=board, small_disk=kind == "disk"
+            runs,
+            seed + tally.sessions,
+            dials,
+            board=board,
+            busy=busy,
+            small_disk=kind == "disk",
         ) as processes:
             processes.start_daemon()
             tally.full_disk = processes.disk.how if processes.disk else ""
@@ -116,8 +129,8 @@ def _disturb(processes: ProcessFixture, kind: str, chance: random.Random) -> Non
         return
     if kind == "cable":
         processes.hand(f"pull {chance.uniform(0.02, 0.6):.3f}")
-    elif kind == "reset":
-        processes.hand("reset")
+    elif kind in {"reset", "brownout"}:
+        processes.hand(kind)
     elif kind == "disk":
         assert processes.disk is not None
         processes.disk.fill(processes.daemon)
@@ -174,7 +187,7 @@ def faults(
     Parameters
     ----------
     counts
-        Disturbances by kind; ``noise`` counts sessions.
+        Disturbances by kind; ``noise`` and ``busy`` count sessions.
     jobs
         Rigs side by side: most of the time they wait.
     say
@@ -203,7 +216,7 @@ def faults(
 
 
 def _shares(kind: str, count: int, jobs: int) -> list[int]:
-    if kind == "noise":
+    if kind in {"noise", "busy"}:
         return [1] * count
     return [part for n in range(jobs) if (part := count // jobs + (n < count % jobs))]
 
@@ -214,6 +227,8 @@ def _some(kind: str, count: int, seed: int, board: str) -> FaultTally:
             return CONTENTION[kind](count, seed, board)
         if kind == "noise":
             return disturbed("daemon", 0, seed, dials=NOISE, board=board)
+        if kind == "busy":
+            return disturbed("daemon", 0, seed, board=board, busy=BUSY)
         return disturbed(kind, count, seed, board=board)
     except Exception as error:
         return FaultTally(broken=[f"given up: {error!r}"])
@@ -223,8 +238,8 @@ def main(arguments: Namespace) -> int:
     """Kill, pull, reset, fill and garble, and count what was lost."""
     found: dict[str, dict[str, FaultTally]] = {}
     for board in arguments.boards:
-        if board == "emu" and find_spec("rig_emulator") is None:
-            say("left out: emu (pip install ./firmware/emulator)")
+        if board != "sim" and find_spec("rig_emulator") is None:
+            say(f"left out: {board} (pip install ./firmware/emulator)")
             continue
         counts = {
             kind: max(1, round(count * arguments.share / 100))

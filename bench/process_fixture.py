@@ -37,7 +37,11 @@ plan: {repeats: RUNS, settle: 0.2 s}
 accept: {missed_edges: 15 %}
 """
 _READY_S = 120.0  # only what never comes takes longer, however busy the machine is
-_BOARDS = {"sim": "sim.pty", "emu": "rig_emulator.hands"}
+_BOARDS = {
+    "sim": ("sim.pty",),
+    "emu": ("rig_emulator.hands",),
+    "bought": ("rig_emulator.hands", "--loader", "--resets"),
+}
 
 
 class ProcessFixture:
@@ -52,7 +56,10 @@ class ProcessFixture:
     dials
         As in a ``sim://`` URL.
     board
-        ``sim``, or ``emu`` for real firmware in an emulator.
+        ``sim``, ``emu`` for real firmware in an emulator, or ``bought`` for that behind Arduino's
+        boot loader and a USB chip that resets it at each opening.
+    busy
+        Share of bytes that are changed while both directions are under way.
     small_disk
         Whether the session is on a disk that can be filled.
     """
@@ -64,6 +71,7 @@ class ProcessFixture:
         dials: dict[str, str] | None = None,
         *,
         board: str = "sim",
+        busy: float = 0.0,
         small_disk: bool = False,
     ) -> None:
         self._folder = TemporaryDirectory(prefix="rig-")
@@ -77,7 +85,7 @@ class ProcessFixture:
         self.disk = SmallDisk(self.folder / "disk") if small_disk else None
         self.session = (self.disk.folder if self.disk else self.folder) / "session"
         self.told = ""  # what the last runner said
-        self._kind = board
+        self._kind, self._busy = board, busy
         self._followed = 0  # bytes of the log
         self.board: Process | None = None
         self.daemon: Process | None = None
@@ -85,8 +93,8 @@ class ProcessFixture:
 
     def __enter__(self) -> Self:
         self.board = self._start(
-            *("-m", _BOARDS[self._kind], "--protocol", self.protocol, "--seed", self.seed),
-            *("--link", self.port, "--log", self.log),
+            *("-m", *_BOARDS[self._kind], "--protocol", self.protocol, "--seed", self.seed),
+            *("--link", self.port, "--log", self.log, "--busy", self._busy),
             *(f"{name}={value}" for name, value in self._dials.items()),
             stdin=subprocess.PIPE,
         )

@@ -45,3 +45,5 @@ MEGA = Capabilities("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
 UNO = Capabilities("Arduino Uno", 12, 2, 0.5, 191, streams=True)
 BOARDS = {"mega": MEGA, "uno": UNO}
 """By the word for them at the command line."""
+FLASHED = {**BOARDS, "nano-old": UNO}
+"""By the word for them where they are flashed: to all else an old Nano is an Uno."""

@@ -12,7 +12,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING
 
 from rig import __version__
-from rig.boards import BOARDS
+from rig.boards import BOARDS, FLASHED
 from rig.errors import RigError
 from rig.printable import printable
 
@@ -257,7 +257,12 @@ def _parser() -> argparse.ArgumentParser:
     _session(command("replay", "feed the recorded bytes through the whole stack and compare"))
 
     flash = command("flash", "write the firmware onto a board and verify it")
-    flash.add_argument("--board", required=True, choices=tuple(BOARDS), help="its kind")
+    flash.add_argument(
+        "--board",
+        required=True,
+        choices=tuple(FLASHED),
+        help="its kind; nano-old: a Nano whose boot loader listens at 57,600 baud only",
+    )
     flash.add_argument(
         "--port", required=True, metavar="PATH", help="its device, such as /dev/ttyACM0"
     )

@@ -83,7 +83,7 @@ class Certificate:
     pulse_end
         What ended the pulse, see `rig.link.messages.PulseEnd`.
     restarts
-        0, or 128 and the cause of the latest restart since the device said who it is.
+        0, or 128 and the causes of all restarts since the device said who it is.
     supply_mv, lowest_mv
         The board's supply when it fired, and its lowest while it recorded; 0 where not measured.
     """

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 CAPACITY = 1024
 MAX_PULSE_US = 500_000
 LATE_TICKS = 256
-POWER_ON, EXTERNAL_RESET = 1, 2  # the AVR's PORF and EXTRF in MCUSR
+POWER_ON, EXTERNAL_RESET, BROWN_OUT = 1, 2, 4  # the AVR's PORF, EXTRF and BORF in MCUSR
+RESTARTED = 128  # in a certificate, beside the causes
 _EXECUTION_NS = 60_000  # from a request's last byte to its execution
 _BATCH = 16  # events worth a frame of their own
 _OLDEST_NS = 10_000_000  # an event waits no longer than this for company
@@ -133,13 +134,17 @@ class VirtualBoard:
         self.advance(at_ns)
         self.line.clear(at_ns)
         before = self._controller
-        self._forget(cause)
+        self._forget((0 if cause & POWER_ON else before.restarts) | RESTARTED | cause)
         if before.drop is not None and before.phase is Phase.HOLDING and not cause & POWER_ON:
             self._controller.drop = before.drop
             before.drop.aborted = False  # so it must be acknowledged
         self.counter.start = self._random.getrandbits(32)
         self._boot_ns = at_ns + _BOOT_NS
         self._boot_cause = cause
+
+    def brown_out(self, at_ns: int) -> None:
+        """Let its supply sink so far that it restarts; its memory stays."""
+        self.reset(at_ns, BROWN_OUT)
 
     def touch(self, gates: int) -> None:
         """Change the beams by hand, now (arming asks the lab again).
@@ -189,13 +194,13 @@ class VirtualBoard:
         upcoming = self._upcoming()
         return None if upcoming is None else upcoming[0]
 
-    def _forget(self, cause: int | None = None) -> None:
+    def _forget(self, restarts: int = 0) -> None:
         self._decoder = Decoder()
         self._inbox: deque[tuple[int, bytes]] = deque()
         self._last: tuple[int, int, int] | None = None  # type, seq and CRC of the last request
         self._answer = b""
         self._controller = Microcontroller(
-            self.lab, self.counter, self.identity, self._inputs, self._random, cause
+            self.lab, self.counter, self.identity, self._inputs, self._random, restarts
         )
         self._oldest_ns = 0
 

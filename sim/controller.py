@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from sim.lab_interface import Lab
 
 _NO_PULSE = (0, wire.PulseEnd.ORDERED)
-_RESTARTED = 128
 _SILENCE_NS = wire.HOST_SILENCE_MS * 10**6
 
 
@@ -47,8 +46,8 @@ class Microcontroller:
         What else it is wired to.
     tokens
         Where tokens come from.
-    cause
-        Of the restart that made it; `None` at power-up.
+    restarts
+        For the certificate: since IDENTIFY.
 
     Attributes
     ----------
@@ -73,7 +72,7 @@ class Microcontroller:
         identity: wire.Identity,
         inputs: Inputs,
         tokens: random.Random,
-        cause: int | None = None,
+        restarts: int = 0,
     ) -> None:
         self.gates = 0
         self.order: wire.Arm | None = None
@@ -93,7 +92,7 @@ class Microcontroller:
         self._token = 0
         self._changed = 0  # armed gates that moved since ARM
         self._now_ns = 0
-        self._restarts = 0 if cause is None else _RESTARTED | cause
+        self.restarts = restarts
 
     @property
     def phase(self) -> Phase:
@@ -184,7 +183,7 @@ class Microcontroller:
         version = self._identity.protocol_version
         if request.protocol_version != version:
             return wire.Refused(Reason.VERSION, version)
-        self._restarts = 0
+        self.restarts = 0
         return self._identity
 
     def _status(self) -> wire.State:
@@ -265,7 +264,7 @@ class Microcontroller:
         if self.drop is not None:
             lasted_ns, by = self.release.lasted() if self.drop.order.release else _NO_PULSE
             ticks = round(lasted_ns * 1e-9 * self._identity.tick_hz)
-            self.drop.released(ticks, by, self._restarts)
+            self.drop.released(ticks, by, self.restarts)
 
     def _abort(self) -> wire.DeviceMessage:
         self.order = None

@@ -46,3 +46,29 @@ class LineFaults:
             else:
                 out.append(byte)
         return bytes(out)
+
+
+class BadLine:
+    """Both directions of a line.
+
+    Parameters
+    ----------
+    corrupt, lose
+        As in `LineFaults`, of either direction.
+    busy
+        Probability, for each byte, of becoming another one, while the other direction is under way.
+    seed
+        Same seed, same damage.
+    """
+
+    def __init__(self, corrupt: float, lose: float, busy: float, seed: int) -> None:
+        self._ways = tuple(LineFaults(corrupt, lose, 2 * seed + n) for n in (0, 1))
+        self._both = LineFaults(corrupt=busy, seed=seed)
+
+    def passed(self, to_host: bytes, to_board: bytes) -> tuple[bytes, bytes]:
+        """Pass on what is sent both ways at the same time."""
+        towards_board, towards_host = self._ways
+        to_host, to_board = towards_host.damage(to_host), towards_board.damage(to_board)
+        if to_host and to_board:
+            return self._both.damage(to_host), self._both.damage(to_board)
+        return to_host, to_board

@@ -1,39 +1,39 @@
 """A virtual board behind a pseudo-terminal, in real time: ``python -m sim.pty``.
 
 Prints the path of the terminal's link on stdout; any program opens it like a board's port, as
-often as it likes. Lines on stdin do what hands do at a rig: ``reset``, ``pull SECONDS [LINK]`` (the
-cable, and put it in again, perhaps elsewhere), ``mute 1`` (the wire towards the host), ``mute 0``,
-``mute fall`` (while chains fall), ``block MASK`` (beams), ``stop 1``, ``stop 0``; the end of stdin
-ends it. The log gets a line of JSON for every drop as the board holds it, and for every change of
-phase or outputs: true by `at_s`, and not yet at `after_s`; `gap_s` is the longest time between two
-looks since the last line, by which the board may have heard too late.
+often as it likes. Lines on stdin do what hands do at a rig: ``reset``, ``brownout`` (of the
+board's supply), ``pull SECONDS [LINK]`` (the cable, and put it in again, perhaps elsewhere),
+``mute 1`` (the wire towards the host), ``mute 0``, ``mute fall`` (while chains fall), ``block
+MASK`` (beams), ``stop 1``, ``stop 0``; the end of stdin ends it. The log gets a line of JSON for
+every drop as the board holds it, and for every change of phase or outputs: true by `at_s`, and not
+yet at `after_s`; `gap_s` is the longest time between two looks since the last line, by which the
+board may have heard too late.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
-import pty
-import select
 import sys
 import time
-import tty
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.link.messages import Phase
 from sim.board import VirtualBoard
 from sim.board_interface import Board
-from sim.line import LineFaults
+from sim.line import BadLine
 from sim.scene import set_scene
+from sim.terminal import Terminal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from sim.scene import Scene
 
+DEAF_S = 0.065
+"""So long an Arduino's reset pin is held low when its port is opened."""
 _TICK_S = 4e-3
 _CHUNK = 4096
 HELD = ("label", "fire_tick", "events", "crc32", "overflows")
@@ -46,6 +46,8 @@ class GlassBoard(Board, Protocol):
     def touch(self, gates: int) -> None: ...  # noqa: D102
 
     def stop(self, opened: bool) -> None: ...  # noqa: D102
+
+    def brown_out(self, at_ns: int) -> None: ...  # noqa: D102
 
     def outputs(self) -> int: ...  # noqa: D102
 
@@ -87,79 +89,62 @@ class Bench:
         Symbolic link to the terminal.
     log
         File for what happens.
-    faults
-        Of the line, towards the board and towards the host.
+    line
+        What happens to bytes on their way.
+    resets
+        Whether opening the terminal pulls the reset pin, as the USB chips of Arduinos do.
     """
 
     def __init__(
-        self, board: GlassBoard, link: Path, log: Path, faults: tuple[LineFaults, LineFaults]
+        self, board: GlassBoard, link: Path, log: Path, line: BadLine, *, resets: bool = False
     ) -> None:
         self.board = board
-        self._link = link
+        self._terminal = Terminal(link, held=not resets)
         self._log = log.open("a", encoding="utf-8", buffering=1)
-        self._to_board, self._to_host = faults
-        self._ends: tuple[int, int] | None = None
+        self._line = line
+        self._resets = resets
+        self._deaf_until_ns = 0
         self._plug_at = 0.0
         self._mute = "0"
         self._begun_ns = time.monotonic_ns()
         self._seen: tuple[int, int] = (0, 0)
         self._looked_s = time.monotonic()  # when the last look began
         self._gap_s = 0.0  # between two looks, the longest since the last line of the log
-        self.plug()
-
-    def plug(self) -> None:
-        """Put the cable in."""
-        far, near = pty.openpty()
-        tty.setraw(near)
-        os.set_blocking(far, False)
-        # Replaced, not removed and made: nobody finds it missing in between.
-        beside = self._link.with_suffix(".new")
-        beside.unlink(missing_ok=True)
-        beside.symlink_to(os.ttyname(near))
-        beside.replace(self._link)
-        self._ends = far, near
-
-    def pull(self) -> None:
-        """Take the cable out; the board goes on."""
-        if self._ends is not None:
-            self._link.unlink(missing_ok=True)
-            for end in self._ends:
-                os.close(end)
-            self._ends = None
 
     def serve(self) -> None:
         """Pass bytes and obey until stdin ends."""
         self.board.reset(0)
         words = b""
         while True:
-            watched = [0] if self._ends is None else [0, self._ends[0]]
-            readable, _, _ = select.select(watched, [], [], _TICK_S)
-            if 0 in readable:
-                more = os.read(0, _CHUNK)
+            if self._terminal.wait(_TICK_S, sys.stdin.fileno()):
+                more = os.read(sys.stdin.fileno(), _CHUNK)
                 if not more:
                     return
                 *lines, words = (words + more).split(b"\n")
                 for line in lines:
                     self._obey(line.decode().split())
-            if self._ends is None and time.monotonic() >= self._plug_at:
-                self.plug()
+            if not self._terminal.is_in and time.monotonic() >= self._plug_at:
+                self._terminal.plug()
             begun_s = time.monotonic()
             self._pass_bytes()
             self._note(begun_s)
 
     def close(self) -> None:
         """Hang up."""
-        self.pull()
+        self._terminal.pull()
         self._log.close()
 
     def _obey(self, words: list[str]) -> None:
         match words:
             case ["reset"]:
                 self.board.reset(self._now_ns())
+            case ["brownout"]:
+                self.board.brown_out(self._now_ns())
             case ["pull", seconds, *elsewhere]:
-                self.pull()
+                self._terminal.pull()
                 self._plug_at = time.monotonic() + float(seconds)
-                self._link = Path(*elsewhere) if elsewhere else self._link
+                if elsewhere:
+                    self._terminal.link = Path(*elsewhere)
             case ["mute", when]:
                 self._mute = when
             case ["block", mask]:
@@ -174,18 +159,16 @@ class Bench:
 
     def _pass_bytes(self) -> None:
         now_ns = self._now_ns()
-        data = self._to_host.damage(self.board.line.arrived(now_ns))
+        if self._terminal.look() and self._resets:
+            self.board.reset(now_ns)
+            self._deaf_until_ns = now_ns + round(DEAF_S * 1e9)
+        sent, heard = self._line.passed(self.board.line.arrived(now_ns), self._terminal.read())
         falling = self.board.phase() == Phase.RECORDING
         if self._mute == "1" or (self._mute == "fall" and falling):
-            data = b""
-        if self._ends is None:
-            return
-        far = self._ends[0]
-        with contextlib.suppress(BlockingIOError):
-            self.board.receive(now_ns, self._to_board.damage(os.read(far, _CHUNK)))
-        with contextlib.suppress(BlockingIOError):  # nobody reads: a UART would not wait either
-            while data:
-                data = data[os.write(far, data) :]
+            sent = b""
+        if now_ns >= self._deaf_until_ns:
+            self.board.receive(now_ns, heard)
+        self._terminal.write(sent)
 
     def _note(self, begun_s: float) -> None:
         # The board's time stood between the two: a busy machine may let long pass in between.
@@ -236,14 +219,21 @@ def main(
     parser.add_argument("--seed", default="0")
     parser.add_argument("--link", type=Path, required=True, help="symbolic link to the terminal")
     parser.add_argument("--log", type=Path, required=True, help="file for what happens")
+    parser.add_argument(
+        "--resets", action="store_true", help="restart the board whenever its terminal is opened"
+    )
+    parser.add_argument(
+        "--busy", type=float, default=0.0, metavar="SHARE", help="of all bytes, changed where both "
+        "directions are under way at once: from 230,400 baud on some USB chips do that",
+    )  # fmt: skip
     parser.add_argument("dial", nargs="*", metavar="NAME=VALUE", help="as in a sim:// URL")
     options = parser.parse_args(arguments)
     dials = dict(text.split("=", 1) for text in options.dial)
     scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
     scene.get_ready()
-    line = scene.line()
-    faults = [LineFaults(line["corrupt"], line["lose"], seed=2 * scene.seed + n) for n in (0, 1)]
-    bench = Bench(make(scene), options.link, options.log, (faults[0], faults[1]))
+    dialled = scene.line()
+    line = BadLine(dialled["corrupt"], dialled["lose"], options.busy, seed=scene.seed)
+    bench = Bench(make(scene), options.link, options.log, line, resets=options.resets)
     try:
         print(options.link, flush=True)
         bench.serve()

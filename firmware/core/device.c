@@ -17,6 +17,7 @@
 #define COMPANY_TICKS (10 * TICKS_PER_MS) /* an event waits no longer than this for others */
 #define STOP_TICKS (300 * TICKS_PER_US) /* the emergency stop's input is the same for so long */
 #define RESTARTED 128
+#define POWER_ON 1                       /* in BOOT's cause */
 #define SELDOM 16                         /* turns between two looks at what has time */
 
 /* What is rare must not put its registers' saving into every turn of the main loop. */
@@ -48,7 +49,10 @@ static struct {
     uint16_t now, worst; /* measures of the supply, larger when it is lower; 0: none yet */
 } supply;
 
-static uint8_t restarts; /* for the certificate; cleared by IDENTIFY */
+/* Restarts since IDENTIFY, for the certificate: the memory outlives them. */
+static struct {
+    uint8_t causes, check;
+} restarts BOARD_KEPT;
 static bool aborted;    /* ABORT came for the drop that is recorded or held */
 static bool closing;    /* the recording is over, but not everything is sent */
 static uint8_t room;    /* events that still belong into the frame being written */
@@ -61,6 +65,12 @@ static struct {
     uint8_t seq, type, code, size;
     uint8_t payload[4];
 } last;
+
+static void note_restarts(uint8_t causes)
+{
+    restarts.causes = causes;
+    restarts.check = (uint8_t)~causes;
+}
 
 /* -- answers */
 
@@ -165,7 +175,7 @@ static RARE void close_recording(void)
     drop.glitches = events.glitches;
     drop.late = events.late;
     drop.pulse_ticks = release_lasted(&drop.pulse_end);
-    drop.restarts = restarts;
+    drop.restarts = restarts.causes;
     drop.lowest_mv = board_supply_mv(supply.worst);
     drop_seal();
     closing = false;
@@ -243,7 +253,7 @@ static void identify(void)
         return;
     }
     name = name_board(record);
-    restarts = 0;
+    note_restarts(0);
     send_begin(MSG_IDENTITY, request.seq);
     send8(PROTOCOL_VERSION);
     send_text(board_type, sizeof board_type - 1);
@@ -541,7 +551,9 @@ void device_start(uint8_t cause)
     requested = closing = aborted = false;
     stop.open = board_stopped();
     stop.wavers = false;
-    restarts = (uint8_t)(RESTARTED | cause);
+    if (cause & POWER_ON || (restarts.check ^ restarts.causes) != 0xFF)
+        restarts.causes = 0;
+    note_restarts((uint8_t)(restarts.causes | RESTARTED | cause));
     last.seq = 0;
     pulses = 0;
     room = 0;

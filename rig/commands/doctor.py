@@ -58,7 +58,10 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
         yield Finding(f"session {session}", "not there", "check its name; rig run makes a new one")
     elif session:
         try:
-            yield checks.session_file(look_at_session(session))
+            told = look_at_session(session)
+            yield checks.session_file(told)
+            if told.whole:
+                yield from (checks.restarts(told), checks.supply(told))
         except SessionError as error:
             yield Finding(f"session {session}", error.message, error.hint)
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.rate import tick_rate
 from rig.link.gatewatch import listed
-from rig.link.messages import HOST_SILENCE_MS
+from rig.link.messages import HOST_SILENCE_MS, unpack_label
+from rig.link.restarts import SUPPLY, WIRING, causes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -213,3 +214,29 @@ def session_file(facts: SessionFacts) -> Finding:
             name, f"damaged: {facts.first_trouble}", f"rig recover {facts.path} -o NEW.session"
         )
     return Finding(name, f"whole, being written by {facts.writer}" if facts.writer else "whole")
+
+
+def restarts(facts: SessionFacts) -> Finding:
+    """See that the board did not restart by itself while the session was made."""
+    told: dict[str, int] = {}
+    for one in facts.restarts:
+        why = causes(one.cause)
+        what = one.when + (f" ({why})" if why else "")
+        if one.label is not None:
+            what = "run {}, attempt {}: ".format(*unpack_label(one.label)) + what
+        told[what] = told.get(what, 0) + 1
+    for name, mask in facts.unseen:
+        why = causes(mask)
+        told[f"{name}: before it, unseen" + (f" ({why})" if why else "")] = 1
+    if not told:
+        return Finding("restarts", "none")
+    said = "; ".join(what + (f", {n} times" if n > 1 else "") for what, n in told.items())
+    return Finding("restarts", said, f"{SUPPLY} Give them one of their own, and check {WIRING}")
+
+
+def supply(facts: SessionFacts) -> Finding:
+    """Say how far the board's supply sank while chains fell."""
+    if facts.sunk is None:
+        return Finding("supply", "not measured")
+    name, at_fire, lowest = facts.sunk
+    return Finding("supply", f"at most from {at_fire:.2f} V to {lowest:.2f} V, in {name}")

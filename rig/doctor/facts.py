@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rig.link.gatewatch import GateStates
     from rig.link.messages import Identity
+    from rig.link.restarts import Restart
     from rig.records import ClockSample, Edge
 
 
@@ -86,10 +87,24 @@ class DiskFacts:
 
 @dataclass(frozen=True, slots=True)
 class SessionFacts:
-    """What `rig recover` says of a session file."""
+    """What `rig recover` says of a session file, and what its log of bytes tells of the board.
+
+    Attributes
+    ----------
+    restarts
+        Of the board, that nobody asked for.
+    unseen
+        Causes of restarts that no message told of, in the certificates of drops; by their names.
+    sunk
+        The drop in which the board's supply sank most, and its voltages at FIRE and lowest, V;
+        `None` where it is not measured.
+    """
 
     path: str
     whole: bool
     foreign: str
     writer: str
     first_trouble: str
+    restarts: tuple[Restart, ...] = ()
+    unseen: tuple[tuple[str, int], ...] = ()
+    sunk: tuple[str, float, float] | None = None

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,10 @@ from rig.link.client import Device
 from rig.link.gatewatch import watch_gates
 from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
 from rig.link.refusals import DeviceRefusedError
+from rig.link.restarts import Restart
+from rig.link.transcript import Transcript
 from rig.recover.examine import examine
+from rig.session.store import Session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -74,7 +78,28 @@ def look_at_session(path: str) -> SessionFacts:
     """Gather what is whole of a session file."""
     found = examine(path)
     trouble = next(iter(found.troubles), "")
-    return SessionFacts(path, found.whole, found.foreign, found.snapshot.writer, trouble)
+    facts = SessionFacts(path, found.whole, found.foreign, found.snapshot.writer, trouble)
+    return _look_at_drops(facts) if found.whole else facts
+
+
+def _look_at_drops(facts: SessionFacts) -> SessionFacts:
+    """Read what a whole session tells of its board's restarts and supply."""
+    with Session.open(facts.path, readonly=True) as session:
+        transcript = Transcript()
+        restarts = tuple(
+            record
+            for host_ns, direction, data in session.byte_log()
+            for record in transcript.feed(direction, host_ns, data)
+            if isinstance(record, Restart)
+        )
+        told = [(f"run {d.run}, attempt {d.attempt}", d.certificate) for d in session.drops()]
+    unseen = tuple((name, c.restarts) for name, c in told if c and c.restarts)
+    dips = [
+        (c.lowest_mv / c.supply_mv, name, c.supply_mv / 1e3, c.lowest_mv / 1e3)
+        for name, c in told
+        if c and c.supply_mv and c.lowest_mv
+    ]
+    return replace(facts, restarts=restarts, unseen=unseen, sunk=min(dips)[1:] if dips else None)
 
 
 def _group(place: Path) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import select
 import shutil
 import subprocess
 import sys
@@ -15,7 +17,8 @@ if TYPE_CHECKING:
 
     from rig.flash.boards import Target
 
-_RESET = "press the board's reset button and try again"
+_LOOK_S = 0.2
+_RESET = "wrong --board (nano-old for an old Nano)? Press the board's reset button and try again"
 _CAUSES = (
     # What it says, in lower case, over the versions 6 and 7; the first that fits counts.
     (
@@ -31,9 +34,9 @@ _CAUSES = (
     ("permission denied", "permission denied", "join the group that owns it (often dialout)"),
     ("busy", "another program uses it", "close that program"),
     ("no such file", "it is gone", "was the board unplugged?"),
-    ("programmer is not responding", "its boot loader does not answer", f"wrong --board? {_RESET}"),
-    ("timeout", "its boot loader does not answer", f"wrong --board? {_RESET}"),
-    ("not in sync", "its boot loader does not answer", f"wrong --board? {_RESET}"),
+    ("programmer is not responding", "its boot loader does not answer", _RESET),
+    ("timeout", "its boot loader does not answer", _RESET),
+    ("not in sync", "its boot loader does not answer", _RESET),
 )
 
 
@@ -91,21 +94,32 @@ def write_flash(avrdude: str, target: Target, port: str, image: Path) -> None:
     except OSError as error:
         raise InputError(f"cannot run {avrdude}: {error.strerror}") from error
     with child:
-        said = _shown(child)
+        said = _shown(child, port)
+    if not os.path.lexists(port):
+        raise DeviceError(
+            f"flashing {port} failed: the connection broke",
+            "plug the board in again and flash it once more: its boot loader was not touched",
+        )
     if child.returncode:
         raise DeviceError(*_cause(port, child.returncode, said))
 
 
-def _shown(child: subprocess.Popen[bytes]) -> str:
+def _shown(child: subprocess.Popen[bytes], port: str) -> str:
     """Pass on what a program says as it says it: its progress is a line that grows."""
     said = bytearray()
     assert child.stdout is not None
-    while chunk := child.stdout.read(4096):
-        said += chunk
-        with suppress(OSError):
-            sys.stderr.write(chunk.decode(errors="replace"))
-            sys.stderr.flush()
-    return said.decode(errors="replace")
+    while True:
+        readable, _, _ = select.select([child.stdout], [], [], _LOOK_S)
+        if not os.path.lexists(port):
+            child.kill()  # avrdude would try for ever to reach a board that is gone
+        if readable:
+            chunk = child.stdout.read(4096)
+            if not chunk:
+                return said.decode(errors="replace")
+            said += chunk
+            with suppress(OSError):
+                sys.stderr.write(chunk.decode(errors="replace"))
+                sys.stderr.flush()
 
 
 def _cause(port: str, code: int, said: str) -> tuple[str, str]:

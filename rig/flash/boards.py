@@ -43,5 +43,7 @@ class Target:
 TARGETS = {
     "mega": Target(MEGA, "m2560", "wiring", 115200, "atmega2560.hex", 0x3E000),
     "uno": Target(UNO, "m328p", "arduino", 115200, "atmega328p.hex", 0x7E00),
+    "nano-old": Target(UNO, "m328p", "arduino", 57600, "atmega328p.hex", 0x7800),
 }
-"""By the word for ``--board``. Both boot loaders' rates are those of the makers' own tools."""
+"""By the word for ``--board``. All boot loaders' rates are those of the makers' own tools. A
+Nano is an Uno on a smaller board; those sold before 2018, and many since, have another loader."""

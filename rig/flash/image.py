@@ -65,7 +65,8 @@ def read_image(path: Path, target: Target) -> Image:
         raise InputError(f"{path} is no Intel HEX file") from None
     flash = _flash(text, path)
     versions = set(_VERSION.findall(flash))
-    boards = [t.board.name for t in TARGETS.values() if t.board.name.encode() + b"\0" in flash]
+    names = {one.board.name for one in TARGETS.values()}
+    boards = [name for name in names if name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
         raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
     if boards != [target.board.name]:

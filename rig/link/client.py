@@ -113,7 +113,6 @@ class Device:
         """
         line = self._line
         line.expect_boot = True
-        line.fired_ns = None
         try:
             line.write(DELIMITER)  # ends whatever junk the line has seen so far
             booted = line.wait(boot_wait_s, _is_boot)
@@ -225,7 +224,6 @@ class Device:
             if refused.reason is not wire.Reason.NOT_ARMED:
                 raise
             raise DeviceRefusedError(refused.reason, refused.detail, self._disarmed) from None
-        self._line.fired_ns = self._line.clock.now_ns()
         return tick
 
     def abort(self) -> None:
@@ -304,7 +302,6 @@ class Device:
                         "the device records and never ends", "abort the drop; rig selftest"
                     )
                 ask = now() + round(_LATE_S * 1e9)
-        self._line.fired_ns = None
         return self.fetch(label)
 
     def fetch(self, label: int) -> Drop:

@@ -9,6 +9,7 @@ from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import refusal
+from rig.link.restarts import SUPPLY, WIRING, Restart
 from rig.link.transcript import Received, Record, Transcript
 
 if TYPE_CHECKING:
@@ -56,8 +57,6 @@ class Exchange:
         How many were sent, and how often one was sent again.
     rx_bytes, tx_bytes
         How much went over the line.
-    fired_ns
-        When the drop that is being recorded was fired; `None` when none is.
     give_way
         Called all the time while an answer is waited for; what it raises ends the waiting.
     """
@@ -71,7 +70,6 @@ class Exchange:
         self.expect_boot = False
         self.requests = self.repeats = 0
         self.rx_bytes = self.tx_bytes = 0
-        self.fired_ns: int | None = None
         self.give_way: Callable[[], None] = lambda: None
         self._port = port
         self._tap = tap
@@ -183,22 +181,10 @@ class Exchange:
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
         records = self._take() if ended else []
-        boots = (r for r in records if isinstance(r, Received) and isinstance(r.message, wire.Boot))
-        if not self.expect_boot and any(boots):
-            raise self._restarted()
+        restarts = (record for record in records if isinstance(record, Restart))
+        if not self.expect_boot and (restart := next(restarts, None)):
+            raise _restarted(restart)
         return records
-
-    def _restarted(self) -> DeviceError:
-        wiring = "the release's wiring (a coil without a diode resets boards)"
-        if self.fired_ns is None:
-            hint = f"check its power supply and {wiring}, then connect again"
-            return DeviceError("the board restarted", hint)
-        back = (self.clock.now_ns() - self.fired_ns) * 1e-9
-        return DeviceError(
-            f"the board restarted in the drop: it is back {back:.2f} s after FIRE",
-            "is its supply shared with the magnets? Give them one of their own, and check "
-            f"{wiring}",
-        )
 
     def write(self, data: bytes) -> None:
         """Send bytes.
@@ -268,6 +254,16 @@ class Exchange:
             for record in records:
                 self._on_record(record)
         return records
+
+
+def _restarted(restart: Restart) -> DeviceError:
+    if restart.label is None:
+        hint = f"check its power supply and {WIRING}, then connect again"
+        return DeviceError("the board restarted", hint)
+    return DeviceError(
+        f"the board restarted {restart.when}: {SUPPLY}",
+        f"give the magnets a supply of their own, and check {WIRING}",
+    )
 
 
 def _lost(error: OSError) -> DeviceError:

@@ -354,7 +354,7 @@ class DropCertificate2(DropCertificate):
     pulse_end
         What ended it.
     restarts
-        0, or 128 and the cause of the latest restart since IDENTIFY.
+        0, or 128 and the causes of all restarts since IDENTIFY.
     supply_mv, lowest_mv
         The board's supply at FIRE, and its lowest while recording; 0 where it is not measured.
     """

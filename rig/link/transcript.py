@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.frames import DELIMITER, Decoder, Frame
+from rig.link.restarts import Restart
 from rig.records import ClockSample, Drop, Pulse
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ class Received:
     message: Message
 
 
-Record: TypeAlias = Received | ClockSample | Pulse | Drop
+Record: TypeAlias = Received | ClockSample | Pulse | Drop | Restart
 
 
 class Transcript:
@@ -60,6 +61,9 @@ class Transcript:
         self._tokens: dict[int, int] = {}
         self._drops: dict[int, Assembly] = {}
         self._given: set[int] = set()
+        self._opened_ns: int | None = None  # until it has booted, or said who it is
+        self._start_up_s: float | None = None
+        self._fired: tuple[int, int] | None = None  # label and host time, until the certificate
 
     @property
     def good_frames(self) -> int:
@@ -92,7 +96,8 @@ class Transcript:
             # A client begins a connection with this. Half a frame from the connection before
             # must not swallow the first of this one: live, each connection starts afresh.
             self._rx.feed(DELIMITER)
-            self._sample_sent = None
+            self._sample_sent = self._fired = None
+            self._opened_ns = host_ns
         decoder, take = (self._tx, self._sent) if direction == "tx" else (self._rx, self._got)
         records: list[Record] = []
         for frame in decoder.feed(data):
@@ -181,6 +186,7 @@ class Transcript:
         match message:
             case wire.Identity():
                 self.identity = message
+                self._opened_ns = None
             case wire.Pong(tick=tick) if self._sample_sent and self._sample_sent[0] == frame.ack:
                 records.append(ClockSample(self._sample_sent[1], host_ns, tick))
                 self._sample_sent = None
@@ -195,17 +201,31 @@ class Transcript:
                 label = self._tokens.get(asked.token)
                 if label in self._drops:
                     self._drops[label].fire_tick = tick
+                    self._fired = label, host_ns
             case wire.Refused(wire.Reason.NOT_KEPT, first) if isinstance(asked, wire.Read):
                 self.assembly(asked.label).first_kept = first
             case wire.EventsFrame(label=label) if label not in self._given:
                 self.assembly(label).add(message)
             case wire.DropCertificate(label=label) if label not in self._given:
                 self.assembly(label).certificate = message
-            case wire.Boot():
+                self._fired = None
+            case wire.Boot(cause=cause):
                 self._sample_sent = None
                 for drop in self._drops.values():
                     drop.reset = True
+                records += self._booted(host_ns, cause)
         return records
+
+    def _booted(self, host_ns: int, cause: int) -> list[Record]:
+        opened_ns, fired = self._opened_ns, self._fired
+        self._opened_ns = self._fired = None
+        if opened_ns is not None:
+            self._start_up_s = (host_ns - opened_ns) * 1e-9
+            return []
+        if fired is None:
+            return [Restart(host_ns, cause)]
+        label, fired_ns = fired
+        return [Restart(host_ns, cause, label, (host_ns - fired_ns) * 1e-9, self._start_up_s)]
 
     def _armed(self, token: int, request: wire.Arm) -> None:
         self._tokens = {token: request.label}

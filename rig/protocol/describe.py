@@ -15,7 +15,6 @@ from rig.units import Quantity, format_quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.errors import Problem
     from rig.protocol.protocol import Drag, Gate, Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
@@ -206,19 +205,25 @@ def _consequences(protocol: Protocol) -> list[str]:
     lines.append(
         f"recorded for {seconds:g} s; the longest fall takes {longest_fall(protocol):.2g} s"
     )
-    for word, board in BOARDS.items():
-        gates: list[Problem] = []
-        for problem in lacking(protocol, board):
-            if problem.key.startswith("gates"):
-                gates.append(problem)  # of many alike the first will do
-            else:
-                lines.append(f"note: not with board {word}: {problem}")
-        if gates:
-            more = f" (and {len(gates) - 1} more)" if len(gates) > 1 else ""
-            lines.append(f"note: not with board {word}: {gates[0]}{more}")
+    lines += _boards(protocol)
     minutes = len(planned) * (plan.settle + seconds) / 60
     lines.append(f"about {minutes:.0f} min, settling {plan.settle:g} s before each drop; "
                  "hanging the chains comes on top")  # fmt: skip
+    return lines
+
+
+def _boards(protocol: Protocol) -> list[str]:
+    """Say which boards can do a protocol, and what the others lack."""
+    wants = {word: lacking(protocol, board) for word, board in BOARDS.items()}
+    able = [word for word, problems in wants.items() if not problems]
+    lines = [f"boards that can do it: {', '.join(able)}"] if able else []
+    for word, problems in wants.items():
+        gates = [problem for problem in problems if problem.key.startswith("gates")]
+        others = [problem for problem in problems if problem not in gates]
+        lines += [f"note: not with board {word}: {problem}" for problem in others]
+        if gates:  # of many alike the first will do
+            more = f" (and {len(gates) - 1} more)" if len(gates) > 1 else ""
+            lines.append(f"note: not with board {word}: {gates[0]}{more}")
     return lines
 
 

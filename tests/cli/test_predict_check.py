@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -162,6 +163,17 @@ def test_check_for_one_board_is_its_refusal(call):
     assert (code, out) == (2, "")
     said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change it"
     assert f"{said}, or take an Arduino Mega 2560" in err
+
+
+def test_the_readme_says_which_boards_can_do_a_ready_protocol(call):
+    readme = (PROTOCOLS.parent / "README.md").read_text("utf-8")
+    rows = re.findall(r"^\| (`[-\w`, ]+) \| .* \| ([\w, ]*)\|$", readme, re.MULTILINE)
+    said = {name: able.strip() for names, able in rows for name in re.findall(r"`(.*?)`", names)}
+    assert {path.stem for path in PROTOCOLS.glob("*.yaml")} <= said.keys()
+    for path in PROTOCOLS.glob("*.yaml"):
+        lines = call("check", path).out.splitlines()
+        able = [line.partition(": ")[2] for line in lines if line.startswith("  boards that can")]
+        assert able == ([said[path.stem]] if said[path.stem] else [])
 
 
 def test_check_says_what_predict_notes(call, tmp_path):

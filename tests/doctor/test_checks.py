@@ -11,6 +11,7 @@ from rig.doctor import checks
 from rig.doctor.checks import mains_ripple
 from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFacts
 from rig.link.gatewatch import GateStates
+from rig.link.restarts import Restart
 from rig.records import ClockSample, Edge
 from sim.board import VirtualBoard
 from tests.link.bench import ScriptedLab
@@ -182,3 +183,16 @@ def test_chance_is_no_rhythm(seed):
 @pytest.mark.parametrize("hz", [37, 55, 80, 173])
 def test_another_rhythm_is_not_the_mains(hz):
     assert mains_ripple([n / hz for n in range(hz)]) is None
+
+
+def test_restarts_that_only_certificates_tell_of_and_a_supply_that_sinks():
+    whole = SessionFacts("s", True, "", "", "")
+    assert not checks.restarts(whole).advice
+    name = "run 3, attempt 1"
+    facts = replace(whole, unseen=((name, 128 | 4 | 8),), sunk=(name, 4.96, 4.31))
+    found = checks.restarts(facts)
+    assert found.what == f"{name}: before it, unseen (brown-out, watchdog)"
+    assert "supply shared with the magnets" in found.advice
+    assert checks.supply(facts).what == f"at most from 4.96 V to 4.31 V, in {name}"
+    twice = replace(whole, restarts=(Restart(1, 0), Restart(2, 0)))
+    assert checks.restarts(twice).what == "while nothing fell, 2 times"

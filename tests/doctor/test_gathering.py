@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from rig.cli import main
 from rig.doctor.facts import Owner
 from rig.doctor.gathering import look_at_board, look_at_disk, look_at_port, look_at_session
+from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.session.store import Session
@@ -199,6 +201,30 @@ def test_a_port_that_somebody_uses_is_not_opened(doctor, terminal, monkeypatch):
     assert code == 4
     assert "screen (process 5)" in out
     assert "board: not asked" in out
+
+
+def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp_path):
+    path = tmp_path / "s.session"
+    with Session.create(path, "x", "x.yaml", simulated=True, origin="x") as session:
+        port = port_of(LoopedBoard(lab()))
+        device = Device(port, port.clock, session.log_bytes)
+        device.connect()
+        label = pack_label(3, 1)
+        order = {"gates": 8, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
+        device.fire(device.arm(label=label, **order))
+        port.clock.sleep(0.004)
+        port.board.brown_out(port.clock.now_ns())
+        said = (
+            r"the board restarted about [45] ms after FIRE: is its supply shared with the magnets\?"
+        )
+        with pytest.raises(DeviceError, match=said):
+            device.collect(label)
+    code, out, _ = doctor("--session", path)
+    assert code == 4
+    found = (
+        r"^restarts: run 3, attempt 1: about [45] ms after FIRE \(brown-out\)\n  do: is its supply"
+    )
+    assert re.search(found, out, re.MULTILINE)
 
 
 def test_without_a_port_nothing_is_opened_and_a_damaged_session_is_said(doctor, tmp_path):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 HZ = 16_000_000
 BYTE_TICKS = 320
-EXTERNAL_RESET = 2
+EXTERNAL_RESET, BROWN_OUT = 2, 4
 _TURN_TICKS = 200
 
 
@@ -101,6 +101,9 @@ class CoreBoard:
         self.line.waiting.clear()
         self.core.host_reset(cause)
         self._start()
+
+    def brown_out(self, at_ns: int) -> None:
+        self.reset(at_ns, BROWN_OUT)
 
     def touch(self, gates: int) -> None:
         self.core.host_gates(gates)

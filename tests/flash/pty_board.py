@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import select
 import threading
 import time
-import tty
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sim.board import VirtualBoard
+from sim.terminal import Terminal
 from tests.link.bench import ScriptedLab
 
 if TYPE_CHECKING:
@@ -30,9 +28,8 @@ class PtyBoard:
         self._board = VirtualBoard(ScriptedLab(), seed=1)
         self._board.identity = replace(self._board.identity, **names)
         self._board.reset(0)
-        self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)
-        self.path = os.ttyname(self._slave)
+        self._terminal = Terminal()
+        self.path = self._terminal.path
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
 
@@ -48,15 +45,13 @@ class PtyBoard:
     ) -> None:
         self._over.set()
         self._thread.join()
-        os.close(self._master)
-        os.close(self._slave)
+        self._terminal.pull()
 
     def _run(self) -> None:
         begun = time.monotonic_ns()
         while not self._over.is_set():
-            readable, _, _ = select.select([self._master], [], [], _LOOK_S)
+            self._terminal.wait(_LOOK_S)
             now = time.monotonic_ns() - begun
-            if readable:
-                self._board.receive(now, os.read(self._master, 4096))
+            self._board.receive(now, self._terminal.read())
             self._board.advance(now)
-            os.write(self._master, self._board.line.arrived(now))
+            self._terminal.write(self._board.line.arrived(now))

@@ -2,47 +2,79 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.boards import FLASHED
 from rig.cli import main
 from rig.flash.boards import TARGETS
 from rig.link.client import Device
 from rig.link.messages import Phase
 from rig.link.port import open_port, port_clock
-from rig_emulator.bootloader import BoughtBoard
-from rig_emulator.wiring import BOARDS
+from rig_emulator.bootloader import LOADERS, BoughtBoard
+from rig_emulator.wiring import BOARDS, Wiring
 from tests.firmware.toolchain import need
 from tests.link.bench import LABEL
 from tests.waiting import until
 
-LOADERS = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders")
-BOUGHT = {
-    "mega": "stk500v2/stk500boot_v2_mega2560.hex",
-    "uno": "optiboot/optiboot_atmega328.hex",
-}
+WRITTEN = 3000
+"""Bytes of a flash under way."""
 
 
-def bought(board: str) -> BoughtBoard:
+@pytest.fixture
+def bought(tmp_path):
     need("avrdude")
-    loader = LOADERS / BOUGHT[board]
-    if not loader.exists():
-        pytest.skip("not installed: arduino-core-avr")
-    return BoughtBoard(BOARDS[board].mcu, loader)
+
+    def buy(board: str) -> BoughtBoard:
+        if not LOADERS[board].exists():
+            pytest.skip("not installed: arduino-core-avr")
+        return BoughtBoard(wiring_of(board).mcu, LOADERS[board], tmp_path / "ttyACM0")
+
+    return buy
 
 
-@pytest.mark.parametrize("board", TARGETS)
-def test_a_new_board_is_flashed_and_its_drops_outlive_the_boot_loader(board, capsys):
-    with bought(board) as there:
+def wiring_of(board: str) -> Wiring:
+    return next(w for word, w in BOARDS.items() if FLASHED[word] is FLASHED[board])
+
+
+@pytest.fixture
+def flash(capsys):
+    def call(board: str, there: BoughtBoard):
         code = main(["flash", "--board", board, "--port", there.path])
         out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return code, out, err
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("board", "power"), [("mega", True), ("uno", False), ("nano-old", True)], ids=TARGETS
+)
+def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the_boot_loader(
+    board, power, bought, flash
+):
+    with bought(board) as there:
+        with ThreadPoolExecutor(1) as hand:
+
+            def cut() -> None:
+                until(lambda: there.heard > WRITTEN)
+                there.pull(power=power)
+
+            done = hand.submit(cut)
+            code, out, err = flash(board, there)
+            done.result()
+        assert (code, out) == (4, "")
+        assert f"flashing {there.path} failed: the connection broke" in err
+        there.plug()
+        code, out, err = flash(board, there)
         assert code == 0, err
         assert out.startswith(TARGETS[board].board.name)
         assert out.endswith(": flashed and verified\n")
-        fallen = drop(there, board)
+        fallen = drop(there, wiring_of(board))
         until(lambda: not there.is_open)
         before = there.restarts
         with closing(open_port(there.path)) as port:
@@ -53,9 +85,18 @@ def test_a_new_board_is_flashed_and_its_drops_outlive_the_boot_loader(board, cap
         assert there.restarts == before + 1
 
 
-def drop(there: BoughtBoard, board: str):
+@pytest.mark.slow
+def test_another_chip_than_the_board_that_was_named_is_not_written(bought, flash):
+    with bought("uno") as there:
+        before = there.avr.program(0, 256)
+        code, out, err = flash("mega", there)
+        assert (code, out) == (4, "")
+        assert "wrong --board" in err
+        assert there.avr.program(0, 256) == before
+
+
+def drop(there: BoughtBoard, wiring: Wiring):
     """Let a drop of forty edges be recorded, and leave it in the board."""
-    wiring = BOARDS[board]
     with there.lock:
         for pin in (*wiring.gates, wiring.stop):
             there.avr.edge(0, pin, False)

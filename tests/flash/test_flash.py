@@ -58,9 +58,9 @@ def test_a_board_is_flashed_and_asked(board, avrdude, flash):
     argv = list(avrdude.argv)
     argv.remove("-D")
     assert options(argv) == {
-        "-p": {"mega": "m2560", "uno": "m328p"}[board],
-        "-c": {"mega": "wiring", "uno": "arduino"}[board],
-        "-b": "115200",
+        "-p": "m2560" if board == "mega" else "m328p",
+        "-c": "wiring" if board == "mega" else "arduino",
+        "-b": "57600" if board == "nano-old" else "115200",
         "-P": there.path,
         "-U": f"flash:w:{target.shipped}:i",
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rig.boards import BOARDS
+from rig.boards import FLASHED
 from rig.errors import InputError
 from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
@@ -26,7 +26,7 @@ GOOD = (b"chainrig 2.3.1", b"Arduino Uno")
 
 
 def test_every_board_of_the_table_can_be_flashed():
-    assert {word: target.board for word, target in TARGETS.items()} == BOARDS
+    assert {word: target.board for word, target in TARGETS.items()} == FLASHED
 
 
 @pytest.fixture

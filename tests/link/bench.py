@@ -68,6 +68,10 @@ class Bench(ABC):
     def reset(self) -> None:
         """Press the reset button; the power stays on."""
 
+    def brown_out(self) -> None:
+        """Let the supply sink for a moment; the memory stays."""
+        raise NotImplementedError
+
     @abstractmethod
     def reopen(self) -> None:
         """Close the port and open it again, without a reset."""

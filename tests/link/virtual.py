@@ -29,6 +29,9 @@ class VirtualBench(Bench):
     def reset(self):
         self.board.reset(self.clock().now_ns())
 
+    def brown_out(self):
+        self.board.brown_out(self.clock().now_ns())
+
     def reopen(self):
         self.serial.close()
         self.serial = self.serial_type(

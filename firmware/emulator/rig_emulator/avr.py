@@ -84,6 +84,8 @@ class Avr:
                 raise InputError(f"the program is too large for {mcu}")
         for address, data in image.eeprom:
             self.eeprom_write(address, data)
+        if image.start:
+            lib.board_start_at(self._board, image.start)
         self.frequency = frequency
         self.rate(baudrate)
 
@@ -125,9 +127,9 @@ class Avr:
         """Pull the reset pin; RAM and EEPROM stay, and what comes on the wires."""
         lib.board_reset(self._board)
 
-    def start_at(self, address: int) -> None:
-        """Begin at an address, now and after each reset: where a boot loader is."""
-        lib.board_start_at(self._board, address)
+    def brown_out(self) -> None:
+        """Let the supply sink so far that it restarts; RAM stays as it was."""
+        lib.board_brown_out(self._board)
 
     def rate(self, baudrate: float) -> None:
         """Let the host at the other end of UART 0 take another rate."""
@@ -233,6 +235,12 @@ class Avr:
         return len(free := self.peek(start, lib.board_ram_end(self._board) + 1 - start)) - len(
             free.lstrip(bytes([FILL]))
         )
+
+    def program(self, address: int, size: int) -> bytes:
+        """Read the flash."""
+        data = ffi.new("uint8_t[]", size)
+        self._fits(lib.board_program(self._board, address, data, size), address)
+        return bytes(data)
 
     def eeprom_read(self, address: int, size: int) -> bytes:
         """Read the EEPROM."""

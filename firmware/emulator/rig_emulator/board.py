@@ -15,7 +15,7 @@ from rig_emulator.line import LineToHost
 from rig_emulator.name import NAME_AT, name_record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     from rig.link.frames import Frame
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 CRYSTAL_HZ = 16_000_000
 _ARM = wire.CODES[wire.Arm]
 _ARMED = wire.CODES[wire.Armed]
+_BOOT = wire.CODES[wire.Boot]
 _POWERED_CYCLES = CRYSTAL_HZ // 10  # the board has been on for a while when the port is opened
 _PULSE_NS = 10**7  # width of the reference's pulses
 _HISTORY = 10_000
@@ -59,6 +60,8 @@ class EmulatedBoard:
         What it sends.
     history
         What its output pins did of late.
+    runs
+        Whether the firmware has said that it runs: before it, a boot loader may.
     second_ns
         Period of a 1 Hz reference that gives pulses from now on; `None`: none is wired.
     """
@@ -85,6 +88,7 @@ class EmulatedBoard:
         for pin in (*wiring.gates, wiring.stop, wiring.reference, wiring.sense):
             if pin is not None:
                 self.avr.edge(0, pin, False)
+        self.runs = False
         self._sense_s: float | None = None
         self._looped: str | None = None
         self.second_ns: int | None = None
@@ -114,9 +118,17 @@ class EmulatedBoard:
 
     def reset(self, at_ns: int) -> None:
         """Pull the reset pin, as opening the port does."""
+        self._restart(at_ns, self.avr.reset)
+
+    def brown_out(self, at_ns: int) -> None:
+        """Let the supply sink for a moment."""
+        self._restart(at_ns, self.avr.brown_out)
+
+    def _restart(self, at_ns: int, how: Callable[[], None]) -> None:
         self.advance(at_ns)
         self.line.cut(at_ns)
-        self.avr.reset()
+        how()
+        self.runs = False
         self._sniff()
         self.history.extend(self.avr.take_changes())
 
@@ -215,6 +227,7 @@ class EmulatedBoard:
             for cycle, value in self.avr.take_sent():
                 self.line.put(self.ns_at(cycle), value)
                 for frame in self._to_host.feed(bytes([value])):
+                    self.runs |= frame.type == _BOOT
                     if frame.type == _ARMED and frame.ack in self._asked:
                         self._label = self._asked[frame.ack]
             for change in self.avr.take_changes():

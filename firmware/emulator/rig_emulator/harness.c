@@ -150,6 +150,14 @@ int board_flash(board_t *b, uint32_t address, const uint8_t *data, uint32_t size
     return 0;
 }
 
+int board_program(board_t *b, uint32_t address, uint8_t *data, uint32_t size)
+{
+    if (address > b->avr->flashend || size > b->avr->flashend + 1 - address)
+        return -1;
+    memcpy(data, b->avr->flash + address, size);
+    return 0;
+}
+
 void board_start_at(board_t *b, uint32_t address) { b->avr->reset_pc = b->avr->pc = address; }
 
 int board_eeprom_set(board_t *b, uint32_t address, const uint8_t *data, uint32_t size)
@@ -230,10 +238,13 @@ int board_run(board_t *b, uint64_t until, int stop_on_sent)
     return b->stop;
 }
 
-void board_reset(board_t *b)
+static void reset_by(board_t *b, avr_regbit_t cause)
 {
     b->fault[0] = 0;
     b->avr->run = avr_callback_run_raw;
-    restart(b, avr_reset, b->avr->reset_flags.extrf);
+    restart(b, avr_reset, cause);
 }
+
+void board_reset(board_t *b) { reset_by(b, b->avr->reset_flags.extrf); }
+void board_brown_out(board_t *b) { reset_by(b, b->avr->reset_flags.borf); }
 

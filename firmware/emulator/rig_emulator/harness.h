@@ -29,6 +29,7 @@ board_t *board_new(const char *mcu, uint32_t frequency, uint8_t fill);
 void board_free(board_t *b);
 /* 0, or -1 when it does not fit. */
 int board_flash(board_t *b, uint32_t address, const uint8_t *data, uint32_t size);
+int board_program(board_t *b, uint32_t address, uint8_t *data, uint32_t size); /* read flash */
 int board_eeprom_set(board_t *b, uint32_t address, const uint8_t *data, uint32_t size);
 int board_eeprom_get(board_t *b, uint32_t address, uint8_t *data, uint32_t size);
 int board_poke(board_t *b, uint32_t address, const uint8_t *data, uint32_t size);
@@ -44,6 +45,7 @@ uint64_t board_cycle(const board_t *b);
 int board_run(board_t *b, uint64_t until, int stop_on_sent);
 const char *board_fault(const board_t *b);
 void board_reset(board_t *b); /* the reset pin; also leaves a fault behind */
+void board_brown_out(board_t *b);
 uint32_t board_watchdog_resets(const board_t *b);
 uint32_t board_timers(const board_t *b); /* what simavr waits for: each one slows it */
 

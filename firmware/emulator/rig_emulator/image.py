@@ -33,11 +33,12 @@ class Symbol(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """What is to be programmed: pieces as (address, bytes)."""
+    """What is to be programmed: pieces as (address, bytes); a reset begins at `start`."""
 
     flash: list[tuple[int, bytes]]
     eeprom: list[tuple[int, bytes]] = field(default_factory=list)
     symbols: dict[str, Symbol] = field(default_factory=dict)
+    start: int = 0
 
 
 def read_image(path: Path) -> Image:

@@ -20,6 +20,7 @@ from sim.scene import set_scene
 from sim.serial_port import SimulatedSerial
 
 if TYPE_CHECKING:
+    from rig_emulator.image import Image
     from rig_emulator.wiring import Wiring
     from sim.board_interface import Board
     from sim.scene import Scene
@@ -65,7 +66,7 @@ def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> 
 
 
 def put_before(
-    scene: Scene, wiring: Wiring, program: Path, baudrate: int, kind: type[Made]
+    scene: Scene, wiring: Wiring, program: Path | Image, baudrate: int, kind: type[Made]
 ) -> Made:
     """Put a board of some kind before a scene.
 

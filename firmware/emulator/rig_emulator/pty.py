@@ -9,14 +9,9 @@ Ctrl-C end it.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
-import pty
-import select
 import signal
 import sys
 import time
-import tty
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +20,7 @@ from rig_emulator.board import EmulatedBoard
 from rig_emulator.protocol_emu import board_before
 from rig_emulator.wiring import BOARDS, board_named, firmware_for
 from sim.scene import set_scene
+from sim.terminal import Terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +28,6 @@ if TYPE_CHECKING:
 BAUDRATE = 500_000
 _TICK_S = 1e-3
 _LOST_S = 0.1  # a computer too slow for real time lets the board's time lag behind
-_CHUNK = 4096
 
 
 class Bridge:
@@ -51,11 +46,8 @@ class Bridge:
 
     def __init__(self, board: EmulatedBoard) -> None:
         self.board = board
-        # Our own hold on the near end keeps the line raw, and alive between two clients.
-        self._far, self._near = pty.openpty()
-        tty.setraw(self._near)
-        os.set_blocking(self._far, False)
-        self.path = os.ttyname(self._near)
+        self._terminal = Terminal()
+        self.path = self._terminal.path
         self._start_ns = time.monotonic_ns()
         self._now_ns = 0
         self._asked_to_reset = self._asked_to_stop = False
@@ -71,18 +63,16 @@ class Bridge:
     def serve(self) -> None:
         """Pass bytes both ways until `stop`."""
         while not self._asked_to_stop:
-            select.select([self._far], [], [], _TICK_S)
+            self._terminal.wait(_TICK_S)
             self._catch_up()
             if self._asked_to_reset:
                 self._asked_to_reset = False
                 self.board.reset(self._now_ns)
-            with contextlib.suppress(BlockingIOError):
-                self.board.receive(self._now_ns, os.read(self._far, _CHUNK))
+            self.board.receive(self._now_ns, self._terminal.read())
 
     def close(self) -> None:
         """Hang up."""
-        os.close(self._far)
-        os.close(self._near)
+        self._terminal.pull()
 
     def _catch_up(self) -> None:
         real_ns = time.monotonic_ns() - self._start_ns
@@ -92,10 +82,7 @@ class Bridge:
             real_ns -= late_ns
         self._now_ns = real_ns
         self.board.advance(real_ns)
-        data = self.board.line.arrived(real_ns)
-        with contextlib.suppress(BlockingIOError):  # nobody reads: a UART would not wait either
-            while data:
-                data = data[os.write(self._far, data) :]
+        self._terminal.write(self.board.line.arrived(real_ns))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
