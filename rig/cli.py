@@ -142,6 +142,9 @@ def _parser() -> argparse.ArgumentParser:
         "--schema", action="store_true", help="the same as a JSON Schema, for editors"
     )
     check.add_argument("--board", choices=tuple(BOARDS), help="refuse what this kind cannot do")
+    check.add_argument(
+        "-o", "--output", metavar="FILE.svg", help="also draw where the gates are mounted"
+    )
 
     design = command("design", "predict what a gate layout will tell, and propose better heights")
     _protocol(design)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
 from rig.errors import InputError
+from rig.files import write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -28,6 +30,8 @@ def main(arguments: Namespace) -> int:
     protocol = reader.read(arguments.protocol)
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
+    if arguments.output:
+        _draw(protocol, Path(arguments.output))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
     return 0
 
@@ -38,6 +42,14 @@ def _reference(*, as_schema: bool) -> int:
 
     print(json.dumps(schema(), indent=2, ensure_ascii=False) if as_schema else page().rstrip())
     return 0
+
+
+def _draw(protocol: Protocol, path: Path) -> None:
+    if protocol.gates is None or not protocol.gates.gates:
+        raise InputError(f"{protocol.source}: there are no gates to be mounted", "leave -o out")
+    from rig.report.mounting import mounting_figure  # noqa: PLC0415 - matplotlib, only here
+
+    write_atomic(path, mounting_figure(protocol, protocol.gates))
 
 
 def _trials(protocol: Protocol) -> list[str]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 _TICK_S = 1e-3
+_LOST_S = 0.02  # a computer too slow for real time lets the board's time lag behind
 _FLASH = {"atmega2560": 0x40000, "atmega328p": 0x8000}
 # The USB chip is an AVR of 16 MHz too, and 2 % off as the boot loader is. An old Nano's is not, but
 # its loader's 2.1 % are well within what silicon understands; the emulator's line is stricter.
@@ -123,6 +124,11 @@ class BoughtBoard:
 
     def _catch_up(self) -> None:
         now = time.monotonic()
+        due = self._cycles + round((now - self._begun) * self.avr.frequency)
+        late = due - self.avr.cycle - round(_LOST_S * self.avr.frequency)
+        if late > 0:
+            self._cycles -= late
+            due -= late
         if self._terminal.look():
             self.restarts += 1
             self.heard = 0
@@ -133,5 +139,5 @@ class BoughtBoard:
             self.avr.rate(_RATES[self._terminal.rate])
             if now >= self._deaf_until:
                 self.avr.receive(data)
-        self.avr.run(self._cycles + round((now - self._begun) * self.avr.frequency))
+        self.avr.run(due)
         self._terminal.write(bytes(sent.value for sent in self.avr.take_sent()))

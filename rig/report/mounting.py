@@ -1,0 +1,199 @@
+"""Where emitters and receivers go: both posts from the side, the board at its inclines, the slots.
+
+Rods hang along the level lines of the board, and a beam crosses them front to back: so it runs up
+the slope and into the board, unless there is a slot, or its uphill part stands before the board.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING
+
+from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
+from rig.text_table import text_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from rig.protocol.protocol import Gates, Protocol, Side
+
+_WORDS: dict[Side, str] = {"impact": "strikes", "free": "falls beside it"}
+_COLOURS: dict[Side, str] = {"impact": SECOND, "free": MODEL}
+_WIDTH_IN = 9.0
+_WRAP = 100
+_LINE_IN = 0.155
+_NEAR_M = 0.16  # what is drawn larger once more
+_POST_M = 0.12  # from the chains to the posts, as drawn
+
+
+def mounting_figure(protocol: Protocol, gates: Gates) -> str:
+    """Draw how the gates of a protocol are mounted.
+
+    Parameters
+    ----------
+    protocol
+        The scene.
+    gates
+        Its gates.
+
+    Returns
+    -------
+    str
+        SVG; lengths in mm.
+    """
+    inclines = _inclines(protocol)
+    text = "\n".join([protocol.title, "", *_zero(protocol, gates), *_slots(protocol, gates)])
+    foot = _LINE_IN * (text.count("\n") + 2)
+    with canvas(
+        (5.6, foot), _WIDTH_IN, simulated=False, columns=2, sharex=False, description=protocol.title
+    ) as drawing:
+        whole, close, below, empty = drawing.axes
+        top = max(gate.height for gate in gates.gates)
+        low = min(gate.height for gate in gates.gates)
+        hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
+        _side_view(whole, protocol, gates, 1.04 * max(top, hanging))
+        whole.set_ylabel("")
+        whole.set_title("both posts, from the side", loc="left")
+        near = max(_NEAR_M, 1.5 * low)
+        _side_view(close, protocol, gates, near)
+        _name_inclines(close, protocol, 0.45 * near)
+        close.set_title("close to the contact point" if inclines else "lowest gates", loc="left")
+        for panel in (below, empty):
+            panel.axis("off")
+        words = below.text(0, 1, text, va="top", family="DejaVu Sans Mono", fontsize=7.0, color=INK)
+        words.set_in_layout(False)  # it goes on under the other panel
+    return drawing.svg
+
+
+def face_below(protocol: Protocol, incline_deg: float) -> float:
+    """How far the board's face is under the contact point, where a resting rod's middle is, m."""
+    thick = max((d for c in protocol.chains.values() for d in c.diameters), default=0.0)
+    return thick / 2 / math.cos(math.radians(incline_deg))
+
+
+def beam_ends(protocol: Protocol, height: float, incline_deg: float) -> tuple[float, float]:
+    """Say where a beam meets the board.
+
+    Parameters
+    ----------
+    protocol
+        The scene.
+    height
+        Of the beam above the contact point, m.
+    incline_deg
+        Of the board, above 0.
+
+    Returns
+    -------
+    float, float
+        How far uphill of the chain, level, m; how far up along the board's face, from the point
+        under the chain, m.
+    """
+    slope = math.radians(incline_deg)
+    rise = height + face_below(protocol, incline_deg)
+    return rise / math.tan(slope), rise / math.sin(slope)
+
+
+def _inclines(protocol: Protocol) -> list[float]:
+    return sorted(set(protocol.plan.inclines)) if protocol.surface is not None else []
+
+
+def _side_view(axes: Axes, protocol: Protocol, gates: Gates, top: float) -> None:
+    """Draw what is below a height, to scale; y, uphill, goes to the right."""
+    post = _POST_M if top > 2 * _POST_M else top / 2
+    for incline in _inclines(protocol):
+        fall = math.tan(math.radians(incline))
+        face = -face_below(protocol, incline)
+        ends = [(y, face + y * fall) for y in (-0.5 * post, 1.2 * post)]
+        axes.plot(*zip(*_mm(ends), strict=True), color=MUTED, linewidth=1.0, zorder=1)
+    for y in (-post, post):
+        axes.plot([1e3 * y] * 2, [-20, 1e3 * top], color=INK, linewidth=3.0, zorder=2)
+    chain = next(iter(protocol.chains.values()))
+    for height, width in zip(chain.chain.heights, chain.widths, strict=True):
+        z = protocol.drop.value + height
+        axes.plot(0, 1e3 * z, "o", color=INK, markersize=max(2.0, 100 * width), zorder=3)
+    for gate in gates.gates:
+        if gate.height > top:
+            continue
+        side = -1 if gate.side == "impact" else 1
+        axes.plot(
+            [-1e3 * post, 1e3 * post], [1e3 * gate.height] * 2, color=_COLOURS[gate.side],
+            linewidth=0.9, linestyle="-" if side < 0 else (0, (4, 3)), zorder=2,
+        )  # fmt: skip
+        axes.annotate(
+            f"{1e3 * gate.height:g}", (1e3 * side * post, 1e3 * gate.height), fontsize=7,
+            xytext=(6 * side, 0), textcoords="offset points", va="center",
+            ha="right" if side < 0 else "left", color=_COLOURS[gate.side],
+        )  # fmt: skip
+    axes.axhline(0, color=INK, linewidth=0.8, linestyle=":")
+    axes.plot(0, 0, "x", color=INK, zorder=4)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(-1.6e3 * post, 1.6e3 * post)
+    axes.set_ylim(-20, 1e3 * top)
+    axes.set_xlabel("mm, uphill to the right" if _inclines(protocol) else "mm")
+    axes.set_ylabel("mm above the contact point" if _inclines(protocol) else "mm")
+    axes.grid(visible=False)
+
+
+def _name_inclines(axes: Axes, protocol: Protocol, radius: float) -> None:
+    for incline in _inclines(protocol):
+        slope = math.radians(incline)
+        face = -face_below(protocol, incline)
+        at = (1e3 * radius * math.cos(slope), 1e3 * (face + radius * math.sin(slope)))
+        box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
+        axes.text(*at, f"{incline:g}°", fontsize=7, color=INK, ha="center", va="center", bbox=box)
+
+
+def _mm(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    return [(1e3 * y, 1e3 * z) for y, z in points]
+
+
+def _zero(protocol: Protocol, gates: Gates) -> list[str]:
+    """Say where heights are counted from, and how that is carried to both posts."""
+    if not _inclines(protocol):
+        return ["Heights count from one level, such as the table: the drop and every beam alike."]
+    drawn = ", ".join(f"{word} (chain that {_WORDS[side]})" for side, word in _lines(gates))
+    return [
+        *_wrapped(
+            "Zero: lay one of the chain's rods on the board where the lowest rod will strike. "
+            "Where its middle is, is 0, for the drop and for every beam. Carry it to both posts at "
+            "once, with a hose of water or a spirit level on a straight bar, and mark it there; "
+            f"each beam is measured from its post's mark to ± {1e3 * gates.height_u:g} mm "
+            f"(height_uncertainty), the marks are good to ± {1e3 * gates.datum_u:g} mm "
+            "(datum_uncertainty). Another incline turns the board about the rod that lies there: 0 "
+            "stays."
+        ),
+        f"Beams: {drawn}.",
+        "",
+    ]
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, _WRAP)
+
+
+def _lines(gates: Gates) -> list[tuple[Side, str]]:
+    words: dict[Side, str] = {"impact": "full", "free": "dashed"}
+    return [(side, words[side]) for side in gates.posts]
+
+
+def _slots(protocol: Protocol, gates: Gates) -> list[str]:
+    """Say where each beam of the side that strikes meets the board."""
+    inclines = [one for one in _inclines(protocol) if one > 0]
+    beams = sorted(gate.height for gate in gates.on("impact"))
+    if not inclines or not beams:
+        return []
+    rows = [["beam, mm", *(f"{one:g}°" for one in inclines)]]
+    for height in beams:
+        ends = [beam_ends(protocol, height, one) for one in inclines]
+        rows.append([f"{1e3 * height:g}", *(f"{1e3 * y:.0f} | {1e3 * s:.0f}" for y, s in ends)])
+    return [
+        *_wrapped(
+            "A beam crosses the rods front to back, and runs into the board so many mm uphill of "
+            "them | so many mm up along its face. As far as the board goes, cut a slot there, as "
+            "wide as the beam and its aim; or set the uphill part nearer to the rods than the "
+            "first number."
+        ),
+        *text_table(rows),
+    ]

@@ -1,0 +1,73 @@
+"""Anything at all before the real binaries: no pulse that was not asked for, none too long."""
+
+from __future__ import annotations
+
+import pytest
+
+import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.link import messages as wire
+from rig_emulator.avr import Change
+from rig_emulator.fuzz import Fuzz, Judge
+from rig_emulator.wiring import BOARDS, firmware_for
+from tests.firmware.toolchain import make
+
+ORDER = wire.Arm(1, 1, 0b01, 1000, 200, 50)
+LIMIT = 16_000  # cycles
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_every_pulse_was_armed_and_fired(name):
+    make("all")
+    fuzz = Fuzz(BOARDS[name], firmware_for(BOARDS[name]), seed=3)
+    for _ in range(250):
+        fuzz.step()
+    assert fuzz.judge.faults == []
+    assert fuzz.judge.pulses["ordered"] >= 5, "or else this would show nothing"
+    assert fuzz.avr.watchdog_resets == 0
+
+
+def judged(*said, until=1000 + LIMIT, pin="PE3"):
+    judge = Judge(("PE3", "PE5"))
+    for what in said:
+        what(judge)
+    judge.change(Change(1000, pin, True))
+    judge.change(Change(until, pin, False))
+    return judge
+
+
+def armed(judge):
+    judge.armed(7, ORDER)
+
+
+def fired(judge):
+    judge.fire(7)
+
+
+def test_the_judge_lets_a_pulse_pass_that_was_asked_for():
+    judge = judged(armed, fired)
+    assert judge.faults == []
+    assert judge.pulses == {"ordered": 1}
+    assert judged(armed, fired, until=2000).pulses == {"cut": 1}
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        (),
+        (armed,),
+        (fired,),
+        (armed, lambda judge: judge.fire(8)),
+        (armed, fired, Judge.restarted),
+        (armed, fired, lambda judge: judge.armed(9, ORDER)),
+        (armed, fired, lambda judge: judge.change(Change(5, "PE3", True))),
+    ],
+    ids=["nothing", "no FIRE", "no ARM", "wrong token", "restart", "armed anew", "twice"],
+)
+def test_the_judge_notices_a_pulse_without_arm_and_fire(said):
+    assert any("went on at 1000 without ARM and FIRE" in fault for fault in judged(*said).faults)
+
+
+def test_the_judge_notices_another_output_and_a_pulse_that_is_too_long():
+    assert judged(armed, fired, pin="PE5").faults
+    (fault,) = judged(armed, fired, until=1000 + 2 * LIMIT).faults
+    assert "was on for 32000 cycles" in fault

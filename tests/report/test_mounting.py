@@ -1,0 +1,48 @@
+"""Where emitters and receivers go."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from rig.cli import main
+from rig.protocol.reader import read
+from rig.report.mounting import beam_ends
+
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+READY = [path for path in sorted(PROTOCOLS.glob("*.yaml")) if "\ngates:" in path.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
+def test_each_ready_protocol_has_its_drawing(path, tmp_path):
+    drawn = tmp_path / "mounting.svg"
+    assert main(["check", str(path), "-o", str(drawn)]) == 0
+    svg = drawn.read_text("utf-8")
+    ET.fromstring(svg)
+    said = re.findall(r"<!-- (.*?) -->", svg)
+    protocol = read(path)
+    for gate in protocol.gates.gates:
+        assert f"{1e3 * gate.height:g}" in said
+    inclines = {incline for incline in protocol.plan.inclines if protocol.surface is not None}
+    assert {f"{incline:g}°" for incline in inclines} <= set(said)
+
+
+def test_a_beam_ends_where_the_face_is_that_a_rod_lies_on():
+    protocol = read(PROTOCOLS / "single-chain.yaml")
+    slope, radius = math.radians(40), 12.7e-3 / 2
+    uphill, along = beam_ends(protocol, 22e-3, 40)
+    # The face is the line at a rod's radius from the contact point.
+    assert -uphill * math.sin(slope) + 22e-3 * math.cos(slope) == pytest.approx(-radius, abs=1e-12)
+    assert along * math.cos(slope) == pytest.approx(uphill)
+    assert beam_ends(protocol, 22e-3, 80)[0] < uphill
+
+
+def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):
+    bead = str(PROTOCOLS / "bead-chain.yaml")
+    assert main(["check", bead, "-o", str(tmp_path / "m.svg")]) == 2
+    assert "there are no gates to be mounted" in capsys.readouterr().err
+    assert not (tmp_path / "m.svg").exists()
