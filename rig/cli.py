@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import signal
 import sys
-from contextlib import suppress
+import threading
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from io import TextIOWrapper
 from typing import TYPE_CHECKING
@@ -17,10 +19,11 @@ from rig.errors import RigError
 from rig.printable import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+_GOES_ON = "rig: interrupted; the same command goes on from here"
 OPTIONAL = ("distributed", "mpmath")
 """Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
 
@@ -37,13 +40,18 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments = _parser().parse_args(argv)
         finally:
             sys.stdout.flush()  # of --help, here, where a closed pipe is understood
-        code: int = import_module(f"rig.commands.{arguments.module}").main(arguments)
+        with _left_at_once():
+            command = import_module(f"rig.commands.{arguments.module}")
+        code: int = command.main(arguments)
         sys.stdout.flush()
     except RigError as error:
         _say(error)
         return error.exit_code
-    except KeyboardInterrupt:
-        _say("rig: interrupted; the same command goes on from here")
+    except (KeyboardInterrupt, RuntimeError) as error:
+        # A class in the making turns what strikes it into a RuntimeError.
+        if not isinstance(error.__cause__ or error, KeyboardInterrupt):
+            raise
+        _say(_GOES_ON)
         # Where it struck while a module made a class from text, Python 3.11 would end by the signal
         # in spite of all; text that runs to its end makes it forget.
         exec("")  # noqa: S102
@@ -65,6 +73,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         _silence_stdout()
         return BAD_INPUT
     return code
+
+
+@contextmanager
+def _left_at_once() -> Iterator[None]:
+    """Have Ctrl-C end the process: a module that is half loaded is no place to come back from."""
+    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if not ours or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(*_: object) -> None:
+        os.write(2, f"{_GOES_ON}\n".encode())
+        os._exit(INTERRUPTED)
+
+    signal.signal(signal.SIGINT, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _open_streams() -> None:

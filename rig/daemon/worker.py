@@ -42,6 +42,7 @@ _STATISTICS_S = 1.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
 STALL_S = 1.0
 """Held up for longer, the worker is said to be: nothing is known of the board meanwhile."""
+_KEPT = "what is waiting is kept in memory until it can be written"
 _LOST = "the client in control was lost"
 
 
@@ -365,6 +366,10 @@ class Worker:
 
     def _weigh(self, error: RigError) -> None:
         """Decide what an error means for the link."""
+        if isinstance(error, SessionError) and self.controller.recording:
+            waiting = self.controller.session.pending
+            if waiting and _KEPT not in error.hint:
+                error.hint = "; ".join(filter(None, [error.hint, _KEPT]))
         if isinstance(error, DeviceRefusedError | StoppedError | ControlError | InputError):
             return
         if isinstance(error, SessionError):

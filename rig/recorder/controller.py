@@ -152,9 +152,14 @@ class Controller:
                 opened.commit()
             fetched = self.settle()
         except BaseException as error:
-            self._part_with(opened)
-            if made and isinstance(error, InputError):
-                path.unlink()  # with other input it would be another protocol's, and in the way
+            # With other input it would be another protocol's, or of another kind of port: in the
+            # way of the next try, and without a board that was met there is nothing in it.
+            empty = made and (isinstance(error, InputError) or not opened.identities())
+            try:
+                self._part_with(opened)
+            finally:
+                if empty:
+                    path.unlink(missing_ok=True)
             raise
         about, plan = shown(opened, scene)
         log.info("session: %s", path)
@@ -340,6 +345,7 @@ class Controller:
                 f"run {run}, attempt {attempt} is not what comes next",
                 "read the session again: another client may have gone on with it",
             )
+        self.session.require_presence()
         self._unarmed = None
         return recorder.arm(run, attempt, self._protocol)
 
@@ -446,6 +452,7 @@ class Controller:
             )
         if (last.state, last.reasons) != (state, reasons):
             self._connected().state(run, attempt, state, reasons)
+            self.session.settle()
 
     def stop(self, reason: str) -> None:
         """Switch everything off; log an armed drop as interrupted.

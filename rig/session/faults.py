@@ -16,8 +16,8 @@ _NOT_A_SESSION = "name a file made by rig run, rig import or rig daemon"
 _ADVICE = {
     sqlite3.SQLITE_FULL: (
         "the disk is full while writing {path}",
-        "free some space and go on: nothing committed is lost, and what is waiting is kept in "
-        "memory until it can be written",
+        "free some space, then the same command goes on: nothing committed is lost, and a drop "
+        "that fell is still on the board",
     ),
     sqlite3.SQLITE_IOERR: (
         "the disk failed under {path}",

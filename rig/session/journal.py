@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -100,6 +100,41 @@ class Journal:
         if self._pending:
             with self._writing():
                 self._commit()
+
+    def save(self, place: Path) -> int:
+        """Write what is committed and what waits into a new file; nothing waits any more.
+
+        Parameters
+        ----------
+        place
+            Where nothing is yet.
+
+        Returns
+        -------
+        int
+            How many records it refuses.
+
+        Raises
+        ------
+        sqlite3.Error, OSError
+            It cannot be read, or not be written there.
+        """
+        self._give_up()
+        refused = 0
+        with closing(sqlite3.connect(place, isolation_level=None)) as target:
+            self._connection.backup(target)
+            target.execute("PRAGMA synchronous = FULL")
+            target.execute("BEGIN")
+            for statements in self._pending:
+                try:
+                    for sql, rows in statements:
+                        target.executemany(sql, rows)
+                except _BAD_ROW:
+                    refused += 1
+            target.execute("COMMIT")
+        self._pending.clear()
+        self._failed = False
+        return refused
 
     def _commit(self) -> None:
         refusal: SessionError | None = None

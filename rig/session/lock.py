@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 from contextlib import suppress
@@ -34,6 +35,12 @@ class WriterLock:
         except OSError as error:
             if isinstance(error, SessionError):
                 raise
+            if error.errno in {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}:
+                raise SessionError(
+                    f"cannot lock {session}: its disk knows no locks",
+                    "is it on a network? Put the session on a disk of this computer, and copy it "
+                    "when all is done",
+                ) from error
             raise SessionError(
                 f"cannot lock {session}: {error.strerror or error}",
                 "a session needs a folder you may write to; copy it to one, or only read it",
@@ -41,6 +48,7 @@ class WriterLock:
 
     def _acquire(self, session: Path) -> int:
         while True:
+            _refuse_second_name(session)
             handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -76,3 +84,13 @@ class WriterLock:
             self.path.unlink(missing_ok=True)  # while still locked, see _is_current
         os.close(self._handle)
         self._handle = None
+
+
+def _refuse_second_name(session: Path) -> None:
+    """A hard link has a lock and a log of its own: two writers would destroy the file."""
+    with suppress(FileNotFoundError):
+        if session.stat().st_nlink > 1:
+            raise SessionError(
+                f"{session} has a second name (a hard link)",
+                "both would be written at once: copy it to a new file, and use that",
+            )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import platform
 import sqlite3
 from contextlib import suppress
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
@@ -17,8 +19,10 @@ from rig import __version__
 from rig.errors import SessionError
 from rig.printable import encodable
 from rig.session.database import build, check_free, check_place, connect
+from rig.session.faults import translated
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
+from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
 
 if TYPE_CHECKING:
@@ -26,6 +30,9 @@ if TYPE_CHECKING:
 
     from rig.records import ClockSample, Drop, HostBreak, Pulse
     from rig.session.schema import RunState
+
+
+log = logging.getLogger(__name__)
 
 
 class Session(Reader):
@@ -40,6 +47,8 @@ class Session(Reader):
         self._lock = lock
         super().__init__(path, connection)
         self._journal = Journal(connection, path)
+        self._presence = Presence(path)
+        self._gone: SessionError | None = None
         # Counted here, not by SQLite, so that a commit tried again writes the same rows.
         self._last_drop = int(self._one('SELECT coalesce(max(id), 0) FROM "drop"', "i"))
 
@@ -144,9 +153,62 @@ class Session(Reader):
         Raises
         ------
         SessionError
-            If the disk is full or fails. The records are kept in memory; call again.
+            If the disk is full or fails: the records are kept in memory; call again. If the file
+            was moved, deleted, replaced or cut: all is saved beside it, and this one is over.
         """
-        self._writable().commit()
+        failure = None
+        try:
+            self._writable().commit()
+        except SessionError as error:
+            failure = error
+        self.require_presence()
+        if failure is not None:
+            raise failure
+
+    def require_presence(self) -> None:
+        """See that the file is still at its place; save what there is where it is not.
+
+        Raises
+        ------
+        SessionError
+            It is not; with the name of the file that has everything.
+        """
+        if self._gone is None and (trouble := self._presence.trouble()):
+            self._gone = self._rescued(trouble)
+        if self._gone is not None:
+            raise self._gone
+
+    def settle(self) -> None:
+        """Bring what is in the log (``-wal``) into the file, so that a copy of it alone is whole.
+
+        A reader that is at it may keep the last of it back until the next time.
+        """
+        with translated(self.path):
+            self._opened().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+        self.require_presence()
+
+    def _rescued(self, trouble: str) -> SessionError:
+        """Save what the open file and this memory have; give the error that says where."""
+        place = next(
+            one
+            for number in count(1)
+            if not (one := self.path.with_name(f"{self.path.name}.saved-{number}")).exists()
+        )
+        try:
+            lost = self._journal.save(place)
+        except (sqlite3.Error, OSError) as error:
+            return SessionError(
+                f"{trouble} while it was in use, and could not be saved as {place}: {error}",
+                "what was not committed is lost; a drop that fell is still on the board: make "
+                "room, and give the same command with a new session file",
+            )
+        log.error("%s while it was in use; everything is saved as %s", trouble, place)
+        return SessionError(
+            f"{trouble} while it was in use; everything that was recorded is saved as {place}"
+            + (f", but for {lost} records" if lost else ""),
+            "give that name to the same command, and it goes on; look for what moves or deletes "
+            "sessions (a sync or backup program?)",
+        )
 
     def close(self) -> None:
         """Commit and close; further calls do nothing.
@@ -160,8 +222,8 @@ class Session(Reader):
             return
         connection = self._connection
         try:
-            if not self.readonly:
-                self._journal.commit()
+            if not self.readonly and self._gone is None:
+                self.commit()
                 # Leaves one file to copy even while a reader keeps the log from being removed.
                 with suppress(sqlite3.Error):
                     connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -323,6 +385,8 @@ class Session(Reader):
 
     def _writable(self) -> Journal:
         self._opened()
+        if self._gone is not None:
+            raise self._gone
         if self.readonly:
             raise SessionError(f"{self.path} is open read-only", "open it for writing")
         return self._journal

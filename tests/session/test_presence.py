@@ -1,0 +1,136 @@
+"""A session that is moved, deleted, replaced or cut while it is in use costs nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import shutil
+
+import pytest
+
+from bench.mutants import make_session
+from bench.process_fixture import FENCE
+from rig.errors import DeviceError, SessionError
+from rig.recorder.controller import Controller
+from rig.session.schema import RunState
+from rig.session.store import Session
+
+DROPS = ((1, 1), (2, 1))
+
+
+def moved(path):
+    path.rename(path.with_name("elsewhere"))
+
+
+def deleted(path):
+    path.unlink()
+
+
+def replaced(path):
+    other = path.with_name("other")
+    shutil.copy(path, other)
+    other.replace(path)
+
+
+def without_log(path):
+    path.with_name(path.name + "-wal").unlink()
+
+
+WAYS = [moved, deleted, replaced, without_log]
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """Have a simulated rig that has recorded one of two drops."""
+    protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
+    protocol.write_text(FENCE.replace("RUNS", "2"), "utf-8")
+    made = Controller("sim://")
+    made.open_session(str(protocol), str(session), 3)
+    made.fire(made.arm(1, 1))
+    made.collect(1, 1)
+    made.log_state(1, 1, RunState.ACCEPTED)
+    yield made, protocol, session
+    with contextlib.suppress(SessionError):
+        made.close()
+
+
+@pytest.mark.parametrize("lose", WAYS)
+def test_nothing_is_armed_and_all_is_saved_beside_it(rig, lose):
+    made, protocol, session = rig
+    before = made.session.states()
+    lose(session)
+    with pytest.raises(SessionError, match=r"everything that was recorded is saved as .*saved-1"):
+        made.arm(2, 1)
+    assert made.recorder.armed is None
+    saved = session.with_name("session.saved-1")
+    with Session.open(saved, readonly=True) as found:
+        found.check()
+        assert found.drop(1, 1) is not None
+        assert found.states() == before
+    again = Controller("sim://")
+    again.open_session(str(protocol), str(saved))
+    again.fire(again.arm(2, 1))
+    assert again.collect(2, 1).faults == ()
+    again.close()
+
+
+@pytest.mark.parametrize("lose", WAYS)
+def test_a_drop_that_fell_meanwhile_is_saved_before_it_is_acknowledged(rig, lose):
+    made, _, session = rig
+    made.fire(made.arm(2, 1))
+    lose(session)
+    with pytest.raises(SessionError, match="while it was in use"):
+        made.collect(2, 1)
+    with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
+        assert [(one.run, one.attempt) for one in found.drops()] == [*DROPS]
+
+
+def test_a_session_that_was_cut_is_noticed(rig):
+    made, _, session = rig
+    os.truncate(session, 4096)
+    with pytest.raises(SessionError, match="was cut from"):
+        made.arm(2, 1)
+
+
+def test_after_an_accepted_run_a_copy_of_the_file_alone_is_whole(rig, tmp_path):
+    _, _, session = rig
+    alone = tmp_path / "copied"
+    shutil.copy(session, alone)
+    with Session.open(alone, readonly=True) as found:
+        assert found.drop(1, 1) is not None
+        assert found.latest_state(1).state is RunState.ACCEPTED
+
+
+def test_two_names_of_one_file_are_not_both_written(tmp_path):
+    session = make_session(tmp_path)
+    (tmp_path / "second").hardlink_to(session)
+    for name in (session, tmp_path / "second"):
+        with pytest.raises(SessionError, match="second name"):
+            Session.open(name)
+    with Session.open(session, readonly=True) as found:
+        found.check()
+
+
+def test_a_disk_that_knows_no_locks_is_said_to(tmp_path, monkeypatch):
+    session = make_session(tmp_path)
+
+    def none(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    with pytest.raises(SessionError, match="knows no locks"):
+        Session.open(session)
+
+
+def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
+    protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
+    protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
+    real = Controller(str(tmp_path / "ttyACM0"))
+    with pytest.raises(DeviceError, match="no such port"):
+        real.open_session(str(protocol), str(session))
+    assert [one.name for one in tmp_path.iterdir()] == [protocol.name]
+    simulated = Controller("sim://")
+    simulated.open_session(str(protocol), str(session))
+    simulated.close()
