@@ -153,8 +153,8 @@ class Controller:
             fetched = self.settle()
         except BaseException as error:
             # With other input it would be another protocol's, or of another kind of port: in the
-            # way of the next try, and without a board that was met there is nothing in it.
-            empty = made and (isinstance(error, InputError) or not opened.identities())
+            # way of the next try, and where no byte went over the line there is nothing in it.
+            empty = made and (isinstance(error, InputError) or not any(opened.byte_log()))
             try:
                 self._part_with(opened)
             finally:

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -113,6 +114,9 @@ def test_a_port_that_cannot_be_opened_is_device_trouble(
     monkeypatch.setattr("rig.link.client.BOOT_WAIT_S", 0.0)
     monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
     assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"), 4)
+    if port != "loop://":  # it was never opened
+        assert not (tmp_path / "s").exists()
+        return
     with Session.open(tmp_path / "s") as session:
         assert not session.simulated
         assert session.states() == []
@@ -209,7 +213,8 @@ def test_simulated_and_real_data_are_never_mixed(call, finished, protocol, tmp_p
     assert session.read_bytes() == before
 
     real = tmp_path / "real"
-    assert call("run", protocol, "--port", "/dev/nonexistent", "--session", real).code == 4
+    text = Path(protocol).read_text("utf-8")
+    Session.create(real, text, "p.yaml", simulated=False, origin="/dev/ttyACM0").close()
     before = real.read_bytes()
     for port in ("sim://", "emu://?board=mega"):
         done = call("run", protocol, "--port", port, "--session", real)
