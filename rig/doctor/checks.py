@@ -141,7 +141,7 @@ def stuck_gates(board: BoardFacts) -> Finding:
     if not stuck:
         return Finding("blocked gates", "none")
     return Finding(
-        "blocked gates", listed(stuck), f"{_BEAM}; wire inputs that have no gate to ground"
+        "blocked gates", listed(stuck), f"{_BEAM}; an input without a gate reads so too: leave it"
     )
 
 
