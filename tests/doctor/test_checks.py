@@ -128,7 +128,7 @@ def test_what_is_well_needs_no_advice(check, facts):
             checks.stuck_gates,
             replace(BOARD, states=GateStates(0x0102, 0)),
             "gates 1, 8",
-            "ground",
+            "leave it",
         ),
         (
             checks.flickering_gates,

@@ -11,20 +11,18 @@ import pytest
 
 from rig.cli import main
 from rig.protocol.reader import read
-from rig.report.mounting import beam_ends
+from rig.report.mounting import beam_ends, mounting_figure
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 READY = [path for path in sorted(PROTOCOLS.glob("*.yaml")) if "\ngates:" in path.read_text("utf-8")]
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
-def test_each_ready_protocol_has_its_drawing(path, tmp_path):
-    drawn = tmp_path / "mounting.svg"
-    assert main(["check", str(path), "-o", str(drawn)]) == 0
-    svg = drawn.read_text("utf-8")
+def test_each_ready_protocol_has_its_drawing(path):
+    protocol = read(path)
+    svg = mounting_figure(protocol, protocol.gates)
     ET.fromstring(svg)
     said = re.findall(r"<!-- (.*?) -->", svg)
-    protocol = read(path)
     for gate in protocol.gates.gates:
         assert f"{1e3 * gate.height:g}" in said
     inclines = {incline for incline in protocol.plan.inclines if protocol.surface is not None}
@@ -39,6 +37,14 @@ def test_a_beam_ends_where_the_face_is_that_a_rod_lies_on():
     assert -uphill * math.sin(slope) + 22e-3 * math.cos(slope) == pytest.approx(-radius, abs=1e-12)
     assert along * math.cos(slope) == pytest.approx(uphill)
     assert beam_ends(protocol, 22e-3, 80)[0] < uphill
+
+
+def test_check_draws_it(tmp_path):
+    drawn = tmp_path / "mounting.svg"
+    fence = PROTOCOLS / "picket-fence.yaml"
+    assert main(["check", str(fence), "-o", str(drawn)]) == 0
+    protocol = read(fence)
+    assert drawn.read_text("utf-8") == mounting_figure(protocol, protocol.gates)
 
 
 def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):
