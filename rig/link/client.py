@@ -240,6 +240,10 @@ class Device:
         """
         self._line.write_past(wire.Abort())
 
+    def finish(self) -> None:
+        """Give the tap what it has not been given yet: nothing more is sent or read."""
+        self._line.log_past()
+
     def acknowledge(self, label: int, crc32: int) -> None:
         """Let the device forget a drop: call it when the drop is safe on disk, not before.
 

@@ -29,6 +29,9 @@ _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
 _PAST_SEQ = 255
 """Of what goes past a request that is under way, whose answer it must not be taken for."""
+STRANGE_BYTES = 1 << 20
+"""Read and kept at most of somebody who has not said who he is."""
+_AT_ONCE = 1 << 16
 _NOISE = 4096  # bytes without a delimiter that are no half of a frame any more
 
 
@@ -173,10 +176,12 @@ class Exchange:
             The board restarted, or the connection broke.
         """
         try:
-            data = self._port.read(max(1, self._port.in_waiting))
+            data = self._port.read(min(max(1, self._port.in_waiting), _AT_ONCE))
         except OSError as error:  # SerialException is one
             raise _lost(error) from error
         self.rx_bytes += len(data)
+        if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
+            raise _strange(self.rx_bytes, self.transcript.good_frames)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
@@ -242,9 +247,13 @@ class Exchange:
         return self._chunk("rx", part)
 
     def _chunk(self, direction: Direction, data: bytes) -> list[Record]:
+        self.log_past()
+        return self._log(direction, self.clock.now_ns(), data)
+
+    def log_past(self) -> None:
+        """Give the tap what other threads have sent, before anything else or at the end."""
         while self._past:
             self._log("tx", *self._past.popleft())
-        return self._log(direction, self.clock.now_ns(), data)
 
     def _log(self, direction: Direction, now_ns: int, data: bytes) -> list[Record]:
         if self._tap is not None:
@@ -273,4 +282,12 @@ def _lost(error: OSError) -> DeviceError:
         f"connection lost: {why}",
         "check the cable; plugged in again, the board is found by its serial number, and the same "
         "rig run goes on: a drop that fell is fetched",
+    )
+
+
+def _strange(size: int, frames: int) -> DeviceError:
+    what = "and no word of who is there" if frames else "that are no frames"
+    return DeviceError(
+        f"{size / 1e6:.1f} MB of bytes {what}",
+        "another baud rate, or another program's port? rig ports lists what is there",
     )

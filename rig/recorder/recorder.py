@@ -146,6 +146,7 @@ class Recorder:
             finally:
                 port, self._port = self._port, None
                 port.close()
+            self._log_rest()
             self.session.commit()
 
     def give_up(self) -> Port | None:
@@ -154,7 +155,14 @@ class Recorder:
             if self._armed is not None:
                 self.abort()
             port, self._port = self._port, None
+            self._log_rest()
             return port
+
+    def _log_rest(self) -> None:
+        """Log what STOP sent past everything, and no request has followed."""
+        if self._device is not None:
+            with suppress(SessionError):  # it waits in memory
+                self._device.finish()
 
     @property
     def armed(self) -> tuple[int, int] | None:

@@ -16,6 +16,7 @@ from rig.clock.host import SystemClock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
+from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
@@ -128,6 +129,16 @@ def test_repeats_have_the_same_seq_and_back_off(clock):
     assert len(port.written) == 6
     assert len(set(port.written)) == 1
     assert 1.5 < clock.ns * 1e-9 < 3
+
+
+@pytest.mark.parametrize("noise", [b"\x55" * 4096, bytes(range(256)) * 16, b"\0" * 4096])
+def test_a_flood_from_who_knows_whom_is_ended_after_a_mebibyte(clock, noise):
+    port, kept = FakePort(clock, {}), []
+    port.read = lambda size: clock.sleep(1e-4) or noise[:size]
+    port.out = noise  # what waits
+    with pytest.raises(DeviceError, match=r"1\.\d MB of bytes that are no frames"):
+        device_at(port, tap=lambda _way, _ns, data: kept.append(len(data))).connect()
+    assert sum(kept) <= STRANGE_BYTES + 2 * len(noise)
 
 
 def test_seq_wraps_around_zero(clock):
