@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.boards import BOARDS, FLASHED
+from rig.command_help import Parser, overview
 from rig.errors import RigError
 from rig.printable import printable
 
@@ -37,9 +38,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     _open_streams()
     try:
         try:
-            arguments = _parser().parse_args(argv)
+            arguments = _parser().parse(argv)
         finally:
             sys.stdout.flush()  # of --help, here, where a closed pipe is understood
+        if "module" not in arguments:
+            _parser().print_help(sys.stderr)
+            return BAD_INPUT
         with _left_at_once():
             command = import_module(f"rig.commands.{arguments.module}")
         code: int = command.main(arguments)
@@ -114,18 +118,19 @@ def _silence_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="rig",
+        usage="rig [-h] [--version] COMMAND ...",
         description="Lab-rig controller for falling-chain and photogate experiments.",
-        epilog="Exit codes: 0 done, 2 bad input, 3 a run was void, 4 device trouble, "
-        "130 interrupted.",
     )
     parser.add_argument("--version", action="version", version=f"rig {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)
+    texts: dict[str, str] = {}
 
     def command(name: str, text: str, module: str = "") -> argparse.ArgumentParser:
-        added = commands.add_parser(name, help=text, description=text)
+        texts[name] = text
+        added = commands.add_parser(name, description=text)
         added.set_defaults(module=module or name)
         return added
 
@@ -135,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--session", required=True, metavar="FILE", help="a new file, or one to be continued"
     )
-    run.add_argument("--seed", type=int, metavar="N", help="of a simulation (default 0)")
+    run.add_argument("--seed", type=_seed, metavar="N", help="of a simulation (default 0)")
     run.add_argument(
         "--yes", action="store_true", help="answer every prompt; implied when nobody can answer"
     )
@@ -380,7 +385,7 @@ def _parser() -> argparse.ArgumentParser:
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
     every.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
-    every.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
+    every.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
     every.add_argument(
         "--repeats", type=_count, default=4, metavar="N", help="drops at each incline (default 4)"
     )
@@ -446,6 +451,8 @@ def _parser() -> argparse.ArgumentParser:
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")
     bulk.add_argument("--rounds", type=_count, default=15, metavar="N", help="of measurement")
     _json(bulk)
+    codes = "0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted"
+    parser.epilog = f"{overview(texts)}\n\nExit codes: {codes}."
     return parser
 
 
@@ -461,7 +468,7 @@ def _tui(tui: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a new file, or one to be continued; alone: to be looked at, without a daemon",
     )
-    tui.add_argument("--seed", type=int, metavar="N", help="of a simulation (default 0)")
+    tui.add_argument("--seed", type=_seed, metavar="N", help="of a simulation (default 0)")
     tui.add_argument("--socket", metavar="PATH", help="of the daemon, if not the usual one")
     tui.add_argument("--keys", metavar="FILE", help="your own keys (TOML)")
     tui.add_argument(
@@ -509,6 +516,12 @@ def _count(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text} is too few: at least 1 is needed")
     return number
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**63:
+        raise argparse.ArgumentTypeError(f"found '{text}', not a whole number from 0 to 2^63")
+    return int(text)
 
 
 def _seconds(text: str) -> float:

@@ -122,6 +122,7 @@ _PLAIN = re.compile(
 _BRACKETED = re.compile(
     rf"\(\s*(?P<value>{_NUMBER})\s*{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*\)\s*(?P<unit>{_UNIT})?"
 )
+_DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
 _LONGEST = 100
 _LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction
 
@@ -164,6 +165,9 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
         raise UnitError(f"found a text of {len(clean)} characters; {wanted}")
     match = _BRACKETED.fullmatch(clean) or _PLAIN.fullmatch(clean)
     if match is None:
+        pointed = _DECIMAL_COMMA.sub(r"\1.\2", clean)
+        if pointed != clean and (_BRACKETED.fullmatch(pointed) or _PLAIN.fullmatch(pointed)):
+            wanted = f"decimals have a point here and not a comma: {pointed}"
         raise UnitError(f"found {quoted(text)}; {wanted}")
     found = match.groupdict()
     unit, u_unit = found["unit"], found.get("u_unit")

@@ -158,6 +158,8 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
             raise InputError(
                 f"{scheme}://: {name}: {text} is more than all", "a share is 0 to 100 %"
             )
+        if abs(changes[name]) > 1.0 and name == "restitution":
+            raise InputError(f"{scheme}://: {name}: {text} is out of range", "-1 to 1 is accepted")
         if changes[name] <= -1.0 and name in _RATES:
             raise InputError(
                 f"{scheme}://: {name}: {text} would stop it", "a real one is off by < 0.5 %"

@@ -107,7 +107,7 @@ def test_other_dimensions(text, dimension, value, u):
         ("5 mm ± 2 %", Dimension.LENGTH, "is a plain number"),
         ("0.5 ± 10 %", Dimension.NUMBER, "two ways"),
         ("5(1) ± 1 mm", Dimension.LENGTH, "two uncertainties"),
-        ("1,5 mm", Dimension.LENGTH, "e.g. 180 mm"),
+        ("1,5 mm", Dimension.LENGTH, "and not a comma: 1.5 mm"),
         ("", Dimension.LENGTH, "found ''"),
         ("9" * 101, Dimension.NUMBER, "101 characters"),
     ],
@@ -162,3 +162,9 @@ def test_any_text_is_a_quantity_or_a_unit_error(text, dimension):
 )
 def test_formatting(quantity, unit, text):
     assert format_quantity(quantity, unit) == text
+
+
+@pytest.mark.parametrize("text", ["15,0 cm", "1,5 ± 0,2 cm", "(1,5 ± 0,2) cm"])
+def test_a_decimal_comma_is_named(text):
+    with pytest.raises(UnitError, match="decimals have a point here and not a comma"):
+        parse(text, Dimension.LENGTH)

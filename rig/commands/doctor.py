@@ -38,6 +38,8 @@ def main(arguments: Namespace) -> int:
         troubles += bool(finding.advice)
     if troubles:
         say(f"{troubles} thing{'s' * (troubles > 1)} to do")
+    else:
+        say("nothing to do" + ("" if arguments.port else "; --port PORT asks the board too"))
     return DeviceError.exit_code if troubles else 0
 
 

@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
+        if arguments.protocol is not None:
+            raise InputError(
+                f"figure {arguments.figure} is of the paper's own chains, not of a protocol's",
+                f"leave {arguments.protocol} out; rig sweep and rig report draw a protocol's",
+            )
         _write_figure(arguments.figure, arguments.output, resolved=arguments.resolved)
         return 0
     if arguments.protocol is None:
@@ -84,9 +89,12 @@ def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     from rig.report.paper import paper_figure  # noqa: PLC0415 - it needs matplotlib
 
     if output is None or Path(output).suffix not in {".svg", ".csv"}:
-        raise InputError(
-            "a figure needs a file to go to", f"rig predict --figure {number} -o FILE.svg"
+        what = (
+            "a figure needs a file to go to"
+            if output is None
+            else (f"{output}: a figure is written as .svg, and its numbers as .csv")
         )
+        raise InputError(what, f"rig predict --figure {number} -o FILE.svg")
     path = Path(output)
     falls = _resolved(number) if resolved else None
     svg, columns = paper_figure(number, falls)

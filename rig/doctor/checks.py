@@ -52,11 +52,13 @@ def permission(port: PortFacts) -> Finding:
     if port.usable:
         return Finding(name, "given")
     group = port.group or "its group"
-    return Finding(
-        name,
-        f"not given: it belongs to the group {group}",
-        f"sudo usermod -aG {port.group or 'dialout'} $USER and log in again, or {RULE}",
+    # Who joins root to reach a board can do far more than that.
+    join = (
+        ""
+        if group == "root"
+        else (f"sudo usermod -aG {port.group or 'dialout'} $USER and log in again, or ")
     )
+    return Finding(name, f"not given: it belongs to the group {group}", f"{join}{RULE}")
 
 
 def other_owners(port: PortFacts) -> Finding:

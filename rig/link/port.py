@@ -34,6 +34,7 @@ _CAUSES = {
     errno.EPERM: _FORBIDDEN,
     errno.EBUSY: _TAKEN,
     errno.EAGAIN: _TAKEN,
+    errno.ENOTTY: ("it is no serial port", _LOOK),
 }
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
 _REACH = (
@@ -99,7 +100,10 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
     except OSError as error:  # SerialException is one
         if _scheme(url) in _NETWORK:
             raise DeviceError(f"cannot open {url}: {_why_unreachable(error)}", _REACH) from error
-        cause, hint = _CAUSES.get(error.errno or 0, (str(error), _LOOK))
+        # Of what it cannot set up, pyserial keeps the cause only behind its own words.
+        below = error.__context__.args[:1] if error.__context__ else ()
+        number = error.errno or next((one for one in below if isinstance(one, int)), 0)
+        cause, hint = _CAUSES.get(number, (str(error), _LOOK))
         raise DeviceError(f"cannot open {url}: {cause}", hint) from error
     except ValueError as error:
         if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import

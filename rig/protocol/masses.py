@@ -104,7 +104,8 @@ def _table(heights: tuple[float, ...]) -> Converter[Masses]:
                 message = "heights must rise, each above the one before"
                 faults.add(listed.items[i].place, f"{key}[{i}]", message)
                 return None
-        if zs[0] > 0.0 or zs[-1] < heights[-1]:
+        # A height that sums up from rods is a rounding above what was written.
+        if zs[0] > 0.0 or zs[-1] < heights[-1] * (1.0 - 1e-12):
             message = (
                 f"runs from {zs[0]:g} m to {zs[-1]:g} m; the rods are from 0 m to {heights[-1]:g} m"
             )

@@ -180,7 +180,7 @@ def test_a_board_at_a_terminal(doctor):
     assert code == 0, out
     assert f"permission for {there.path}: given" in out
     assert "flickering gates: none within 1 s" in out
-    assert err == ""
+    assert err == "nothing to do\n"
 
 
 def test_nobody_at_a_port(doctor, terminal, monkeypatch):

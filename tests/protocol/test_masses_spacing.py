@@ -61,6 +61,14 @@ def test_an_exponential_profile_has_an_even_ratio_and_the_given_ends():
     assert a.chain.masses == (0.001, 0.003)
 
 
+@pytest.mark.parametrize("rods", [2, 8, 15, 29, 57])
+def test_a_table_may_end_where_the_chain_does(rods):
+    """Whatever rounding the height of the top rod has."""
+    table = "[{height: 0 mm, mass: 10 g}, {height: 1165 mm, mass: 3 g}]"
+    found = chains(f"rods: {rods}, length: 1165 mm, masses: {{table: {table}}}")["A"]
+    assert found.chain.masses[-1] == pytest.approx(0.003, rel=1e-12)
+
+
 def test_a_table_runs_straight_between_its_points():
     table = (
         "[{height: 0 mm, mass: 10 g}, {height: 125 mm, mass: 5 g}, {height: 300 mm, mass: 12 g}]"

@@ -1,0 +1,115 @@
+"""What the command line says of itself: commands in groups, two examples each, near misses."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "Before a session": ("check", "predict", "design", "sweep"),
+    "The board": ("ports", "flash", "selftest", "doctor"),
+    "A session": ("run", "tui", "daemon", "import"),
+    "Results": ("analyze", "report", "estimate", "export", "unblind", "replay", "recover"),
+    "Studies of the program itself": ("bench",),
+}
+"""Every command, in the order in which they are met."""
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "check": ("rig check protocols/inclined-uniform.yaml", "rig check --keys"),
+    "predict": ("rig predict protocols/graded-chain.yaml", "rig predict --figure 3 -o figure.svg"),
+    "design": (
+        "rig design protocols/inclined-uniform.yaml",
+        "rig design protocols/inclined-uniform.yaml --repeats 4",
+    ),
+    "sweep": (
+        "rig sweep protocols/single-chain.yaml --vary friction=0..0.4:50 -o sweep.svg",
+        "rig sweep protocols/inclined-uniform.yaml --vary drop=100mm..300mm:20 -o sweep.csv",
+    ),
+    "ports": ("rig ports", "rig ports --json"),
+    "flash": ("rig flash --board mega --port /dev/ttyACM0", "rig flash --board uno --port COM3"),
+    "selftest": ("rig selftest --port /dev/ttyACM0", "rig selftest --port sim:// --release"),
+    "doctor": ("rig doctor", "rig doctor --port /dev/ttyACM0 --session my.session"),
+    "run": (
+        "rig run protocols/single-chain.yaml --port sim:// --session my.session",
+        "rig run my-chains.yaml --port /dev/ttyACM0 --session my.session --yes",
+    ),
+    "tui": (
+        "rig tui protocols/inclined-uniform.yaml --port sim:// --session my.session",
+        "rig tui --session my.session",
+    ),
+    "daemon": ("rig daemon --port /dev/ttyACM0", "rig daemon --port sim:// --tcp"),
+    "import": (
+        "rig import edges.csv --protocol my-chains.yaml --session my.session",
+        "rig import logger.txt --protocol my-chains.yaml --dry-run",
+    ),
+    "analyze": ("rig analyze my.session", "rig analyze my.session --budget 1"),
+    "report": ("rig report my.session -o report.html",
+               "rig report my.session -o report.html --figures my-figures"),
+    "estimate": ("rig estimate my.session", "rig estimate my.session -o my-pictures"),
+    "export": ("rig export my.session --csv my-csv",
+               "rig export my.session --csv /tmp/for-a-spreadsheet"),
+    "unblind": ("rig unblind my.session", "rig unblind my.session && rig analyze my.session"),
+    "replay": ("rig replay my.session", "rig replay old.session"),
+    "recover": ("rig recover my.session", "rig recover my.session -o saved.session"),
+    "bench": ("rig bench stability", "rig bench layouts -o my-folder"),
+}  # fmt: skip
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose mistakes name what was meant, and whose help has groups and examples."""
+
+    def __init__(self, **options: Any) -> None:
+        options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        super().__init__(**options)
+        examples = EXAMPLES.get(self.prog.removeprefix("rig "))
+        if examples:
+            self.epilog = "\n  ".join(["examples:", *examples])
+
+    def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
+        """Parse; what is left over is the mistake of the sub-command that was named."""
+        found, rest = self.parse_known_args(args)
+        if rest:
+            said = list(sys.argv[1:] if args is None else args)
+            inner = next((one for word in said if (one := self._inner(word))), None)
+            (inner or self).error(f"unrecognized arguments: {' '.join(rest)}")
+        return found
+
+    def _inner(self, word: str) -> argparse.ArgumentParser | None:
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction) and word in action.choices:
+                inner: argparse.ArgumentParser = action.choices[word]
+                return inner
+        return None
+
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        if action.choices is not None and value not in action.choices:
+            from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
+
+            known = list(map(str, action.choices))
+            near = get_close_matches(str(value), known, n=1)
+            guess = f"did you mean {near[0]}? " if near else ""
+            message = f"found '{value}'; {guess}accepted: {', '.join(known)}"
+            raise argparse.ArgumentError(action, message)
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is, and end."""
+        usage = self.format_usage()
+        self.exit(2, f"{self.prog}: {message}\n{usage}  hint: {self.prog} --help\n")
+
+
+def overview(texts: dict[str, str]) -> str:
+    """All commands with what they do, in groups.
+
+    Parameters
+    ----------
+    texts
+        One line on each command.
+    """
+    lines = []
+    for group, names in GROUPS.items():
+        lines += ["", f"{group}:", *(f"  {name:<10}{texts[name]}" for name in names)]
+    return "\n".join(lines)

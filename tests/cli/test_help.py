@@ -1,0 +1,63 @@
+"""What the command line says of itself, and of what it does not accept."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from rig.cli import _parser
+from rig.command_help import EXAMPLES, GROUPS
+from tests.cli.lab import PROTOCOLS
+
+
+def commands():
+    return next(one.choices for one in _parser()._actions if one.dest != "help" and one.choices)
+
+
+def test_every_command_has_a_group_and_two_examples(call):
+    known = set(commands())
+    assert {name for names in GROUPS.values() for name in names} == known == set(EXAMPLES)
+    done = call()
+    assert (done.code, done.out) == (2, "")
+    for name in known:
+        assert f"\n  {name} " in done.err
+        assert len(EXAMPLES[name]) >= 2
+
+
+@pytest.mark.parametrize("line", [one for lines in EXAMPLES.values() for one in lines])
+def test_examples_are_commands(line):
+    for part in line.split(" && "):
+        program, *words = shlex.split(part)
+        assert program == "rig"
+        assert _parser().parse(words).module
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["analyse", "x"], "did you mean analyze?"),
+        (["analyze", "x", "--josn"], "usage: rig analyze"),
+        (["run", "p", "--port", "sim://", "--session", "s", "--seed", "-1"], "found '-1'"),
+        (["predict", "nothere.yaml", "--figure", "3"], "leave nothere.yaml out"),
+        (["predict", "--figure", "3", "-o", "x.png"], "x.png: a figure is written as .svg"),
+        (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
+    ],
+)
+def test_a_mistake_is_named(call, words, said):
+    done = call(*words)
+    assert done.code in {2, 4}
+    assert said in done.err
+    assert "Traceback" not in done.err
+
+
+def test_what_no_board_has_is_refused(call, tmp_path):
+    done = call("run", PROTOCOLS / "single-chain.yaml", "--port", "sim://?restitution=7",
+                "--session", tmp_path / "s")  # fmt: skip
+    assert (done.code, "-1 to 1 is accepted" in done.err) == (2, True)
+
+
+def test_a_doctor_who_finds_nothing_says_so(call):
+    done = call("doctor")
+    if done.code == 0:  # a full disk is a finding
+        assert "nothing to do" in done.err
