@@ -21,6 +21,7 @@ from rig.analysis.fit import settle
 from rig.analysis.identify import (
     MISSED,
     around_order,
+    held_back,
     possible,
     read_quickly,
     read_side,
@@ -146,8 +147,9 @@ class Explainer:
             stated = self._absolute(self.setting, reading.evidence)
             gains, well = np.array(self._gains(fit)), well_read(reading)
             ranked = np.argsort(gains)[::-1][:_TRIED]
-            # Of a good reading the score tells beforehand which search would end in vain.
-            ranked = ranked[gains[ranked] > 0.0] if well else ranked
+            # Of a good reading the score tells beforehand which search would end in vain; air that
+            # seems to push is what a fault may save besides.
+            ranked = ranked[gains[ranked] > min(0.0, held_back(fit))] if well else ranked
             found += [self._sought(self.steady[n], 0.0, reading, stated) for n in ranked]
             others = [one for one in self.faults if one.shift is None or not well]
         found += [self._afresh(one, size, stated) for one, size in self._voted(others)]

@@ -172,10 +172,7 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
     if protocol.drag is not None:
         yield Fault(
             lambda setting, _: _protocol(setting, drag=None),
-            lambda kappa, u: (
-                f"the air holds the chains back by κ = {kappa:.2g} ± {max(2.0 * u, 1e-4):.1g} per "
-                "m, and not as the protocol says"
-            ),
+            other_air,
             of_air=True,
         )
     if protocol.surface is None:
@@ -235,6 +232,14 @@ def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
         return _with_gates(setting, found)
 
     return Fault(change, lambda _s, _u: exchanged(gates[a], gates[b]))
+
+
+def other_air(kappa: float, u: float) -> str:
+    """Say what the air takes, where that is not what was stated."""
+    return (
+        f"the air holds the chains back by κ = {kappa:.2g} ± {max(2.0 * u, 1e-4):.1g} per m, and "
+        "not as the protocol says"
+    )
 
 
 def exchanged(one: Gate, other: Gate) -> str:

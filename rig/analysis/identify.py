@@ -156,8 +156,7 @@ def identify(
     found: dict[str, list[Reading]] = {}
     shares: dict[str, float] = {}
     # The free chain first: it tells what the air does to both, and when they were let go.
-    near, kappa, clock = window, prior_air(protocol)[0], 0.0
-    told = protocol.drag is not None
+    near, kappa, clock, told = window, prior_air(protocol)[0], 0.0, False
     for record in reversed(records):
         side = _Side(protocol, record, clock_u, components, told)
         readings = side.readings(near, kappa, clock)
@@ -374,10 +373,10 @@ def log_evidence(fit: Fit) -> float:
         total += far.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS))
     y = scaled(estimate.x, estimate.sd)
     _, volume = np.linalg.slogdet(estimate.information)
-    return total - 0.5 * float(y @ y) - 0.5 * float(volume) + _held_back(fit)
+    return total - 0.5 * float(y @ y) - 0.5 * float(volume) + held_back(fit)
 
 
-def _held_back(fit: Fit) -> float:
+def held_back(fit: Fit) -> float:
     """Log of the share of an estimated κ's distribution above zero, twice: air only holds back."""
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start

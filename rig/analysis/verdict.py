@@ -7,8 +7,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.deciding import deciding_gate
-from rig.analysis.diagnoses import diagnose
+from rig.analysis.diagnoses import IMPLAUSIBLE, diagnose
 from rig.analysis.distributions import most_by_chance
+from rig.analysis.faults import other_air
 from rig.analysis.identify import MISSED
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import disagreements
@@ -107,7 +108,7 @@ def judge(
             void += faults.doubts  # which may be why
         doubts += faults.doubts
         doubts += _doubts(protocol, drop, audit, found, fit.estimate)
-        pushed = _pushed(fit)
+        pushed = _pushed(fit) or _other_air(fit)
         remarks = other_incline(fit, run)
         accused += (*pushed, *remarks)
         doubts += pushed
@@ -236,6 +237,21 @@ def _blown(fit: Fit) -> list[str]:
         f"(κ = {model.kappa(estimate.x):.2g} per m) edges scatter {estimate.scatter:.1f} times as "
         "much as assumed"
     ]
+
+
+def _other_air(fit: Fit) -> tuple[str, ...]:
+    """Edges tell the air better than a protocol does: where it is not as stated, that is said."""
+    model, estimate = fit.model, fit.estimate
+    if model.protocol.drag is None or "drag" not in model.unknowns:
+        return ()
+    at = model.unknowns["drag"].start
+    off, sd = float(estimate.x[at]), float(estimate.sd[at])
+    if abs(off) <= IMPLAUSIBLE * sd:
+        return ()
+    # By the edges alone, without what the protocol makes of them.
+    share = 1.0 / (1.0 - min(float(estimate.covariance[at, at]), 0.9))
+    kappa = model.kappa(estimate.x) + (share - 1.0) * off
+    return (other_air(kappa, math.sqrt(share * estimate.covariance[at, at]) * sd),)
 
 
 def _pushed(fit: Fit) -> tuple[str, ...]:

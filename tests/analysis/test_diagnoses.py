@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from itertools import combinations
@@ -17,10 +18,11 @@ from rig.bench.layout_catalogue import KINDS, STANDARD, Kind, graded, under
 from rig.bench.wrong_rigs import WRONG_RIGS
 from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
-from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Drag, Protocol
 from rig.protocol.reader import parse
+from rig.units import Quantity
 from sim.dials import Dials, read_dials
-from tests.analysis.drops import GRADED, SCENES, UNIFORM, Case, case
+from tests.analysis.drops import GRADED, SCENES, UNIFORM, Case, case, with_dials
 from tests.analysis.sessions import MILD
 
 HEIGHTS = {gate.channel: gate.height for gate in UNIFORM.gates.gates}
@@ -158,6 +160,19 @@ def test_a_rig_that_is_wrong_in_one_thing_is_told_what_it_is(name):
     if digits:
         assert found is not None
         assert abs(float(found[1]) - float(digits)) < 2.0 * float(found[2])
+
+
+@pytest.mark.parametrize(("true", "stated"), [(0.0, 0.1), (0.08, 0.03)])
+def test_air_that_is_not_as_stated_is_told(true, stated):
+    """The edges tell it, and the motion fits them: but the protocol is wrong."""
+    speed = math.sqrt(UNIFORM.gravity.value / stated)
+    windy = replace(UNIFORM, drag=Drag(terminal_speed=Quantity(speed, 0.02 * speed)))
+    one = case(UNIFORM, with_dials(drag=true), incline=40.0)
+    result = replace(one, protocol=windy).analyze()
+    assert result.verdict == "void"
+    (reason,) = result.reasons
+    found = re.search(r"κ = ([\d.e-]+) ± ([\d.e-]+) per m, and not as the protocol says", reason)
+    assert abs(float(found[1]) - true) < max(2.0 * float(found[2]), 1e-3)
 
 
 def test_impacts_of_a_quite_different_incline_are_remarked():
