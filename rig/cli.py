@@ -471,9 +471,11 @@ def _tui(tui: argparse.ArgumentParser) -> None:
     tui.add_argument("--seed", type=_seed, metavar="N", help="of a simulation (default 0)")
     tui.add_argument("--socket", metavar="PATH", help="of the daemon, if not the usual one")
     tui.add_argument("--keys", metavar="FILE", help="your own keys (TOML)")
+    tui.add_argument("--bell", action="store_true", help="ring at every verdict")
     tui.add_argument(
-        "--pictures", metavar="DIR", help="write the main screens of --session as SVG files"
+        "--ascii", action="store_true", help="only characters that every terminal and font has"
     )
+    tui.add_argument("--pictures", metavar="DIR", help="write all pages of --session as SVG files")
 
 
 def _sweep(sweep: argparse.ArgumentParser) -> None:

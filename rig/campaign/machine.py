@@ -41,6 +41,7 @@ from rig.campaign.events import (
 from rig.campaign.voids import after, why_halted
 from rig.link.messages import Reason
 from rig.records import Job
+from rig.session.schema import NOTE
 
 if TYPE_CHECKING:
     from rig.campaign.events import Effect, Event
@@ -60,7 +61,6 @@ _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
 _PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
 """Refusals to arm that end by themselves, or that somebody at the rig can end."""
-_NOTE = "note: "
 _DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
 """Refusals to fire after which the drop can be prepared again."""
 
@@ -159,16 +159,20 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return _relogged(flow, "rejected", (cause.strip(), *_notes(flow)))
         case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
-            later = [note for note in _notes(flow) if note not in reasons]
-            return _relogged(flow, verdict, (*reasons, *later))
-        case Note(text) if flow.stage is Stage.RESULT and text.strip():
-            noted = (*flow.reasons, f"{_NOTE}{text.strip()}")
-            return _relogged(flow, flow.verdict, noted)
+            return _relogged(flow, verdict, (*_noteless(reasons), *_notes(flow)))
+        case Note(text) if flow.stage is Stage.RESULT:
+            note = (f"{NOTE}{text.strip()}",) if text.strip() else ()
+            if note != _notes(flow):  # what was noted before stays in the log
+                return _relogged(flow, flow.verdict, (*_noteless(flow.reasons), *note))
     return flow, ()
 
 
 def _notes(flow: Flow) -> tuple[str, ...]:
-    return tuple(reason for reason in flow.reasons if reason.startswith(_NOTE))
+    return tuple(reason for reason in flow.reasons if reason.startswith(NOTE))
+
+
+def _noteless(reasons: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(reason for reason in reasons if not reason.startswith(NOTE))
 
 
 def _stopped(flow: Flow) -> Outcome:

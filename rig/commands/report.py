@@ -18,6 +18,7 @@ from rig.report.parts import effects_parts
 from rig.report.pictures import pictures
 from rig.report.remarks import remarks
 from rig.results import protocol_of, results
+from rig.results.whole import notes
 from rig.sections import Sections
 from rig.session.store import Session
 
@@ -76,7 +77,7 @@ def main(arguments: Namespace) -> int:
                 },
                 identities=[identity for _, identity in session.identities()],
                 clock=found.clock.details,
-                notes=remarks(found),
+                notes=[*remarks(found), *_noted(session)],
                 parts=parts,
                 sections=sections,
             ),
@@ -87,6 +88,14 @@ def main(arguments: Namespace) -> int:
         say(sentence)
     say(f"report: {arguments.output}")
     return 0
+
+
+def _noted(session: Session) -> list[str]:
+    """Tell what operators noted to drops."""
+    return [
+        f"Note on run {job.run}, attempt {job.attempt}: {text}"
+        for job, text in notes(session).items()
+    ]
 
 
 def _estimated(protocol: Protocol, analysis: Analysis) -> SessionEstimate | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 from rig.errors import InputError
 from rig.ports import check_name
 from rig.tui.app import RigApp
+from rig.tui.ascii import wanted
 from rig.tui.context import Options
 from rig.tui.keys import read_keys
 
@@ -53,6 +55,8 @@ def _options(arguments: Namespace) -> Options:
         seed=arguments.seed,
         socket=Path(arguments.socket).absolute() if arguments.socket else None,
         offline=offline,
+        bell=arguments.bell,
+        ascii=arguments.ascii or wanted(os.environ),
     )
 
 

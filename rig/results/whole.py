@@ -16,7 +16,7 @@ from rig.protocol import reader
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
 from rig.session.reading import BESIDE
-from rig.session.schema import RunState
+from rig.session.schema import RunState, noted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, MutableMapping
@@ -219,6 +219,13 @@ def rejected(session: Reader) -> dict[tuple[int, int], tuple[str, ...]]:
     """Drops whose last state is that the operator rejected them, with the causes."""
     last = {(entry.run, entry.attempt): entry for entry in session.states()}
     return {key: entry.reasons for key, entry in last.items() if entry.state is RunState.REJECTED}
+
+
+def notes(session: Reader) -> dict[Job, str]:
+    """What operators noted to drops, of each the latest note, in order of recording."""
+    last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
+    found = {job: " · ".join(noted(entry.reasons)) for job, entry in last.items()}
+    return {job: text for job, text in found.items() if text}
 
 
 def tick_rates(session: Reader) -> dict[int, float]:

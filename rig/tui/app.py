@@ -17,6 +17,7 @@ from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands, selectors
 from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, Action, hindrance, shown_key
+from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
@@ -29,8 +30,9 @@ from rig.tui.widgets.status import StatusBar
 from rig.tui.widgets.stopbar import StopBar, StopLine
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Hashable, Mapping
+    from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 
+    from textual.filter import LineFilter
     from textual.screen import Screen
 
     from rig.results.live import SessionView
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
 TICK_S = 0.1
 _COUNTED_S = 0.3
 """Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
+_TOLD_S = 15.0
 _SHARE = 0.17  # of a core, that this may take on a slow machine
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
@@ -162,10 +165,18 @@ class RigApp(App[None], inherit_bindings=False):
         self._stillness = Stillness(options.still_s)
         self._last = monotonic()
         self._spent = process_time()
+        self._ascii = AsciiFilter()
+        self._told, self._told_s = "", 0.0
         self._followed = ""
+        self._rang_at = start
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = THEMES[0].name
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """What goes over every line that is drawn."""
+        more = (self._ascii,) if self.options.ascii else ()
+        return (*super().get_line_filters(), *more)
 
     # ------------------------------------------------------------------ life
 
@@ -225,7 +236,8 @@ class RigApp(App[None], inherit_bindings=False):
             base.query_one("#alarm")
         except NoMatches:
             return  # on its way in, or out
-        base.query_one(StatusBar).show(model, self.page, self.keys, size)
+        told = self._told if model.now_s - self._told_s < _TOLD_S else ""
+        base.query_one(StatusBar).show(model, self.page, self.keys, size, told)
         base.query_one(StopBar).show(model, self.page, self.keys, size.width)
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
@@ -286,6 +298,13 @@ class RigApp(App[None], inherit_bindings=False):
     def _follow(self) -> None:
         """Show the page of the stage when the stage has changed."""
         stage = self.model.stage
+        if (
+            stage is not self._rang_at
+            and stage in {Stage.RESULT, Stage.HALTED}
+            and self.options.bell
+        ):
+            self.bell()
+        self._rang_at = stage
         wanted = _PAGE_OF.get(stage, "run")
         if self.options.offline:
             wanted = "history"
@@ -337,6 +356,11 @@ class RigApp(App[None], inherit_bindings=False):
         if not self.model.hot:
             self.push_screen(question, answered)
             self.draw()
+
+    def tell(self, text: str) -> None:
+        """Say something for a while, on any page."""
+        self._told, self._told_s = text, monotonic()
+        self.draw()
 
     def next_theme(self) -> None:
         """Change the colours."""

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopped, Try, Warned
 from rig.campaign.plan import again
 from rig.errors import RigError
+from rig.session.schema import noted
 from rig.tui import selectors
 from rig.tui.screens.ask import Ask, AskReason, Confirm
 from rig.tui.screens.help import Help
 from rig.tui.screens.palette import Palette
+from rig.tui.writing import export_of, report_of, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
+    from pathlib import Path
 
     from rig.tui.client import ReconnectingClient
     from rig.tui.context import CommandContext
@@ -145,10 +148,39 @@ def _drops(app: CommandContext) -> None:
 
 def _note(app: CommandContext) -> None:
     def given(text: str | None) -> None:
-        if text:
+        if text is not None:
             app.driver.take(Note(text))
 
-    app.ask(Ask("Note on this drop:"), given)
+    app.ask(Ask("Note on this drop:", " · ".join(noted(app.driver.flow.reasons))), given)
+
+
+def _filter(app: CommandContext) -> None:
+    """Ask which drops are looked at."""
+    from rig.tui.choosing import HOW  # noqa: PLC0415 - brings the analysis along
+
+    def given(words: str | None) -> None:
+        if words is not None:
+            app.history.sift(words.strip())
+
+    app.turn("history")
+    app.ask(Ask(HOW, app.history.words), given)
+
+
+def _write(app: CommandContext, command: Callable[[Path], tuple[str, ...]]) -> None:
+    """Have files written of the session that is looked at."""
+    view = app.history.view if app.page == "history" else app.model.view
+    if view is None:
+        app.tell("no session is open: o lists them")
+    else:
+        app.begin(write(app, *command(view.path)))
+
+
+def _step(app: CommandContext, by: int) -> None:
+    """Go a step in time, or with the cursor where nothing is played."""
+    if app.page == "history":
+        app.history.turn(by)
+    else:
+        app.pages[app.page].point(by)
 
 
 def _reject(app: CommandContext) -> None:
@@ -234,8 +266,12 @@ _DO: dict[str, Callable[[CommandContext], object]] = {
     "drops": _drops,
     "play": lambda app: app.history.play(),
     "turn_round": lambda app: app.history.turn_round(),
-    "earlier": lambda app: app.history.turn(-1),
-    "later": lambda app: app.history.turn(1),
+    "earlier": lambda app: _step(app, -1),
+    "later": lambda app: _step(app, 1),
+    "filter": _filter,
+    "compare": lambda app: app.history.compare(),
+    "report": lambda app: _write(app, report_of),
+    "export": lambda app: _write(app, export_of),
     "slower": lambda app: app.history.pace(0.5),
     "faster": lambda app: app.history.pace(2.0),
 }

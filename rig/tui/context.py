@@ -39,6 +39,10 @@ class Options:
         Only look at `session`: no daemon is asked for.
     still_s
         How long the screen stands still before Enter can arm.
+    bell
+        Whether it rings at a verdict.
+    ascii
+        Whether only ASCII can be shown.
     """
 
     files: tuple[Path, ...] = ()
@@ -49,6 +53,8 @@ class Options:
     offline: bool = False
     countdown_s: float = COUNTDOWN_S
     still_s: float = STILL_S
+    bell: bool = False
+    ascii: bool = False
 
 
 class CommandContext(Protocol):
@@ -80,6 +86,8 @@ class CommandContext(Protocol):
     def choices(self) -> list[Choice]: ...
 
     def action_do(self, name: str | None) -> None: ...
+
+    def tell(self, text: str) -> None: ...
 
     def next_theme(self) -> None: ...
 

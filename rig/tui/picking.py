@@ -85,7 +85,7 @@ def drops(app: CommandContext) -> None:
     lines = []
     counting = {Job(one.run.number, one.attempt) for one in found.analysis.runs
                 if one.verdict in GOOD}  # fmt: skip
-    for job in found.jobs:
+    for job in history.jobs:
         verdict = found.results[job].verdict
         symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
         run = found.plan[job.run]
@@ -100,7 +100,7 @@ def drops(app: CommandContext) -> None:
         if number is not None:
             history.choose(number)
 
-    app.ask(Pick("Drops of this session", lines, history.player.at), chosen)
+    app.ask(Pick("Drops of this session", lines, history.player.at % max(1, len(lines))), chosen)
 
 
 async def _open(app: CommandContext, entry: SessionEntry) -> None:

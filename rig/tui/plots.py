@@ -22,6 +22,7 @@ _MARKS = {"impact": ("×", "primary"), "free": ("+", "secondary")}
 _BEFORE_S = 0.02
 _WITH_BARS = 40  # numbers in a chart: the bars of more stand in each other's way
 _MOST = 300  # marks of a chain: more would stand on each other
+_LAID = 12  # drops over each other
 _TIME = "t (ms)"
 
 
@@ -100,6 +101,53 @@ def drop_pictures(
         result.matches or None,
         None if skew is None else skew.value,
     )
+
+
+def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
+    """Draw Δz(t) of several drops over each other, as if let go together, one above the others.
+
+    `None` where nothing of it was measured. Of very many drops some are left out.
+    """
+    thin = jobs[:: 1 + len(jobs) // _LAID]
+    curves: list[Series] = []
+    for one in (*(other for other in thin if other != job), job):
+        apart = (
+            drop_pictures(view, one)[1]
+            if RELEASE_SKEW.name in view.results[one].quantities
+            else None
+        )
+        if apart is None:
+            continue
+        model, dots = apart.series
+        if one == job:
+            curves += [model, dots._replace(label=f"run {one.run}")]
+        else:
+            some = f"{len(thin) - 1} others" if not curves else ""
+            curves.append(dots._replace(color="foreground", marker="·", label=some))
+    title = "Δz (cm) as if let go together"
+    return Picture(title, _TIME, tuple(curves)) if curves else None
+
+
+def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
+    """Draw what several drops measured, in order of the runs, one of them above the others."""
+    row = next((row for row in averaged() if row.name in view.results[job].quantities), None)
+    if row is None:
+        return None
+    series = []
+    for color, label, some in (
+        ("secondary", "others ± U", [one for one in jobs if one != job]),
+        ("primary", f"run {job.run} ± U", [job]),
+    ):
+        found = [(one.run, view.results[one].quantities[row.name]) for one in some
+                 if row.name in view.results[one].quantities]  # fmt: skip
+        series.append(
+            Series("bars", [float(run) for run, _ in found],
+                   [one.value * row.scale for _, one in found], color, "●", label,
+                   [one.expanded * row.scale for _, one in found])
+        )  # fmt: skip
+    ends = (0.5, len(view.plan) + 0.5)
+    return Picture(f"{row.label} ({row.unit})", "run", tuple(series), ends,
+                   x_ticks=_whole(len(view.plan)))  # fmt: skip
 
 
 def _expected_end(found: Sequence[ChainFall]) -> float:

@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from textual.widgets import OptionList
 
+from rig.records import Job
 from rig.results import detailed
 from rig.results.live import LiveAnalysis
+from rig.results.whole import notes
+from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.app import RigApp
+from rig.tui.choosing import chosen
 from rig.tui.context import Options
 from rig.tui.picking import session_list
-from rig.tui.plots import control_pictures
+from rig.tui.plots import control_pictures, laid_over, run_picture
 from rig.tui.why import speed_picture, why_words
 from tests.cli.lab import rig, short
 from tests.tui.lab import KEYS, Operator, run
@@ -73,6 +78,54 @@ def test_why_the_chain_that_strikes_arrives_first(recorded):
     assert drawn["model"].y[-1] - drawn["free fall"].y[-1] > 1.0
     jumps = np.diff(drawn["model"].y) - np.diff(drawn["free fall"].y)
     assert np.count_nonzero(jumps > 1e-9) == 25 - 1  # each rod that strikes pulls, but the top one
+
+
+def test_drops_are_sifted_and_laid_over_each_other(recorded):
+    view = LiveAnalysis(recorded).read()
+    assert chosen(view, "") == chosen(view, "40° accepted") == view.jobs
+    by_a, by_b = chosen(view, "a"), chosen(view, "B 40")
+    assert {view.plan[job.run].impact for job in by_a} == {"A"}
+    assert sorted((*by_a, *by_b)) == sorted(view.jobs)
+    assert chosen(view, "A B") == chosen(view, "60") == ()
+    apart = laid_over(view, view.jobs, view.jobs[2])
+    assert [one.label for one in apart.series if one.label] == ["3 others", "model", "run 3"]
+    beside = run_picture(view, by_a, by_a[0])
+    measured = [view.results[job].quantities["separation_m"].value * 100 for job in by_a]
+    assert [*beside.series[1].y, *beside.series[0].y] == measured
+
+
+def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path):
+    mine = tmp_path / "mine.session"
+    mine.write_bytes(recorded.read_bytes())
+    with Session.open(mine) as session:
+        session.add_state(2, 1, RunState.ACCEPTED, 0, ["note: a [draught]"])
+        session.commit()
+    with Session.open(mine, readonly=True) as session:
+        assert notes(session) == {Job(2, 1): "a [draught]"}
+
+    async def work():
+        app = RigApp(Options(session=mine, offline=True), KEYS)
+        async with app.run_test(size=(120, 36)) as pilot:
+            op = Operator(app, pilot)
+            await op.sees("drop 1 of 4")
+            await op.press("down")
+            await op.sees("drop 2 of 4", "note: a [draught]")
+            await op.press("k")
+            await op.sees("3 others", "mean SD", "as if let go together")
+            await op.press("f", *"nothing", "enter")
+            await op.sees("No drop is nothing")
+            await op.press("f", *["backspace"] * 7, *"40 B", "enter")
+            await op.sees("drop 1 of 2 that are 40 B")
+            await op.press("g")
+            await op.sees("Drops of this session")
+            assert op.app.screen.query_one(OptionList).option_count == 2
+            await op.press("backspace")
+            await op.until(lambda: len(app.screen_stack) == 1)
+            await op.press("e")
+            await op.sees("CSV files: ")
+
+    run(work())
+    assert (tmp_path / "mine.csv" / "edges.csv").is_file()
 
 
 def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded):

@@ -22,13 +22,14 @@ class Ask(Dialog[str | None]):
 
     DEFAULT_CSS = "Ask Input { margin: 1 0 0 0; }"
 
-    def __init__(self, question: str) -> None:
+    def __init__(self, question: str, text: str = "") -> None:
         super().__init__()
         self._question = question
+        self._text = text
 
     def contents(self) -> ComposeResult:
         yield Words(id="question")
-        yield Input(max_length=200)
+        yield Input(self._text, max_length=200, select_on_focus=False)
         yield Words(id="how")
 
     def on_mount(self) -> None:

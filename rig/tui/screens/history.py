@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from statistics import mean, stdev
 from typing import TYPE_CHECKING
 
 from textual.containers import Horizontal, Vertical
 from textual.content import Content
 
 from rig.films import read_films
+from rig.measurands import listed
+from rig.report.numbers import fixed
+from rig.session.schema import noted
+from rig.tui.choosing import chosen
 from rig.tui.motion import motions
-from rig.tui.plots import drop_pictures
+from rig.tui.plots import drop_pictures, laid_over, run_picture
 from rig.tui.replay import Player, end_of, indicators_at, until
 from rig.tui.scale import drawing
 from rig.tui.screens.page import Page
@@ -21,6 +27,8 @@ from rig.tui.widgets.gates import GateBoard
 from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from textual.app import ComposeResult
 
     from rig.films import Film
@@ -50,6 +58,10 @@ class HistoryPage(Page):
         self.player = Player()
         self.other: SessionView | None = None
         """Of another session than the one in hand."""
+        self.words = ""
+        """Which drops are looked at, as `rig.tui.choosing` reads them."""
+        self.comparing = False
+        self._sifted: tuple[object, tuple[Job, ...]] = None, ()
         self._view: SessionView | None = None
         self._of: object = None
         self._told: object = None
@@ -77,8 +89,27 @@ class HistoryPage(Page):
     @property
     def job(self) -> Job | None:
         """The drop that is played."""
+        return self.jobs[self.player.at % len(self.jobs)] if self.jobs else None
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        """The drops that are looked at."""
         found = self.view
-        return found.jobs[self.player.at % len(found.jobs)] if found else None
+        if found is None:
+            return ()
+        key = found.path, found.reading, self.words
+        if self._sifted[0] != key:
+            self._sifted = key, chosen(found, self.words)
+        return self._sifted[1]
+
+    def sift(self, words: str) -> None:
+        """Look at some drops only."""
+        self.words = words
+        self.player = replace(self.player, at=0, time_s=0.0)
+
+    def compare(self) -> None:
+        """Lay all drops that are looked at over each other, or show one alone."""
+        self.comparing = not self.comparing
 
     def tick(self, seconds: float) -> None:
         """Let time pass while playing."""
@@ -103,8 +134,8 @@ class HistoryPage(Page):
 
     def move(self, by: int) -> None:
         """Take another drop."""
-        if self.view:
-            self.player = self.player.other(by, len(self.view.jobs))
+        if self.jobs:
+            self.player = self.player.other(by, len(self.jobs))
 
     def choose(self, at: int) -> None:
         """Take one drop of the list."""
@@ -122,29 +153,40 @@ class HistoryPage(Page):
         self._view = self.other or model.view
         view, job = self.view, self.job
         said = self.query_one("#which", Words)
+        if view is not None and job is None:
+            self._blank()
+            said.say(f"No drop is {plain(self.words, 40)}: f asks for others.")
+            return
         if view is None or job is None:
             self._blank()
             waiting = model.offline and self._view is None and not model.unreadable
             said.say(f"Reading the session: {model.read} drops so far …" if waiting
                      else "No drop is recorded yet. o lists other sessions.")  # fmt: skip
             return
-        said.say_content(_which(view, job, self.player))
+        said.say_content(_which(view, job, self))
         drop, hz = view.drops[job], view.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
         indicators = indicators_at(view.channels, drop, seen)
         self.query_one(GateBoard).show(view.protocol, indicators, 0.0)
         self._draw_chains(view, job, indicators)
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        key = (view.path, job, hz, len(seen))
+        key = (view.path, job, hz, len(seen), self.jobs if self.comparing else None)
         if z.wants(key):
-            first, second = drop_pictures(view, job, seen)
+            if self.comparing:
+                first, second = run_picture(view, self.jobs, job), laid_over(view, self.jobs, job)
+            else:
+                first, second = drop_pictures(view, job, seen)
             z.show(first, key)
             dz.show(second, key)
-        for figure in (z, dz):
-            figure.point_at(self.player.time_s * 1e3)
-        if self._told != (view.path, view.reading, job):
-            self._told = view.path, view.reading, job
-            self.query_one("#numbers", Words).say_content(number_table(view, job, wide=False))
+        now_ms = self.player.time_s * 1e3
+        z.point_at(None if self.comparing else now_ms)
+        dz.point_at(now_ms)
+        told = view.path, view.reading, job, key[-1]
+        if self._told != told:
+            self._told = told
+            table = comparison(view, self.jobs) if self.comparing else number_table(
+                view, job, wide=False)  # fmt: skip
+            self.query_one("#numbers", Words).say_content(table)
 
     def _draw_chains(self, view: SessionView, job: Job, indicators: Indicators) -> None:
         """Draw both chains at the moment of the tape, from all edges of the drop."""
@@ -166,20 +208,43 @@ class HistoryPage(Page):
             self.query_one(name, Figure).show(None)
 
 
-def _which(view: SessionView, job: Job, player: Player) -> Content:
+def comparison(view: SessionView, jobs: Sequence[Job]) -> Content:
+    """Write mean and standard deviation of what some drops measured."""
+    lines = [Content.styled(f"{'':15}{'n':>4}{'mean':>9}{'SD':>9}", "bold")]
+    for row in listed():
+        values = [
+            found.value * row.scale
+            for job in jobs
+            if (found := view.results[job].quantities.get(row.name)) is not None
+        ]
+        if values:
+            scatter = fixed(stdev(values), 3) if len(values) > 1 else "–"
+            line = (
+                f"{row.label:15}{len(values):4}{fixed(mean(values), 3):>9}{scatter:>9} {row.unit}"
+            )
+            lines.append(Content(line))
+    return Content("\n").join(lines)
+
+
+def _which(view: SessionView, job: Job, page: HistoryPage) -> Content:
+    player = page.player
     run, result = view.plan[job.run], view.results[job]
     symbol, colour = LOOKS.get(result.verdict, ("?", "$foreground"))
     hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
-    place = view.jobs.index(job) + 1
+    place = page.jobs.index(job) + 1
+    only = f" that are {plain(page.words, 40)}" if page.words else ""
+    entry = next(one for one in reversed(view.states) if (one.run, one.attempt) == job)
+    note = "".join(f"\nnote: {plain(text, 160)}" for text in noted(entry.reasons))
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ still {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} of"
     stamp = "  ▲ SIMULATED" if view.simulated else ""
     return Content.assemble(
-        (f"drop {place} of {len(view.jobs)}", "bold $primary"),
+        (f"drop {place} of {len(page.jobs)}{only}", "bold $primary"),
         f"  run {job.run}, attempt {job.attempt} · {hung} · ",
         (f"{symbol} {result.verdict}", colour),
         f"\n{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · ",
         (plain(view.path.name, 60), "$foreground 70%"),
         (stamp, "bold $warning"),
+        (note, "bold"),
     )

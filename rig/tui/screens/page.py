@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from textual.containers import Vertical
 
+from rig.tui.widgets.figure import Figure
+
 if TYPE_CHECKING:
     from rig.tui.model import Model
 
@@ -28,6 +30,11 @@ class Page(Vertical):
 
     def other_chart(self) -> None:
         """Show another quantity where there is a choice."""
+
+    def point(self, by: int) -> None:
+        """Move the cursor of every plot."""
+        for figure in self.query(Figure):
+            figure.step(by)
 
     def choose(self, at: int) -> None:
         """Take one line of whatever this page lists."""

@@ -50,14 +50,17 @@ class Figure(SpanView):
         self._share = min(1.0, max(0.0, share))
         self._draw()
 
-    def point_at(self, value: float) -> None:
-        """Put the cursor at a value of the horizontal axis."""
-        if self._picture is not None:
+    def point_at(self, value: float | None) -> None:
+        """Put the cursor at a value of the horizontal axis, or take it away."""
+        if self._picture is None:
+            return
+        share = None
+        if value is not None:
             low, high = spread(self._picture)
             share = min(1.0, max(0.0, (value - low) / (high - low)))
-            if share != self._share:
-                self._share = share
-                self._draw()
+        if share != self._share:
+            self._share = share
+            self._draw()
 
     def on_resize(self) -> None:
         """Draw for the new size."""

@@ -38,6 +38,7 @@ class StatusBar(Vertical):
     StatusBar #headline { height: 1; padding: 0 1; background: $panel; }
     StatusBar #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
                     background: $error 20%; color: $foreground; }
+    StatusBar #alarm.-told { background: $primary 20%; }
     """
 
     def compose(self) -> ComposeResult:
@@ -45,14 +46,19 @@ class StatusBar(Vertical):
         yield Words(id="tabs")
         yield Words(id="alarm")
 
-    def show(self, model: Model, page: str, keys: Mapping[str, str], size: Size) -> None:
-        """Draw what holds now."""
+    def show(
+        self, model: Model, page: str, keys: Mapping[str, str], size: Size, told: str = ""
+    ) -> None:
+        """Draw what holds now; what was `told` only while nothing is wrong."""
         self.query_one("#headline", Words).say_content(headline(model, page, size.width - 2))
         self.query_one("#tabs", Words).say_content(tabs(page, keys))
         wrong = alarm(model)
         box = self.query_one("#alarm", Words)
-        box.display = wrong is not None
-        if wrong is not None:
+        box.display = wrong is not None or bool(told)
+        box.set_class(wrong is None, "-told")
+        if wrong is None:
+            box.say(plain(told, 240))
+        else:
             hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
             box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
 

@@ -1,0 +1,40 @@
+"""Report and CSV files of a session, written by the commands of those names beside the screen."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rig.tui.context import CommandContext
+
+
+def report_of(session: Path) -> tuple[str, ...]:
+    """Say what writes a session's page: the command's words."""
+    return "report", str(session), "-o", str(session.with_suffix(".html"))
+
+
+def export_of(session: Path) -> tuple[str, ...]:
+    """Say what writes a session's CSV files: the command's words."""
+    return "export", str(session), "--csv", str(session.with_suffix(".csv"))
+
+
+async def write(app: CommandContext, *command: str) -> None:
+    """Run a command, and say where its files are or what went wrong.
+
+    A process of its own: what it computes takes nothing from STOP.
+    """
+    app.tell(f"rig {command[0]}: working …")
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "rig", *command,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )  # fmt: skip
+    said, _ = await process.communicate()
+    lines = [line for line in said.decode("utf-8", "replace").splitlines() if line.strip()]
+    told = lines[-1:] if process.returncode == 0 else lines[-2:]
+    app.tell("; ".join(told) or f"rig {command[0]} ended with {process.returncode}")
