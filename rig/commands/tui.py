@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,9 +56,19 @@ def _options(arguments: Namespace) -> Options:
         seed=arguments.seed,
         socket=Path(arguments.socket).absolute() if arguments.socket else None,
         offline=offline,
+        last=_last(),
         bell=arguments.bell,
         ascii=arguments.ascii or wanted(os.environ),
     )
+
+
+def _last() -> Path | None:
+    """Find the session that was written last in this folder."""
+    found = []
+    for path in Path().glob("*.session"):
+        with suppress(OSError):  # gone meanwhile
+            found.append((path.stat().st_mtime_ns, path))
+    return max(found)[1] if found else None
 
 
 def _fresh() -> Path:

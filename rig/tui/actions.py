@@ -50,7 +50,7 @@ class Action(NamedTuple):
 
 ACTIONS: tuple[Action, ...] = (
     Action("stop", "f9", "STOP", "Stop: everything off, nothing falls", "Ctrl-C in rig run"),
-    Action("go_on", "enter", "go on", "Go on: acknowledge, next run; on the run page, arm",
+    Action("go_on", "enter", "go on", "Go on: open, next run; on the run page, arm",
            "rig run PROTOCOL --port URL --session FILE",
            ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True),
     Action("reject", "x", "reject", "Reject this drop for a reason, or take that back", "",
@@ -88,7 +88,7 @@ ACTIONS: tuple[Action, ...] = (
     Action("drops", "g", "drops", "History: another drop"),
     Action("filter", "f", "filter", "History: only some drops, by incline, chain or verdict"),
     Action("compare", "k", "compare", "History: all these drops in one picture, or one alone"),
-    Action("report", "r", "report", "Write the session's report beside it",
+    Action("report", "m", "report", "Write the session's report beside it",
            "rig report SESSION -o FILE.html"),
     Action("export", "e", "export", "Write the session's CSV files beside it",
            "rig export SESSION --csv DIR"),
@@ -119,7 +119,7 @@ _NOT = {
     Stage.PREPARE: "before the drop",
     Stage.LIVE: "while chains fall",
     Stage.JUDGING: "while the drop is analysed",
-    Stage.RESULT: "before this drop is acknowledged",
+    Stage.RESULT: "before this drop is done with",
     Stage.HALTED: "while the plan stands still",
     Stage.DONE: "when the plan is done",
 }

@@ -158,7 +158,7 @@ class RigApp(App[None], inherit_bindings=False):
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
         self.driver = Driver(flow, self.client, self.follower, self.begin)
-        self.protocols = ProtocolPage(options.files, options.session)
+        self.protocols = ProtocolPage(options.files, options.session, options.last)
         self.pages: dict[str, Page] = {ProtocolPage.NAME: self.protocols}
         self._turning = asyncio.Lock()
         self._turned_to = ""

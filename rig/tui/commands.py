@@ -166,6 +166,12 @@ def _filter(app: CommandContext) -> None:
     app.ask(Ask(HOW, app.history.words), given)
 
 
+def _compare(app: CommandContext) -> None:
+    """Lay drops over each other, or show one alone."""
+    app.turn("history")
+    app.history.compare()
+
+
 def _write(app: CommandContext, command: Callable[[Path], tuple[str, ...]]) -> None:
     """Have files written of the session that is looked at."""
     view = app.history.view if app.page == "history" else app.model.view
@@ -269,7 +275,7 @@ _DO: dict[str, Callable[[CommandContext], object]] = {
     "earlier": lambda app: _step(app, -1),
     "later": lambda app: _step(app, 1),
     "filter": _filter,
-    "compare": lambda app: app.history.compare(),
+    "compare": _compare,
     "report": lambda app: _write(app, report_of),
     "export": lambda app: _write(app, export_of),
     "slower": lambda app: app.history.pace(0.5),

@@ -89,6 +89,14 @@ class Model:
     disk_s: float = 0.0
 
     @property
+    def loading(self) -> str:
+        """Say that the session is being read, where it is not there yet; empty where it is."""
+        waits = self.offline or bool(self.state.section("session"))
+        if self.view is not None or self.unreadable or not waits:
+            return ""
+        return f"loading the session: {self.read} drops so far …"
+
+    @property
     def stage(self) -> Stage:
         """Where the session is: by our own flow, or as seen by a watcher."""
         if self.driving or not self.connected:

@@ -108,9 +108,9 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
 
     `None` where nothing of it was measured. Of very many drops some are left out.
     """
-    thin = jobs[:: 1 + len(jobs) // _LAID]
+    others = [other for other in jobs[:: 1 + len(jobs) // _LAID] if other != job]
     curves: list[Series] = []
-    for one in (*(other for other in thin if other != job), job):
+    for one in (*others, job):
         apart = (
             drop_pictures(view, one)[1]
             if RELEASE_SKEW.name in view.results[one].quantities
@@ -122,7 +122,7 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
         if one == job:
             curves += [model, dots._replace(label=f"run {one.run}")]
         else:
-            some = f"{len(thin) - 1} others" if not curves else ""
+            some = f"{len(others)} others" if not curves else ""
             curves.append(dots._replace(color="foreground", marker="·", label=some))
     title = "Δz (cm) as if let go together"
     return Picture(title, _TIME, tuple(curves)) if curves else None
@@ -233,6 +233,19 @@ def control_pictures(view: SessionView) -> list[Picture]:
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
         found.append(_chart("g of the free chain (m/s²)", view, expected, points))
     return found
+
+
+def meaning(label: str) -> str:
+    """Say in a line what a control chart is read for."""
+    if label.startswith(RELEASE_SKEW.label):
+        return (
+            "skew: how much later the free chain left; beyond the limit a drop is void; "
+            "a drift says that a release wears"
+        )
+    return (
+        "g: gravity by each free chain; bars that keep off the protocol's mean wrong heights, "
+        "clock or side"
+    )
 
 
 def _point(measured: Measured | None, scale: float = 1.0) -> tuple[float, float] | None:

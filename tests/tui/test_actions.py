@@ -10,6 +10,7 @@ from rig.campaign.machine import Stage
 from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME, hindrance, shown_key
 from rig.tui.keys import combined, read_keys
+from rig.tui.screens.help import GROUPS
 from rig.tui.widgets.text import LONGEST, duration, plain
 
 
@@ -17,6 +18,11 @@ def test_every_key_has_one_meaning():
     keys = Counter(key for action in ACTIONS for key in action.keys.split(","))
     assert max(keys.values()) == 1
     assert len(BY_NAME) == len(ACTIONS)
+
+
+def test_help_has_every_action_under_one_heading():
+    named = [name for names in GROUPS.values() for name in names]
+    assert sorted(named) == sorted(BY_NAME)
 
 
 def test_stop_is_possible_always():

@@ -164,8 +164,8 @@ def test_the_session_page_says_how_many_taught_each_other(recorded):
         async with app.run_test(size=(120, 36)) as pilot:
             op = Operator(app, pilot)
             await op.press("5")
-            await op.sees("after learning from 4 runs", "release skew")
+            await op.sees("what 4 runs say together", "release skew")
             await op.press("y")
-            await op.sees("g of the free chain")
+            await op.sees("g of the free chain", "wrong heights")
 
     run(work())

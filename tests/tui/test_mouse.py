@@ -86,7 +86,9 @@ def test_a_protocol_and_stop_are_clicked(lab, fence):
 
     async def work():
         async with lab.operator(files=(broken, lab.protocol, other)) as op:
-            await op.sees("A short fence")  # what can be used, and not the first of the list
+            op.app.protocols.last = lab.folder / "older.session"
+            # What can be used, and not the first of the list.
+            await op.sees("A short fence", "What follows", "last session:", "o older")
             await op.until(lambda: op.app.client and op.app.client.driving)
 
             async def chosen():  # again, should the list have been laid out anew under the pointer

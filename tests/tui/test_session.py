@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from rig.campaign.machine import Stage
@@ -89,12 +91,20 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab, page):
 
 
 def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
+    rung = []
+
     async def work():
         async with lab.ready() as op:
+            op.app.options = replace(op.app.options, bell=True)
+            op.app.bell = lambda: rung.append(op.app.flow.stage)
             await op.arms(Stage.RESULT)
+            await op.until(lambda: op.app.flow.logged and rung)
+            await op.press("n", *"[/b] hn", "enter")
+            await op.sees("note: [/b] hn")
             await op.until(lambda: op.app.flow.logged)
-            await op.press("n", *"[/b] hm", "enter")
+            await op.press("n", "backspace", "m", "enter")  # what is there is changed
             await op.sees("note: [/b] hm")
+            assert rung == [Stage.RESULT]
             await op.until(lambda: op.app.flow.logged)
             await op.press("x", "escape")
             assert op.app.flow.verdict == "accepted"
@@ -134,8 +144,9 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
     with Session.open(lab.session, readonly=True) as session:
         told = [(entry.state, entry.reasons) for entry in session.states() if entry.attempt == 1]
     note = "note: [/b] hm"
-    assert told[-5:] == [
+    assert told[-6:] == [
         (RunState.ACCEPTED, ()),
+        (RunState.ACCEPTED, ("note: [/b] hn",)),
         (RunState.ACCEPTED, (note,)),
         (RunState.REJECTED, ("draught", note)),
         (RunState.ACCEPTED, (note,)),

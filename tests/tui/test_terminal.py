@@ -103,7 +103,7 @@ def test_an_abba_session_by_keys_alone(terminal, url):
             terminal.sees("not armed: Enter came too soon after another key")
             terminal.sees("RUN 2 of 4", "Enter arm")
         terminal.enters("Enter arm")
-        terminal.sees(f"run {number}, attempt 1", "release skew", "Enter acknowledge")
+        terminal.sees(f"run {number}, attempt 1", "release skew", "Enter next run")
         terminal.press("Enter")
     terminal.sees("4 of 4 runs", "✓✓✓✓")
     pid = _daemon_of(terminal.folder)

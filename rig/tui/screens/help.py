@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from textual.containers import VerticalScroll
 from textual.content import Content
 
-from rig.tui.actions import ACTIONS, shown_key
+from rig.tui.actions import BY_NAME, shown_key
 from rig.tui.screens.dialog import Dialog
 from rig.tui.widgets.text import Words
 
@@ -16,15 +16,29 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
+    from rig.tui.actions import Action
+
 PAGES = {
     "protocol": "Choose what is to be dropped. ✗ shows what is wrong, with its line in the file.",
     "device": "See that every gate answers: wave a hand through each beam, and it is named.",
     "run": "Hang the chains as told, see the checks turn ✓, arm, and keep clear.",
-    "result": "Read the verdict, then acknowledge it, reject the drop with a cause, or add a note.",
+    "result": "Read the verdict, then go on, reject the drop for a reason, or write a note.",
     "session": "Watch the means settle on the model's curve, and the skew stay within its limits.",
     "history": "Play any drop again, as slowly as you like.",
 }
 """What an operator does on each page."""
+
+
+GROUPS = {
+    "At the rig": ("stop", "go_on", "again", "release_test", "wave", "control", "close"),
+    "What a drop is worth": ("reject", "note", "unblind", "report", "export"),
+    "Pages": ("page_protocol", "page_device", "page_run", "page_result", "page_session",
+              "page_history", "previous", "next", "control_chart"),
+    "Drops again": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "filter",
+                    "compare", "sessions"),
+    "This program": ("help", "palette", "theme", "quit"),
+}  # fmt: skip
+"""Every action under a heading."""
 
 
 class Help(Dialog[None]):
@@ -58,15 +72,20 @@ def table(page: str, keys: Mapping[str, str], wide: bool) -> Content:
         Content("STOP works on every screen: its key, Esc where nothing is typed, or the red bar."),
         Content(""),
     ]
-    for action in ACTIONS:
-        command = f"  {action.command}" if wide and action.command else ""
-        lines.append(
-            Content.assemble(
-                (f"{shown_key(keys[action.name]):8}", "bold $primary"),
-                f"{action.text:56}" if command else action.text,
-                (command, "$foreground 70%"),
-            )
-        )
+    for head, names in GROUPS.items():
+        lines.append(Content.styled(head, "bold"))
+        lines += [_line(BY_NAME[name], keys, wide=wide) for name in names]
+        lines.append(Content(""))
     own = 'Other keys: ~/.config/chainrig/keys.toml, such as reject = "r"'
-    lines += [Content(""), Content(own), Content("↑ and ↓ scroll, any other key closes this.")]
+    lines += [Content(own), Content("↑ and ↓ scroll, any other key closes this.")]
     return Content("\n").join(lines)
+
+
+def _line(action: Action, keys: Mapping[str, str], *, wide: bool) -> Content:
+    """Write one action: key, what it does, and the command that does it too."""
+    command = f"  {action.command}" if wide and action.command else ""
+    return Content.assemble(
+        (f"{shown_key(keys[action.name]):8}", "bold $primary"),
+        f"{action.text:62}" if command else action.text,
+        (command, "$foreground 70%"),
+    )

@@ -159,9 +159,7 @@ class HistoryPage(Page):
             return
         if view is None or job is None:
             self._blank()
-            waiting = model.offline and self._view is None and not model.unreadable
-            said.say(f"Reading the session: {model.read} drops so far …" if waiting
-                     else "No drop is recorded yet. o lists other sessions.")  # fmt: skip
+            said.say(model.loading or "No drop is recorded yet. o lists other sessions.")
             return
         said.say_content(_which(view, job, self))
         drop, hz = view.drops[job], view.scales[job].hz
@@ -170,7 +168,7 @@ class HistoryPage(Page):
         self.query_one(GateBoard).show(view.protocol, indicators, 0.0)
         self._draw_chains(view, job, indicators)
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        key = (view.path, job, hz, len(seen), self.jobs if self.comparing else None)
+        key = (view.path, job, hz, self.jobs if self.comparing else len(seen))
         if z.wants(key):
             if self.comparing:
                 first, second = run_picture(view, self.jobs, job), laid_over(view, self.jobs, job)
@@ -181,7 +179,7 @@ class HistoryPage(Page):
         now_ms = self.player.time_s * 1e3
         z.point_at(None if self.comparing else now_ms)
         dz.point_at(now_ms)
-        told = view.path, view.reading, job, key[-1]
+        told = view.path, view.reading, job, self.comparing and self.jobs
         if self._told != told:
             self._told = told
             table = comparison(view, self.jobs) if self.comparing else number_table(
@@ -233,8 +231,8 @@ def _which(view: SessionView, job: Job, page: HistoryPage) -> Content:
     hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
     place = page.jobs.index(job) + 1
     only = f" that are {plain(page.words, 40)}" if page.words else ""
-    entry = next(one for one in reversed(view.states) if (one.run, one.attempt) == job)
-    note = "".join(f"\nnote: {plain(text, 160)}" for text in noted(entry.reasons))
+    said = (one.reasons for one in reversed(view.states) if (one.run, one.attempt) == job)
+    note = "".join(f"\nnote: {plain(text, 160)}" for text in noted(next(said, ())))
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ still {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} of"

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
 
 
+_FIRST = "What follows"
+"""The section that is read first here: a screen has no room for all of them."""
+
+
 class ProtocolPage(Page):
     """Files left, the chosen one's scene and plan right."""
 
@@ -37,10 +41,13 @@ class ProtocolPage(Page):
     ProtocolPage #scene { width: 1fr; }
     """
 
-    def __init__(self, files: tuple[Path, ...], session: Path | None) -> None:
+    def __init__(
+        self, files: tuple[Path, ...], session: Path | None, last: Path | None = None
+    ) -> None:
         super().__init__()
         self.files = files
         self.session = session
+        self.last = last
         self.chosen = -1  # none yet
         self._read: tuple[Path, int] | None = None
         self._protocol: Protocol | None = None
@@ -91,11 +98,19 @@ class ProtocolPage(Page):
             style = "bold $primary" if at == self.chosen else "$foreground"
             rows.append(Content.assemble((mark + plain(file.stem, 25), style)).stylize(press))
         if not rows:
-            rows = [Content("no protocol here: name one,\nrig tui PROTOCOL")]
+            rows = [Content("no protocol in this folder:\nname one, rig tui PROTOCOL")]
+        if self.last is not None:
+            press = Style.from_meta({"@click": "app.do('sessions')"})
+            last = Content.assemble("\nlast session:\n", ("o ", "bold $primary"),
+                                    plain(self.last.stem, 24))  # fmt: skip
+            rows.append(last.stylize(press))
         self.query_one("#files", Words).say_content(Content("\n").join(rows))
         if self._protocol is None or self._problem:
+            what = "choose a protocol" if not self.files else f"{plain(self.files[self.chosen])}"
             self.query_one("#scene", Words).say(
-                ("✗ this cannot be used\n\n", "bold $error"), self._problem
+                (f"{what}\n\n", "bold"),
+                ("✗ this cannot be used yet\n", "bold $error"),
+                self._problem,
             )
             return
         session = plain(self.session) if self.session else ""
@@ -146,9 +161,10 @@ class ProtocolPage(Page):
 def _described(protocol: Protocol) -> Content:
     lines = [plain(line, 200) for line in describe(protocol, notes(protocol)).splitlines()]
     title, *rest = lines
-    parts = [Content.styled(title, "bold")]
-    parts += [
-        Content(line) if line.startswith(" ") else Content.styled(line, "bold $primary")
-        for line in rest
-    ]
+    begins = [at for at, line in enumerate(rest) if line and not line.startswith(" ")]
+    sections = [rest[at:end] for at, end in zip(begins, [*begins[1:], len(rest)], strict=True)]
+    sections.sort(key=lambda section: section[0] != _FIRST)
+    parts = [Content.styled(title, "bold"), Content("")]
+    for head, *facts in sections:
+        parts += [Content.styled(head, "bold $primary"), *map(Content, facts)]
     return Content("\n").join(parts)

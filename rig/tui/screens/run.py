@@ -124,6 +124,8 @@ class RunPage(Page):
 def _card(model: Model, expected: str, *, low: bool) -> Content:
     """Say what to hang where; on a low screen in few lines."""
     run, job, protocol = model.run, model.job, model.protocol
+    if model.loading:
+        return Content(model.loading)
     if job is None or run is None or protocol is None:
         if model.state.runs and model.flow.stage is not Stage.PROTOCOL:
             return Content("Every run of the plan is done with.")

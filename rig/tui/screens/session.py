@@ -15,7 +15,7 @@ from rig.measurands import averaged
 from rig.protocol.protocol import Condition
 from rig.report.columns import main_error
 from rig.report.numbers import fixed, plus_minus
-from rig.tui.plots import control_pictures, incline_pictures
+from rig.tui.plots import control_pictures, incline_pictures, meaning
 from rig.tui.screens.page import Page
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.figure import Figure
@@ -44,6 +44,7 @@ class SessionPage(Page):
     SessionPage #plan { height: auto; max-height: 8; padding: 0 1; }
     .-wide SessionPage #plan { max-height: 24; }
     SessionPage #figures { height: 1fr; grid-size: 2 2; grid-rows: 3fr 2fr; }
+    SessionPage #meaning { height: auto; padding: 0 1; color: $foreground 80%; }
     SessionPage #control { column-span: 2; }
     .-low SessionPage #figures { grid-size: 2 1; grid-rows: 1fr; }
     .-low SessionPage #control, .-wide SessionPage #control { column-span: 1; }
@@ -64,6 +65,7 @@ class SessionPage(Page):
             yield Figure(id="speed")
             yield Figure(id="control")
             yield Figure(id="second")
+        yield Words(id="meaning")
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
@@ -89,6 +91,8 @@ class SessionPage(Page):
         }
         if wide:
             shown["control"] = charts[:1]
+        charted = [picture.y_label for picture in (*shown["control"], *shown["second"])]
+        self.query_one("#meaning", Words).say("\n".join(map(meaning, charted)))
         for figure, name in zip(figures, _FIGURES, strict=True):
             figure.show(next(iter(shown[name]), None), key)
 
@@ -102,6 +106,8 @@ class SessionPage(Page):
 
 
 def _progress(model: Model) -> Content:
+    if model.loading:
+        return Content(model.loading)
     runs = model.state.runs
     voids = model.voids.counts(runs)
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
@@ -151,10 +157,10 @@ def _taught(model: Model) -> tuple[str, str]:
     view = model.view
     if view is None or not view.analysis.summary:
         return "", ""
-    more = " · learning from the newest …" if view.lagging else ""
+    more = " · the newest is being added …" if view.lagging else ""
     if view.fitted:
-        return f"\nafter learning from {view.fitted} runs{more}", "$foreground 70%"
-    few = f"; they teach each other from {FEWEST} good ones on" if not more else ""
+        return f"\nwhat {view.fitted} runs say together{more}", "$foreground 70%"
+    few = f"; from {FEWEST} good ones on they are read together" if not more else ""
     return f"\neach drop by itself{few}{more}", "$foreground 70%"
 
 

@@ -42,11 +42,11 @@ class Banner(Words):
 def verdict_words(model: Model) -> Content:
     """Write the verdict and its reasons."""
     if model.job is None:
-        return Content("no drop yet")
+        return Content(model.loading or "no drop yet")
     run = f"run {model.job.run}, attempt {model.job.attempt}"
     verdict, reasons = model.verdict
     if not verdict:
-        return Content(f"{run}: not judged yet")
+        return Content(model.loading or f"{run}: not judged yet")
     symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
     lines = [
         Content.assemble((f" {symbol} {verdict.upper()} ", f"bold $background on {colour}"),

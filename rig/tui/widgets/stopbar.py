@@ -25,16 +25,16 @@ _GO_ON = {
     Stage.PROTOCOL: "open session",
     Stage.DEVICE: "to the first run",
     Stage.PREPARE: "arm",
-    Stage.RESULT: "acknowledge",
+    Stage.RESULT: "next run",
     Stage.HALTED: "try again",
     Stage.DONE: "what is left",
 }
-_PAGES = tuple(action.name for action in ACTIONS if action.name.startswith("page_"))
 _OF_PAGE = {
-    "history": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "sessions"),
+    "history": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "filter",
+                "compare", "sessions"),
     "device": ("go_on", "wave", "release_test"),
-    "session": ("go_on", "control_chart", "again"),
-}
+    "session": ("go_on", "control_chart", "again", "report"),
+}  # fmt: skip
 """What is wanted most on some pages."""
 
 
@@ -78,7 +78,7 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
     """Write as many keys as fit, the most wanted first."""
     first = _OF_PAGE.get(page, ())
     flow = () if page == "history" else _FIRST
-    names = dict.fromkeys((*first, *flow, *_ALWAYS, *_PAGES))
+    names = dict.fromkeys((*first, *(("help",) if first else ()), *flow, *_ALWAYS))
     parts: list[Content] = []
     used = 0
     by_name = {action.name: action for action in ACTIONS}
