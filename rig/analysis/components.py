@@ -42,6 +42,8 @@ class Components:
         goes with what its own string does; where M are left it counts by 1/M.
     gates, rods
         Beam heights and rod places: relative to the protocol's own uncertainties.
+    swing
+        Of the square of the speed with which chains swing: relative to the protocol's own.
     """
 
     floor: float = _DEFAULT.edge_floor
@@ -54,6 +56,7 @@ class Components:
     bounce: float = _DEFAULT.last_impulse
     gates: float = 1.0
     rods: float = 1.0
+    swing: float = 1.0
 
     def impulses(self, alpha: float, above: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scatter of each impulse's α, for an α.

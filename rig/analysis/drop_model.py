@@ -11,6 +11,7 @@ import numpy as np
 
 from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
+from rig.analysis.swing import drawn, swing_sd
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -105,7 +106,7 @@ class DropModel:
         self.clock_u = clock_u
         self.components = components or stated(protocol)
         self.expected: dict[str, Expected] = {
-            role: Expected.of(record) for role, record in self.records.items()
+            role: Expected.of(record, protocol) for role, record in self.records.items()
         }
         slopes: dict[str, float] = {
             record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
@@ -150,6 +151,9 @@ class DropModel:
             unknowns.add(f"{role} hang", "hanging height", components.hang)
             unknowns.add(f"{role} rods", "rod places", places)
             unknowns.add(f"{role} width", "rod width", chain.width_u)
+            if not free_only and chain.chain.rods > 1:
+                sd = components.swing * swing_sd(chain.chain, protocol)
+                unknowns.add(f"{role} swing", "swing", sd)
         if "impact" in self.records:
             rods = self.records["impact"].chain.chain.rods
             alpha = abs(self.guesses["impact"].alpha)
@@ -294,6 +298,8 @@ class DropModel:
         places[:-1] -= x[at["contact"]]
         places[-1] += x[at["top"]][0]
         places -= self.protocol.contact.level.value
+        if "impact swing" in at:
+            places -= x[at["impact swing"]] * self._drawn()
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
         gains += x[at["strings"]] * _alone(places.size)
         return struck_trajectory(
@@ -332,7 +338,14 @@ class DropModel:
             found[..., at["impact rods"]] = by_place
             found[..., at["contact"]] = -by_place[..., :-1].sum(axis=-1, keepdims=True)
             found[..., at["top"]] = by_place[..., -1:]
+            if "impact swing" in at:
+                found[..., at["impact swing"]] = -(by_place @ self._drawn())[..., None]
         return found
+
+    def _drawn(self) -> Array:
+        """`drawn` of each rod of the chain that strikes, as it strikes."""
+        chain = self.records["impact"].chain.chain
+        return drawn(chain, self.protocol, -np.array(chain.heights))
 
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""
@@ -346,6 +359,8 @@ class DropModel:
         found -= x[at[f"{role} rods"]][edges.rods]
         if "ripple" in at:
             found -= self._tilts[role] * edges.turn * x[at["ripple"]][edges.gate]
+        if f"{role} swing" in at:
+            found += x[at[f"{role} swing"]] * edges.drawn
         if role == "impact":
             found -= edges.alone * x[at["top"]][0]
         return found
@@ -424,6 +439,8 @@ class DropModel:
         if "ripple" in at:
             ripple = self._tilts[role] * seen.turn
             slopes[row, local.at[at["ripple"].start + seen.gate]] += ripple
+        if f"{role} swing" in at:
+            slopes[:, local.at[at[f"{role} swing"].start]] -= seen.drawn
         if role == "impact":
             slopes[:, local.at[at["top"].start]] += seen.alone
         told = self._part(seen, struck, values, sigma)

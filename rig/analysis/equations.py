@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.swing import drawn
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.drop_model import DropModel
+    from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -99,6 +102,7 @@ class Seen(NamedTuple):
     levels: Array
     sign: Array
     turn: Array
+    drawn: Array
     alone: Flags
     paired: Flags
 
@@ -116,6 +120,8 @@ class Expected(NamedTuple):
         By how much its height follows the rods' width: −½ where it darkens the beam, else ½.
     turn
         Which way its rod is tilted: +1 for even rods, −1 for odd ones.
+    drawn
+        See `rig.analysis.swing.drawn`, of its rod.
     alone
         Whether all rods below have struck: only the top rod falls.
     begins, ends
@@ -129,12 +135,13 @@ class Expected(NamedTuple):
     levels: Array
     sign: Array
     turn: Array
+    drawn: Array
     alone: Flags
     begins: Index
     ends: Index
 
     @classmethod
-    def of(cls, record: ChainRecord) -> Expected:
+    def of(cls, record: ChainRecord, protocol: Protocol) -> Expected:
         """Join the gates of a side."""
         trains, places = record.trains, record.chain.chain.heights
         observed = np.array([train.times.size for train in trains])
@@ -153,6 +160,7 @@ class Expected(NamedTuple):
             levels,
             np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
             np.where(rods % 2, -1.0, 1.0),
+            drawn(record.chain.chain, protocol, levels[:, None])[np.arange(rods.size), rods],
             alone,
             np.cumsum(observed) - observed,
             np.cumsum(expected)[:-1],
@@ -176,6 +184,7 @@ class Expected(NamedTuple):
             self.levels[pick],
             self.sign[pick],
             self.turn[pick],
+            self.drawn[pick],
             self.alone[pick],
             self._pairs(pick),
         )

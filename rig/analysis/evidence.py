@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 STATED_WEIGHT = 1.0
 """Members that a stated uncertainty counts for."""
+_MEMBERS = ("gates", "rods", "beam", "hang", "swing")
+_BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
 
@@ -58,8 +60,8 @@ class Evidence:
         self.components = components
         self.stated = stated
         self.degrees: dict[str, float] = {}
-        self._squares = dict.fromkeys(("gates", "rods", "beam", "hang"), 0.0)
-        self._determined = dict.fromkeys(("gates", "rods", "beam", "hang"), 0.0)
+        self._squares = dict.fromkeys(_MEMBERS, 0.0)
+        self._determined = dict.fromkeys(_MEMBERS, 0.0)
         self._impulses: list[Array] = []
         self._edges: list[tuple[Array, Array, Flags]] = []
 
@@ -83,6 +85,8 @@ class Evidence:
         at = model.unknowns
         for role in model.records:
             self._count("hang", y[at[f"{role} hang"]], v[at[f"{role} hang"]])
+        if "free swing" in at:  # once rods have struck, what a chain does else looks like it
+            self._count("swing", y[at["free swing"]], v[at["free swing"]])
         if "impulses" in at:
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
             # Back to α², for drops of different α have different units.
@@ -115,8 +119,10 @@ class Evidence:
         new: dict[str, float] = {}
         for kind, found in self._squares.items():
             stated = (getattr(self.stated, kind) / getattr(old, kind)) ** 2
-            self.degrees[kind] = STATED_WEIGHT + self._determined[kind]
-            share = (STATED_WEIGHT * stated + found) / self.degrees[kind]
+            weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
+            told = weight + self._determined[kind]
+            self.degrees[kind] = max(STATED_WEIGHT, told)
+            share = (weight * stated + found) / told
             least = LEAST_SHARE * getattr(self.stated, kind)
             new[kind] = max(getattr(old, kind) * share**0.5, least)
         if self._impulses:

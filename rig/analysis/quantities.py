@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.analysis.adjust import uncertainty
 from rig.analysis.result import Measured
+from rig.analysis.swing import lever
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -29,6 +30,7 @@ SCALES = frozenset(
         "hanging height",
         "side",
         "beam offsets",
+        "swing",
         "single impulses",
         "top rod",
         "strings",
@@ -208,8 +210,19 @@ def _apart(model: DropModel, x: Array, when: float, d_when: Array) -> Value:
     top = model.records["free"].chain.chain.length + float(x[at["free rods"]][-1])
     height, speed = free.heights(np.array([when]))
     gradient = model.spread("free", free.derivatives(np.array([when])))[0]
+    gradient -= float(speed[0]) * d_when
+    turned = 0.0
+    if "free swing" in at:
+        # A chain that turned is lower at its top, the more the further it fell.
+        chain, protocol = model.records["free"].chain.chain, model.protocol
+        rate = float(x[at["free swing"]][0])
+        slope = float(lever(chain)[-1]) / protocol.gravity.value
+        fallen = protocol.drop.value - float(height[0])
+        turned = rate * slope * fallen
+        gradient *= 1.0 + rate * slope
+        gradient[at["free swing"]] = -slope * fallen
     gradient[at["free rods"].stop - 1] += 1.0  # the top rod is measured, not the reference point
-    return float(height[0]) + top, gradient - float(speed[0]) * d_when
+    return float(height[0]) + top - turned, gradient
 
 
 COMPUTED: dict[str, Callable[[DropModel, Array], Value | None]] = {

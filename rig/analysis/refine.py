@@ -27,6 +27,7 @@ _DEGREES = {
     "beam offsets": "beam",
     "rod places": "rods",
     "hanging height": "hang",
+    "swing": "swing",
     "single impulses": "impulse",
     "top rod": "departure",
 }

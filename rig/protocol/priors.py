@@ -63,6 +63,11 @@ PRIORS: dict[str, Prior] = {
         "how far off a rod's middle a beam runs; times tan(tilt) it shifts edges rod by rod",
         "a beam of 3 mm aimed by eye: ±1.7 mm evenly likely (GUM 4.3.7)",
     ),
+    "swing": Prior(
+        Range(Dimension.SPEED, 0.0, 1.0, "m/s", open_low=False),
+        "how fast the bottom rod swings as a chain is let go",
+        "a chain of a metre that swings 3 cm to and fro, which one sees",
+    ),
     "departure": Prior(
         _length(),
         "how far off its chain a rod may be once rods have struck",

@@ -193,6 +193,7 @@ class Priors:
     hang: float = 0.3e-3
     side: float = 0.5e-3
     beam_offset: float = 1.0e-3
+    swing: float = 0.1
     departure: float = 0.25e-3
     impulses: float = 0.2
     impulse_floor: float = 0.003

@@ -117,7 +117,8 @@ def test_a_stamp_s_own_error_tells_nothing_of_the_clock(scene):
         scaled[at[f"{role} rods"]] = 2.0 * np.array(record.chain.chain.heights)
         scaled[at[f"{role} rods"]] += 2.0 * x[at[f"{role} rods"]]
         scaled[at[f"{role} width"]] = 2.0 * (record.chain.widths[0] + x[at[f"{role} width"]])
-        for name, power in (("ripple", 2.0), ("drag", -2.0), ("contact", 2.0), ("top", 2.0)):
+        powers = {"ripple": 2.0, "drag": -2.0, "contact": 2.0, "top": 2.0, f"{role} swing": 2.0}
+        for name, power in powers.items():
             if name in at:
                 scaled[at[name]] = power * x[at[name]]
         found = model.equations(role, x, matches[role])

@@ -1,0 +1,54 @@
+"""How a chain that swings as it is let go falls: it turns, and its ends come nearer its middle.
+
+Nothing turns a chain that falls, so that it goes on at the rate ω that it was let go with: by ωt
+after a time t, and a rod at s above the centre of mass is lower than on a straight chain by ½sω²t².
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rig.model.chain import Chain
+    from rig.protocol.protocol import Protocol
+
+    Array = NDArray[np.float64]
+
+
+def lever(chain: Chain) -> Array:
+    """How far each rod is above the centre of mass, m; shape ``(rods,)``."""
+    heights = np.array(chain.heights)
+    found: Array = heights - np.average(heights, weights=chain.masses)
+    return found
+
+
+def drawn(chain: Chain, protocol: Protocol, levels: Array) -> Array:
+    """How much lower each rod is than on a straight chain, for a chain that turns at 1 rad/s.
+
+    By ½t² = (start − level)/g; where the chain was struck before it takes a little less.
+
+    Parameters
+    ----------
+    levels
+        Of the reference point, m; shape ``(…, 1)`` or ``(…, rods)``.
+
+    Returns
+    -------
+    ndarray
+        m, shape ``(…, rods)``.
+    """
+    return lever(chain) * np.maximum(protocol.drop.value - levels, 0.0) / protocol.gravity.value
+
+
+def swing_sd(chain: Chain, protocol: Protocol) -> float:
+    """Standard deviation of ω² for what is known of the bottom rod's speed beforehand, 1/s².
+
+    Of a normally distributed speed the square has √3 times the square of its standard deviation,
+    about zero.
+    """
+    return math.sqrt(3.0) * (protocol.priors.swing / chain.length) ** 2
