@@ -173,12 +173,14 @@ def _compare(app: CommandContext) -> None:
 
 
 def _write(app: CommandContext, command: Callable[[Path], tuple[str, ...]]) -> None:
-    """Have files written of the session that is looked at."""
+    """Ask, then have files written of the session that is looked at."""
     view = app.history.view if app.page == "history" else app.model.view
     if view is None:
         app.tell("no session is open: o lists them")
-    else:
-        app.begin(write(app, *command(view.path)))
+        return
+    words = command(view.path)
+    _confirm(app, "WRITE FILES", f"{words[-1]}: what is there is replaced.", "write them",
+             lambda: app.begin(write(app, *words)))  # fmt: skip
 
 
 def _step(app: CommandContext, by: int) -> None:

@@ -34,7 +34,12 @@ async def write(app: CommandContext, *command: str) -> None:
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,
     )  # fmt: skip
-    said, _ = await process.communicate()
+    try:
+        said, _ = await process.communicate()
+    except asyncio.CancelledError:  # the screen is left
+        process.kill()
+        await process.wait()
+        raise
     lines = [line for line in said.decode("utf-8", "replace").splitlines() if line.strip()]
     told = lines[-1:] if process.returncode == 0 else lines[-2:]
     app.tell("; ".join(told) or f"rig {command[0]} ended with {process.returncode}")

@@ -104,7 +104,7 @@ def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path
         assert notes(session) == {Job(2, 1): "a [draught]"}
 
     async def work():
-        app = RigApp(Options(session=mine, offline=True), KEYS)
+        app = RigApp(Options(session=mine, offline=True, still_s=0.0), KEYS)
         async with app.run_test(size=(120, 36)) as pilot:
             op = Operator(app, pilot)
             await op.sees("drop 1 of 4")
@@ -122,6 +122,8 @@ def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path
             await op.press("backspace")
             await op.until(lambda: len(app.screen_stack) == 1)
             await op.press("e")
+            await op.sees("WRITE FILES", "mine.csv")
+            await op.means()
             await op.sees("CSV files: ")
 
     run(work())
