@@ -96,7 +96,8 @@ def judge(
         faults = diagnose(fit)
         if faults.pile:  # all else that is odd follows from it
             return Judgement("void", (*void, *faults.void), known=True)
-        accused, suspects = faults.void, faults.suspects
+        # A motion in the wrong air tells nothing of the gates.
+        accused, suspects = _other_air(fit) or faults.void, faults.suspects
         void += _limits(protocol, audit, found)
         void += accused
         void += _blown(fit)
@@ -108,7 +109,7 @@ def judge(
             void += faults.doubts  # which may be why
         doubts += faults.doubts
         doubts += _doubts(protocol, drop, audit, found, fit.estimate)
-        pushed = _pushed(fit) or _other_air(fit)
+        pushed = _pushed(fit)
         remarks = other_incline(fit, run)
         accused += (*pushed, *remarks)
         doubts += pushed

@@ -10,6 +10,7 @@ import numpy as np
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.fit import Fit
 from rig.analysis.free_flight import squared_after
+from rig.analysis.swing import drawn
 from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
@@ -129,7 +130,7 @@ def _squares(model: DropModel, x: Array, heights: Array) -> Array:
     """V² of the impact chain when its top rod is at a height."""
     path = model.trajectory("impact", x)
     level = heights - _places(model, x, "impact")[-1]
-    level -= _alone(model, x, level)
+    level -= _alone(model, x, level) - _turned(model, x, "impact", level)
     leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
     return squared_after(path.height[leg] - level, path.speed[leg], path.gravity, path.kappas(leg))
 
@@ -140,7 +141,19 @@ def _separations(model: DropModel, x: Array, times: Array) -> Array:
     level = struck.heights(struck.time[0] + times)[0]
     apart = _places(model, x, "free")[-1] - _places(model, x, "impact")[-1]
     apart = apart - _alone(model, x, level)
-    found: Array = free.heights(free.time[0] + times)[0] - level + apart
+    beside = free.heights(free.time[0] + times)[0]
+    apart = apart + _turned(model, x, "impact", level) - _turned(model, x, "free", beside)
+    found: Array = beside - level + apart
+    return found
+
+
+def _turned(model: DropModel, x: Array, role: str, level: Array) -> Array:
+    """How much lower the top rod of a chain that turns is than on a straight one."""
+    swing = f"{role} swing"
+    if swing not in model.unknowns:
+        return np.zeros_like(level)
+    chain = model.records[role].chain.chain
+    found: Array = x[model.unknowns[swing]] * drawn(chain, model.protocol, level[:, None])[:, -1]
     return found
 
 

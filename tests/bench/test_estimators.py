@@ -33,7 +33,7 @@ def test_draws_have_the_mean_of_the_adjustment():
     Where impulses are known to be nearly alike: else a single drop says so little of the last ones
     that they move Δz by more than in proportion.
     """
-    like = Priors(departure=0.1e-3, impulses=0.05, last_impulse=0.01, strings=0.0)
+    like = Priors(departure=0.1e-3, impulses=0.05, last_impulse=0.01, strings=0.0, swing=0.01)
     one = case(replace(UNIFORM, priors=like), Dials(skew_sd=1e-3), incline=40.0)
     fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
     known = quantities(fit.model, fit.estimate)

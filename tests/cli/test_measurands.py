@@ -78,7 +78,8 @@ def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
     page = (tmp_path / "r.html").read_text("utf-8")
     assert page.count("Vf ± U (m/s)") == 2  # the summary's table, and that of the runs
     assert "could not be made" not in page
-    screens = {path.stem: path for path in draw(session, tmp_path / "screens", KEYS)}
+    pictures = draw(session, tmp_path / "screens", KEYS, sizes=[(120, 36)], themes=["dark"])
+    screens = {path.stem.partition("-")[0]: path for path in pictures}
     for screen, text in (("result", SPIN.label), ("session", SPIN.symbol)):
         drawn = screens[screen].read_text("utf-8").replace("&#160;", " ")
         assert text in drawn, screen
