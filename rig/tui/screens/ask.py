@@ -28,16 +28,17 @@ class Ask(Dialog[str | None]):
         self._text = text
 
     def contents(self) -> ComposeResult:
-        yield Words(id="question")
-        yield Input(self._text, max_length=200, select_on_focus=False)
-        yield Words(id="how")
-
-    def on_mount(self) -> None:
-        self.query_one("#question", Words).say((self._question, "bold"))
-        self.query_one("#how", Words).say_content(
+        asked, keys = Words(id="question"), Words(id="how")
+        asked.say((self._question, "bold"))
+        keys.say_content(
             how(("Enter", "say so", "screen.say"), ("Esc", "leave it", "screen.leave"))
         )
-        self.query_one(Input).focus()
+        yield asked
+        yield Input(self._text, max_length=200, select_on_focus=False)
+        yield keys
+
+    def on_mount(self) -> None:
+        self.query(Input).focus()
 
     @on(Input.Submitted)
     def action_say(self) -> None:
@@ -59,22 +60,23 @@ class AskReason(Dialog[str | None]):
         self._reasons = reasons
 
     def contents(self) -> ComposeResult:
-        yield Words(id="question")
+        self._keys = Words(id="how")
+        asked, options = Words(id="question"), OptionList(*self._reasons, markup=False)
+        asked.say((self._question, "bold"))
+        options.can_focus = False
+        self._tell("Enter", "reject for this reason")
+        yield asked
         yield Input(max_length=200, placeholder="type a reason, or choose one below with ↑ ↓")
-        yield OptionList(*self._reasons, markup=False)
-        yield Words(id="how")
+        yield options
+        yield self._keys
 
     def on_mount(self) -> None:
-        options = self.query_one(OptionList)
-        options.can_focus, options.highlighted = False, None
-        self.query_one("#question", Words).say((self._question, "bold"))
-        self._tell("Enter", "reject for this reason")
-        self.query_one(Input).focus()
+        for options in self.query(OptionList):
+            options.highlighted = None
+        self.query(Input).focus()
 
     def _tell(self, key: str, text: str) -> None:
-        self.query_one("#how", Words).say_content(
-            how((key, text, "screen.say"), ("Esc", "leave it", "screen.leave"))
-        )
+        self._keys.say_content(how((key, text, "screen.say"), ("Esc", "leave it", "screen.leave")))
 
     def move(self, by: int) -> None:
         """Go to the previous or next of the list."""
@@ -111,15 +113,15 @@ class Confirm(Dialog[bool | None]):
         self._yes = yes
 
     def contents(self) -> ComposeResult:
-        yield Words(id="question")
-        yield Words(id="how")
-
-    def on_mount(self) -> None:
+        # Told before they are mounted: a screen that ends meanwhile mounts nothing any more.
         title, question = self._said
-        self.query_one("#question", Words).say((f"{title}\n", "bold $warning"), question)
-        self.query_one("#how", Words).say_content(
+        asked, keys = Words(id="question"), Words(id="how")
+        asked.say((f"{title}\n", "bold $warning"), question)
+        keys.say_content(
             how(("Enter", self._yes, ""), ("any other key", "leave it", "screen.leave"))
         )
+        yield asked
+        yield keys
 
 
 class Pick(Dialog[int | None]):
@@ -138,18 +140,19 @@ class Pick(Dialog[int | None]):
         self._chosen = chosen
 
     def contents(self) -> ComposeResult:
-        yield Words(id="question")
-        yield OptionList(*self._lines, markup=False)
-        yield Words(id="how")
-
-    def on_mount(self) -> None:
-        self.query_one("#question", Words).say((self._question, "bold"))
-        self.query_one("#how", Words).say_content(
+        asked, keys = Words(id="question"), Words(id="how")
+        asked.say((self._question, "bold"))
+        keys.say_content(
             how(("Enter", "take it", "screen.take"), ("Backspace", "leave", "screen.leave"))
         )
-        chooser = self.query_one(OptionList)
-        chooser.highlighted = self._chosen
-        chooser.focus()
+        yield asked
+        yield OptionList(*self._lines, markup=False)
+        yield keys
+
+    def on_mount(self) -> None:
+        for chooser in self.query(OptionList):
+            chooser.highlighted = self._chosen
+            chooser.focus()
 
     @on(OptionList.OptionSelected)
     def action_take(self) -> None:
