@@ -15,7 +15,7 @@ from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
 from tests.daemon.at_work import working
-from tests.waiting import PATIENCE_S
+from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4
 ALONE = f"no client for {IDLE_S:g} s"
@@ -132,6 +132,7 @@ def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
 
 def test_it_stays_until_the_disk_has_taken_everything(processes, driver):
     processes.disk.fill(processes.daemon)
+    until(lambda: driver.call("subscribe")["state"]["phase"] == "trouble")  # until then all is kept
     driver.close()
     time.sleep(4 * IDLE_S)
     assert processes.daemon.poll() is None

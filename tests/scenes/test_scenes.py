@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from tests.scenes.draw import Scene
 
-FEW = 42
+FEW = 32
 MANY = 240
 LONG = 24
 """A scene in which every drop is void, and each command seeks the causes anew."""
