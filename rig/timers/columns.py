@@ -7,7 +7,16 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rig.timers.table import BLOCKED, CLEAR, FALLING, NO_LEVEL, NUMBER, RISING, is_number
+from rig.timers.table import (
+    BLOCKED,
+    CLEAR,
+    FALLING,
+    NAME_AND_NUMBER,
+    NO_LEVEL,
+    RISING,
+    as_state,
+    is_number,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +59,6 @@ _DERIVED = re.compile(
     r"dist|pos|vel|speed|accel|height|angle|weg|strecke|geschwindigkeit|omega|^v[a-z]?$|^a[a-z]?$|"
     r"^[dsxyz]$|^[xyz]\b|latitude|error|note|remark|comment", _I)  # fmt: skip
 _WHOLE = re.compile(r"[0-9]{1,4}")
-_NAME = re.compile(r"[A-Za-z_]+[ _-]?[0-9]+")
 _STATES = (BLOCKED | CLEAR) - RISING - FALLING
 _WORTH = 200  # rows that are looked at
 _SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
@@ -99,8 +107,6 @@ class Columns:
     ----------
     times
         One, or one a run where runs stand side by side.
-    states
-        Say whether the beam is blocked, and belong to the only column of times.
     edge
         Which way a signal went, which is not yet whether the beam is blocked.
     channel, run
@@ -174,14 +180,14 @@ def _by_heading(
     problems: ProblemList,
 ) -> Columns:
     found = Columns()
-    durations = []
+    durations, states = [], []
     for n, cell in enumerate(heading.cells):
         text = cell.text
         here = values[n] if n < len(values) else []
         kind = _kind(text, here)
         said = _SAID[kind]
-        if kind == "state" and not _STATE.search(text):
-            heading.cells[n] = cell._replace(text=f"{text} state")
+        if kind == "state":
+            states.append(n)
         elif kind == "duration":
             durations.append(cell)
         elif kind in {"time", "time of an input"}:
@@ -196,14 +202,14 @@ def _by_heading(
         elif kind in {"edge", "channel", "run"}:
             setattr(found, kind, n)
         elif kind == "other" and (text or here):
-            found.unused.append(text or f"column {n + 1}")
+            found.unused.append(_name(heading, n))
             _check_unused(heading.line, cell, here, problems)
         if text or here:
-            found.said[text or f"column {n + 1}"] = said
+            found.said[_name(heading, n)] = said
     found.derived = any(_DERIVED.search(name) for name in found.unused)
-    _pair_states(found, heading)
+    _pair_states(found, states, len(heading.cells))
     _check_gate(found, heading, values, problems)
-    _one_clock(found, block, separator)
+    _one_clock(found, heading, block, separator)
     if not (found.times or found.levels or found.volts):
         if durations:
             problems.add(
@@ -265,30 +271,32 @@ def _kind(text: str, here: Sequence[str]) -> str:
     return "counter" if _counts(here) else "other"
 
 
-def _pair_states(found: Columns, heading: Row) -> None:
+def _name(heading: Row, n: int) -> str:
+    return heading.cells[n].text or f"column {n + 1}"
+
+
+def _pair_states(found: Columns, states: Sequence[int], width: int) -> None:
     """Give each column of times the states that stand behind it, or before the first."""
-    if not found.times:
-        return
-    states = [n for n, text in enumerate(heading.texts) if _STATE.search(text)]
-    for one, end in zip(found.times, [*(t.at for t in found.times[1:]), len(heading.cells)],
-                        strict=True):  # fmt: skip
-        behind = [n for n in states if one.at < n < end]
+    for one, end in pairwise([*found.times, None]):
+        assert one is not None
+        behind = [n for n in states if one.at < n < (width if end is None else end.at)]
         before = [n for n in states if n < one.at] if one is found.times[0] else []
         one.state = next(iter([*behind, *before]), None)
 
 
-def _one_clock(found: Columns, block: RowBlock, separator: str) -> None:
+def _one_clock(found: Columns, heading: Row, block: RowBlock, separator: str) -> None:
     """Of columns that say the same times in other units, keep the finest."""
     if len({one.power for one in found.times}) < 2:
         return
     finest = max(found.times, key=lambda one: one.power)
-    same = [one for one in found.times if one is finest or _same(one, finest, block, separator)]
-    if len(same) == len(found.times):
+    coarser = [one for one in found.times if one is not finest]
+    if all(_same(one, finest, block, separator) for one in coarser):
         state = next((one.state for one in found.times if one.state is not None), None)
         found.times = [TimeColumn(finest.at, finest.power, state)]
-        for key, said in found.said.items():
-            if said.startswith("times in") and said != f"times in {_SYMBOLS[finest.power]}":
-                found.said[key] = "the same times, coarser; not used"
+        # First these: with like headings, what the finest one is stays.
+        found.said |= {
+            _name(heading, one.at): "the same times, coarser; not used" for one in coarser
+        } | {_name(heading, finest.at): f"times in {_SYMBOLS[finest.power]}"}
 
 
 def _same(one: TimeColumn, other: TimeColumn, block: RowBlock, separator: str) -> bool:
@@ -402,13 +410,7 @@ def _by_values(
 def _levels(here: Sequence[str]) -> bool:
     """Whether a column holds two states, or levels, and nothing else."""
     known = BLOCKED | CLEAR | RISING | FALLING | NO_LEVEL
-    return bool(here) and all(_plain(text) in known for text in here)
-
-
-def _plain(text: str) -> str:
-    """Write 1.0 and 0,00 as a state is written."""
-    text = text.lower()
-    return text.rstrip("0").rstrip(".,") or "0" if NUMBER.fullmatch(text) else text
+    return bool(here) and all(as_state(text) in known for text in here)
 
 
 def _digits(here: Sequence[str]) -> bool:
@@ -420,7 +422,7 @@ def _whole(here: Sequence[str]) -> bool:
 
 
 def _names(here: Sequence[str]) -> bool:
-    return bool(here) and all(_NAME.fullmatch(text) for text in here)
+    return bool(here) and all(NAME_AND_NUMBER.fullmatch(text) for text in here)
 
 
 def _few_whole(here: Sequence[str]) -> bool:

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers.edges_csv import TICK_HZ, picoseconds
-from rig.timers.table import BLOCKED, CLEAR, FALLING, NUMBER, RISING, TableCell
+from rig.timers.table import BLOCKED, CLEAR, FALLING, RISING, as_state, pointed
 
 if TYPE_CHECKING:
     from rig.timers.columns import Columns, TimeColumn
     from rig.timers.problems import ProblemList
-    from rig.timers.table import Row
+    from rig.timers.table import Row, TableCell
 
 MAX_SPAN_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
@@ -81,17 +81,16 @@ class PassageRows:
                 self._time(row, column, (number, beside), label)
 
     def _time(self, row: Row, column: TimeColumn, key: tuple[int, int], label: str) -> None:
-        cell = _cell(row, column.at)
+        cell = row.cell(column.at)
         if not cell.text:
             return
-        text = cell.text if self._separator == "," else cell.text.replace(",", ".", 1)
-        time = picoseconds(text, -column.power)
+        time = picoseconds(pointed(cell.text, self._separator), -column.power)
         if time is None or abs(time) >= 10**12 * TICK_HZ:
             self._fault(row, cell, "time", f"{cell.text!r:.40} is not a time a drop can have")
             return
         blocked = high = None
         if column.state is not None:
-            state = _cell(row, column.state)
+            state = row.cell(column.state)
             blocked = _said(state.text, BLOCKED, CLEAR)
             if blocked is None:
                 self._fault(
@@ -100,7 +99,7 @@ class PassageRows:
                 )  # fmt: skip
                 return
         elif self._columns.edge is not None:
-            edge = _cell(row, self._columns.edge)
+            edge = row.cell(self._columns.edge)
             high = _said(edge.text, RISING, FALLING)
             if high is None:
                 self._fault(row, edge, "edge", f"{edge.text!r:.40} is no edge: rising or falling")
@@ -120,12 +119,12 @@ class PassageRows:
 
     def _label(self, row: Row) -> str:
         at = self._columns.channel
-        return "" if at is None else _cell(row, at).text
+        return "" if at is None else row.cell(at).text
 
     def _whole(self, row: Row, at: int | None, key: str) -> int:
         if at is None:
             return 0
-        cell = _cell(row, at)
+        cell = row.cell(at)
         if not cell.text.isdecimal() or len(cell.text) > 6:
             self._fault(row, cell, key, f"{cell.text!r:.40} is not a whole number")
             return 0
@@ -135,13 +134,8 @@ class PassageRows:
         self._problems.add(row.line, cell.column, key, message)
 
 
-def _cell(row: Row, at: int) -> TableCell:
-    return row.cells[at] if at < len(row.cells) else TableCell(1, "")
-
-
 def _said(text: str, yes: set[str], no: set[str]) -> bool | None:
-    text = text.lower()
-    text = text.rstrip("0").rstrip(".,") or "0" if NUMBER.fullmatch(text) else text
+    text = as_state(text)
     return True if text in yes else False if text in no else None
 
 

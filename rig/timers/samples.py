@@ -9,10 +9,10 @@ import numpy as np
 
 from rig.timers.edges_csv import TICK_HZ, picoseconds
 from rig.timers.passages import Passage
-from rig.timers.table import FALLING, NO_LEVEL, RISING
+from rig.timers.table import FALLING, NO_LEVEL, RISING, as_state, pointed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -68,28 +68,22 @@ def level_passages(
         Changes, and the level that each input begins with.
     """
     found: list[Passage] = []
+    begins: dict[str, bool] = {}
     now: dict[str, bool] = {}
     for row, time in zip(rows, times, strict=True):
         for at, label in columns.levels.items():
-            text = row.cells[at].text.lower() if at < len(row.cells) else "x"
-            if text in NO_LEVEL or not text:
+            cell = row.cell(at)
+            level = as_state(cell.text)
+            if level in NO_LEVEL or not level:
                 continue
-            if text not in RISING | FALLING:
-                cell = row.cells[at]
+            if level not in RISING | FALLING:
                 problems.add(row.line, cell.column, label, f"{cell.text!r:.40} is no level: 0, 1")
                 continue
-            high = text in RISING
-            if label in now and now[label] is not high:
+            high = level in RISING
+            if high is not now.get(label, begins.setdefault(label, high)):
                 found.append(Passage(time, label, None, high))
-            now.setdefault(label, high)
             now[label] = high
-    first = {label: _first(rows, at) for at, label in columns.levels.items() if label in now}
-    return found, first
-
-
-def _first(rows: Sequence[Row], at: int) -> bool:
-    texts = (row.cells[at].text.lower() for row in rows if at < len(row.cells))
-    return next(text for text in texts if text in RISING | FALLING) in RISING
+    return found, begins
 
 
 def volt_passages(
@@ -121,8 +115,8 @@ def volt_passages(
     high = bool(volts[0] > centre)
     begins = high
     found: list[Passage] = []
-    for n in _beyond(volts, centre, half):
-        if (volts[n] > centre) is high or bool(volts[n] > centre) == high:
+    for n in np.flatnonzero(np.abs(volts - centre) > half).tolist():
+        if bool(volts[n] > centre) is high:
             continue
         high = not high
         k = n  # back to where it crossed the middle
@@ -134,10 +128,6 @@ def volt_passages(
             Passage(times[k - 1] + round(share * (times[k] - times[k - 1])), label, None, high)
         )
     return found, begins, centre
-
-
-def _beyond(volts: Array, centre: float, half: float) -> Iterator[int]:
-    yield from np.flatnonzero(np.abs(volts - centre) > half).tolist()
 
 
 def _middle(volts: Array) -> tuple[float, float] | None:
@@ -176,16 +166,12 @@ def sample_times(
     column = columns.times[0]
     found: list[int] = []
     for row in rows:
-        cell = row.cells[column.at] if column.at < len(row.cells) else None
-        text = "" if cell is None else cell.text
-        time = picoseconds(text if separator == "," else text.replace(",", ".", 1), -column.power)
+        cell = row.cell(column.at)
+        time = picoseconds(pointed(cell.text, separator), -column.power)
         if time is None:
-            problems.add(
-                row.line, 1 if cell is None else cell.column, "time", f"{text!r:.40} is not a time"
-            )
+            problems.add(row.line, cell.column, "time", f"{cell.text!r:.40} is not a time")
             time = found[-1] if found else 0
         elif found and time < found[-1]:
-            assert cell is not None
-            problems.add(row.line, cell.column, "time", f"{text} is before the time above it")
+            problems.add(row.line, cell.column, "time", f"{cell.text} is before the time above it")
         found.append(time)
     return found

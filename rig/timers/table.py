@@ -27,7 +27,7 @@ _NEW_BLOCK = re.compile(
     r"^(?:run|trial|drop|data ?set|series|lauf|versuch|messung|vernier format)\b", re.IGNORECASE
 )
 _REMARK = re.compile(r'^\s*"?(?:#|%|//)|^;\s+[^;]+$')
-_NAME_AND_NUMBER = re.compile(r"[A-Za-z_]+[ _-]?[0-9]+")
+NAME_AND_NUMBER = re.compile(r"[A-Za-z_]+[ _-]?[0-9]+")
 
 
 class TableCell(NamedTuple):
@@ -47,6 +47,10 @@ class Row(NamedTuple):
     def texts(self) -> list[str]:
         """What its cells say."""
         return [cell.text for cell in self.cells]
+
+    def cell(self, at: int) -> TableCell:
+        """Return the cell of a column, from 0; an empty one where the row ends before it."""
+        return self.cells[at] if at < len(self.cells) else TableCell(1, "")
 
 
 @dataclass(slots=True)
@@ -122,8 +126,9 @@ def read_table(lines: Sequence[str]) -> Table:
         if not any(row.texts):
             continue
         block = blocks[-1]
-        if (block.rows and _NEW_BLOCK.match(_first_text(row))) or (
-            block.rows and not has_number(row, separator) and _like(row, block)
+        if block.rows and (
+            _NEW_BLOCK.match(_first_text(row))
+            or (not has_number(row, separator) and _like(row, block))
         ):
             block = RowBlock()
             blocks.append(block)
@@ -145,8 +150,7 @@ def is_data(row: Row, separator: str) -> bool:
     """Whether a row holds numbers and states only, and at least one number."""
     texts = [text for text in row.texts if text]
     return has_number(row, separator) and all(
-        is_number(text, separator) or text.lower() in _WORDS or _NAME_AND_NUMBER.fullmatch(text)
-        for text in texts
+        is_number(text, separator) or _is_word(text) for text in texts
     )
 
 
@@ -158,6 +162,16 @@ def has_number(row: Row, separator: str) -> bool:
 def is_number(text: str, separator: str) -> bool:
     """Whether a text is a number; decimals have a comma only where none separates cells."""
     return NUMBER.fullmatch(text) is not None and not (separator == "," and "," in text)
+
+
+def pointed(text: str, separator: str) -> str:
+    """Write a number with a decimal point; it may have a comma where none separates cells."""
+    return text if separator == "," else text.replace(",", ".", 1)
+
+
+def as_state(text: str) -> str:
+    """Write 1.0 and 0,00, and states in capitals, as a state is written."""
+    return re.sub("[.,]0*$", "", text) if NUMBER.fullmatch(text) else text.lower()
 
 
 def _unmarked(line: str) -> str:
@@ -215,9 +229,12 @@ def _separator(lines: Sequence[str]) -> str:
 
 def _is_value(text: str) -> bool:
     """Whether a word is a number, a state or the name of an input."""
-    return bool(
-        NUMBER.fullmatch(text) or text.lower() in _WORDS or _NAME_AND_NUMBER.fullmatch(text)
-    )
+    return NUMBER.fullmatch(text) is not None or _is_word(text)
+
+
+def _is_word(text: str) -> bool:
+    """Whether a text is a state or the name of an input."""
+    return text.lower() in _WORDS or NAME_AND_NUMBER.fullmatch(text) is not None
 
 
 def _cells(line: str, separator: str) -> list[TableCell]:

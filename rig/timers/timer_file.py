@@ -27,7 +27,7 @@ from rig.timers.samples import (
     sample_times,
     volt_passages,
 )
-from rig.timers.table import NUMBER, lines_of, read_table
+from rig.timers.table import is_number, lines_of, pointed, read_table
 from rig.timers.vcd import is_vcd, read_vcd
 
 if TYPE_CHECKING:
@@ -249,12 +249,13 @@ def _volts(
 ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     values = np.zeros(len(block.rows))
     for n, row in enumerate(block.rows):
-        text = row.cells[at].text if at < len(row.cells) else ""
-        plain = text if separator == "," else text.replace(",", ".", 1)
-        if not NUMBER.fullmatch(plain) or "," in plain:
-            problems.add(row.line, 1, "volts", f"{text!r:.40} is not a number of volts")
+        cell = row.cell(at)
+        if not is_number(cell.text, separator):
+            problems.add(
+                row.line, cell.column, "volts", f"{cell.text!r:.40} is not a number of volts"
+            )
             continue
-        values[n] = float(plain)
+        values[n] = float(pointed(cell.text, separator))
     return values
 
 

@@ -374,6 +374,8 @@ class RigApp(App[None], inherit_bindings=False):
         """Take keys before anybody else: STOP must work with focus anywhere."""
         taken = False
         if isinstance(event, events.InputEvent) and not event.is_forwarded:
+            if not self.screen_stack:  # the terminal has ended
+                return
             if isinstance(event, events.Key):
                 taken = self._takes(event.key, event.time)
             elif isinstance(event, events.Paste):

@@ -174,6 +174,22 @@ async def _typed(session, lived):
         return app.client.told, hands.keys
 
 
+def test_what_is_typed_as_the_terminal_ends_is_nobody_s(session):
+    async def work():
+        async with _screen(session) as (app, _):
+            pass
+        known = len(app.client.told)
+        for event in (
+            *(events.Key(key, None) for key in ("enter", "q", "escape")),
+            events.Paste("laser"),
+            events.MouseDown(None, 9, 5, 0, 0, 1, False, False, False, 9, 5),
+        ):
+            await app.on_event(event)
+        assert len(app.client.told) == known
+
+    run(work())
+
+
 def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async def work():
         async with _screen(session) as (app, pilot):
