@@ -373,7 +373,7 @@ class RigApp(App[None], inherit_bindings=False):
     async def on_event(self, event: events.Event) -> None:
         """Take keys before anybody else: STOP must work with focus anywhere."""
         taken = False
-        if isinstance(event, events.InputEvent) and not event.is_forwarded:
+        if isinstance(event, (events.InputEvent, events.Paste)) and not event.is_forwarded:
             if not self.screen_stack:  # the terminal has ended
                 return
             if isinstance(event, events.Key):

@@ -56,6 +56,8 @@ episodes = st.lists(
 ARMS = [("prepare", "", [("wait", 6 * STILL_S), ("keys", ["enter"]), ("wait", 0.6)])]
 ENDS = [("prepare", "", [("wait", 6 * STILL_S), ("keys", ["enter"]), ("type", "x"), ("wait", 0.6)])]
 
+PASTES = [("prepare", "", [*ENDS[0][2][:2], ("paste", "x"), ("wait", 0.6)])]
+
 
 class Rig(FakeClient):
     """A rig that does whatever it is told at once, and remembers it."""
@@ -107,6 +109,7 @@ class Hands:
                 self.look()
         elif kind == "paste":
             self.touched = time.monotonic()
+            self.keys.append((self.touched, False))
             self.app.post_message(events.Paste(what))
             await asyncio.sleep(0.005)
         elif kind == "click":
@@ -131,11 +134,12 @@ def session(tmp_path_factory):
 @given(episodes)
 @example(ARMS)
 @example(ENDS)
+@example(PASTES)
 @example([("result", "", [("type", "board moved"), ("hold", "enter"), ("wait", 0.6)])])
 def test_nothing_is_armed_but_by_the_deliberate_step(session, lived):
     told, keys = run(_typed(session, lived))
     for _ in range(5):  # on a busy machine a page may not have stood still long enough
-        if told or lived not in [ARMS, ENDS]:
+        if told or lived not in [ARMS, ENDS, PASTES]:
             break
         told, keys = run(_typed(session, lived))
     for at, method in told:
@@ -149,7 +153,7 @@ def test_nothing_is_armed_but_by_the_deliberate_step(session, lived):
     methods = [method for _, method in told]
     if lived == ARMS:
         assert methods == ["wait", "arm", "fire", "collect"]
-    if lived == ENDS:
+    if lived in [ENDS, PASTES]:
         assert "fire" not in methods
         assert methods[-1] == "stop"
 
