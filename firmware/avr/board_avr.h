@@ -13,6 +13,13 @@
 
 #define BOARD_HZ F_CPU
 #define BOARD_FLASH PROGMEM
+/* A stamp may be off when the interrupt before it was still running: three passes through the
+ * interrupt, with room to spare. */
+#define BOARD_LATE 256
+/* A turn of the compare unit's counter, less what a look at it may be off. */
+#define BOARD_REACH 0xF800
+/* A match that is set for so soon may have been passed before it was set. */
+#define BOARD_SHORT (10 * (BOARD_HZ / 1000000u))
 #define BOARD_KEPT __attribute__((section(".noinit")))
 
 /* The stamp interrupt (stamp.S) has registers of its own, which the compiler is told to leave alone
@@ -144,7 +151,7 @@ static inline void board_release_end(uint16_t count)
     }
 }
 
-static inline uint16_t board_fire(uint8_t release, uint16_t ticks)
+static inline uint16_t board_fire(uint8_t release, uint32_t ticks)
 {
     uint8_t set = units(release, RELEASE_SET_0, RELEASE_SET_1);
     uint8_t clear = units(release, RELEASE_CLEAR_0, RELEASE_CLEAR_1);
@@ -169,6 +176,12 @@ static inline void board_release_off(void)
 {
     RELEASE_FORCE = RELEASE_FORCE_BOTH;
     RELEASE_UNITS = 0;
+}
+
+/* The emergency stop is the program's work here. */
+static inline uint32_t board_release_cut(void)
+{
+    return 0;
 }
 
 /* The pins themselves. */

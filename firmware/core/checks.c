@@ -1,6 +1,6 @@
 #include "checks.h"
 
-#include "board.h"
+#include "board_api.h"
 
 /* The remainders of all bytes: zlib.crc32(bytes([n])) without its two inversions. */
 static const uint32_t table[256] BOARD_FLASH = {

@@ -2,7 +2,7 @@
 
 #include <stdbool.h>
 
-#include "board.h"
+#include "board_api.h"
 #include "bytes.h"
 #include "drop.h"
 #include "events.h"
@@ -266,7 +266,7 @@ static void identify(void)
     send32(RELEASE_MAX_US);
     send16(BOARD_STREAMS ? BOARD_CAPACITY - 1 : BOARD_CAPACITY);
     send8(BOARD_STREAMS);
-    send16(LATE_TICKS);
+    send16(BOARD_LATE);
     send_text(board_channels, sizeof board_channels - 1);
     send_end();
 }

@@ -1,6 +1,6 @@
 #include "drop.h"
 
-#include "board.h"
+#include "board_api.h"
 #include "checks.h"
 #include "events.h"
 #include "send.h"

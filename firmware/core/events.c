@@ -46,7 +46,7 @@ void events_start(uint16_t gates)
     at.entry = at.event = events_memory;
     at.gates = gates;
     at.ports = 0;
-    at.stamp = at.last = ticks_now() - LATE_TICKS;
+    at.stamp = at.last = ticks_now() - BOARD_LATE;
     at.excused[0] = at.excused[1] = 0;
     at.lead = at.most = 0;
     board_entries_start(events_memory, last_slot());
@@ -81,7 +81,7 @@ static void keep(uint16_t ports, uint32_t stamp)
     uint8_t n;
     if (ports == at.ports)
         events.glitches++;
-    if (stamp - at.last < LATE_TICKS)
+    if (stamp - at.last < BOARD_LATE)
         events.late++;
     at.last = stamp;
     put32(event, stamp - BOARD_LATENCY);

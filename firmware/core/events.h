@@ -10,14 +10,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "board.h"
+#include "board_api.h"
 
 #define EVENT_SIZE 6
 #define EVENTS_BYTES ((uint16_t)BOARD_CAPACITY * EVENT_SIZE)
-
-/* A stamp may be off when the interrupt before it was still running. One that follows within this
- * many ticks counts as late: three passes through the interrupt with room to spare. */
-#define LATE_TICKS 256
 
 extern uint8_t events_memory[];
 

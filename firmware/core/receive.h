@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "board.h"
+#include "board_api.h"
 
 #define RECEIVE_KEPT 16 /* payload bytes kept: no request of the table has more */
 

@@ -1,21 +1,17 @@
 #include "release.h"
 
-#include "board.h"
+#include "board_api.h"
 #include "ticks.h"
 #include "wire.h"
 
-/* As far ahead as the compare unit is set: a turn of its counter, less what a look may be off. */
-#define REACH 0xF800
 /* The end is put off when this much of it is over. */
 #define SOON 0x1000
-/* By now a pulse of so many ticks is over, or was too short for the compare unit. */
-#define SHORT (10 * TICKS_PER_US)
-/* A pulse is on this long after its end: the compare unit failed. */
+/* A pulse is on this long after its end: hardware failed to end it. */
 #define FAILED 0x400
 
 static struct {
     uint32_t since, length; /* of the pulse, or of the rest after it, in ticks */
-    uint32_t end;           /* when the compare unit ends the pulse, as it is set now */
+    uint32_t end;           /* when hardware ends the pulse, as it is set now */
     bool on, resting, sync;
     uint32_t lasted;
     uint8_t ended_by;
@@ -38,12 +34,12 @@ static void end_now(uint8_t by)
     ended(ticks_now(), by);
 }
 
-static uint16_t within_reach(uint32_t left)
+static uint32_t within_reach(uint32_t left)
 {
-    return (uint16_t)(left < REACH ? left : REACH);
+    return left < BOARD_REACH ? left : BOARD_REACH;
 }
 
-/* The compare unit is set when the pulse begins, and put off for as long as this is called: a main
+/* Hardware is told its end when the pulse begins, and put off for as long as this is called: a main
  * loop that stands still ends the pulse too early, never too late. */
 static void put_off(uint32_t now)
 {
@@ -60,7 +56,7 @@ void release_reset(void)
 
 uint32_t release_fire(uint8_t mask, uint32_t ticks)
 {
-    uint16_t reach = within_reach(ticks);
+    uint32_t reach = within_reach(ticks);
     uint32_t at = ticks_of(board_fire(mask, reach));
     pulse.sync = true;
     pulse.lasted = 0;
@@ -71,7 +67,7 @@ uint32_t release_fire(uint8_t mask, uint32_t ticks)
     pulse.length = ticks;
     pulse.end = at + reach;
     pulse.on = true;
-    if (ticks < SHORT && board_release_high())
+    if (ticks < BOARD_SHORT && board_release_high())
         end_now(PULSE_END_ORDERED);
     return at;
 }
@@ -109,9 +105,11 @@ void release_pass(uint32_t now)
         if (pulse.resting && now - pulse.since >= pulse.length)
             pulse.resting = false;
     } else if (!board_release_high()) {
-        ended(pulse.end, whole ? PULSE_END_ORDERED : PULSE_END_DEVICE);
+        uint32_t cut = board_release_cut();
+        uint8_t by = whole ? PULSE_END_ORDERED : PULSE_END_DEVICE;
+        ended(pulse.end - cut, cut ? PULSE_END_STOPPED : by);
     } else if (!whole) {
-        if (pulse.end - now < REACH - SOON)
+        if (pulse.end - now < BOARD_REACH - SOON)
             put_off(now);
     } else if ((int32_t)(now - pulse.end) > FAILED) {
         end_now(PULSE_END_DEVICE);

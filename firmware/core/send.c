@@ -1,6 +1,6 @@
 #include "send.h"
 
-#include "board.h"
+#include "board_api.h"
 #include "checks.h"
 #include "receive.h"
 

@@ -1,6 +1,6 @@
 #include "ticks.h"
 
-#include "board.h"
+#include "board_api.h"
 
 #define HALF_BITS 15
 #define BEHIND 0x400 /* by how much a rough look may have been ahead, with room to spare */

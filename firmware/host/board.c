@@ -131,6 +131,11 @@ bool board_release_high(void)
     return outputs & ~SYNC;
 }
 
+uint32_t board_release_cut(void)
+{
+    return 0;
+}
+
 uint16_t board_supply(void)
 {
     return 1;
@@ -141,7 +146,7 @@ uint16_t board_supply_mv(uint16_t measured)
     return (uint16_t)(5000 * measured);
 }
 
-uint16_t board_fire(uint8_t release, uint16_t ticks)
+uint16_t board_fire(uint8_t release, uint32_t ticks)
 {
     outputs = (uint8_t)(release | SYNC);
     release_end = now + ticks;

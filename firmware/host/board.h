@@ -20,6 +20,9 @@
 #define BOARD_RELEASES 2
 #define BOARD_LATENCY HOST_LATENCY
 #define BOARD_BUSY (HOST_BUSY + HOST_LATENCY)
+#define BOARD_LATE 256
+#define BOARD_REACH 0xF800
+#define BOARD_SHORT (10 * (BOARD_HZ / 1000000u))
 #define BOARD_FLASH
 #define BOARD_KEPT
 
@@ -64,10 +67,11 @@ void board_entries_stop(uint8_t *slot);
 uint16_t board_entries_lost(void);
 void board_resume(void);
 void board_sync(bool on);
-uint16_t board_fire(uint8_t release, uint16_t ticks);
+uint16_t board_fire(uint8_t release, uint32_t ticks);
 void board_release_end(uint16_t count);
 void board_release_off(void);
 bool board_release_high(void);
+uint32_t board_release_cut(void);
 uint16_t board_supply(void);
 uint16_t board_supply_mv(uint16_t measured);
 bool board_stopped(void);
