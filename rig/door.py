@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rig.analysis.gate_passages import GatePassage
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.summary import Incline
     from rig.protocol.protocol import Protocol
@@ -201,6 +202,11 @@ class _Quantities:
         """Acceleration of a chain that strikes nothing, m/s²."""
         return self._one("gravity_m_s2")
 
+    @property
+    def acceleration(self) -> Measured:
+        """Acceleration of one object down its track, m/s²."""
+        return self._one("acceleration_m_s2")
+
     def _written(self) -> str:
         rows = (MEASURANDS[name] for name in self.quantities)
         said = (
@@ -223,6 +229,8 @@ class RunResult(_Quantities):
         Which it was.
     verdict, reasons
         ``accepted``, ``marginal``, ``void`` or ``rejected``, and why.
+    gates
+        How one object passed each gate; empty for chains.
     """
 
     run: int = field(kw_only=True)
@@ -231,6 +239,7 @@ class RunResult(_Quantities):
     impact_chain: str | None = field(kw_only=True)
     verdict: str = field(kw_only=True)
     reasons: tuple[str, ...] = field(kw_only=True)
+    gates: tuple[GatePassage, ...] = field(kw_only=True)
 
     @classmethod
     def _of(cls, one: DropResult) -> RunResult:
@@ -242,6 +251,7 @@ class RunResult(_Quantities):
             impact_chain=one.run.impact,
             verdict=one.verdict,
             reasons=one.reasons,
+            gates=one.gates,
         )
 
     @property

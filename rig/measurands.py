@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Container, Iterator
 
 _SUFFIXES = ("_m_s2", "_m_s", "_m", "_s")
 
@@ -118,6 +118,11 @@ MEASURANDS: dict[str, Measurand] = {
             "acceleration of the falling chain",
             "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
         ),
+        Measurand(
+            "acceleration_m_s2", "a", "a", "acceleration",
+            "acceleration of the object down its track, friction and all",
+            "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
+        ),
     )
 }  # fmt: skip
 
@@ -127,6 +132,12 @@ SPEED = MEASURANDS["speed_m_s"]
 RELEASE_SKEW = MEASURANDS["release_skew_s"]
 FALL_TIME = MEASURANDS["fall_time_s"]
 GRAVITY = MEASURANDS["gravity_m_s2"]
+ACCELERATION = MEASURANDS["acceleration_m_s2"]
+
+
+def acceleration_in(names: Container[str]) -> Measurand | None:
+    """Return what measures how something falls that strikes nothing, where that is among names."""
+    return next((row for row in (GRAVITY, ACCELERATION) if row.name in names), None)
 
 
 def averaged() -> Iterator[Measurand]:

@@ -10,7 +10,7 @@ from functools import partial
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
-from rig.measurands import FALL_TIME, GRAVITY, SEPARATION, SPEED
+from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -141,7 +141,8 @@ def predict_incline(
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     """What the model says of one run, by JSON name; nothing where it has no answer."""
     if run.impact is None:
-        return {GRAVITY.name: protocol.gravity}
+        row = GRAVITY if protocol.track is None else ACCELERATION
+        return {row.name: protocol.gravity}
     one = predict_incline(protocol, run.incline_deg, run.impact, run.free)
     found = {
         SEPARATION.name: (one.separation if run.free is not None else None, one.separation_u),
@@ -219,10 +220,11 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
 
         kappa = air_of(protocol, name)[0]
         speed, time = drag_leg(drop + rods.chain.length, start, gravity, kappa)
+    way = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,
         impact_chain=None,
-        model="free fall" if protocol.drag is None else "free fall, drag",
+        model=f"{way}{', drag' if protocol.drag is not None else ''}",
         alpha=None,
         gamma=None,
         separation_m=None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
@@ -13,9 +14,10 @@ from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise, faults
 from rig.analysis.fit import timed
+from rig.analysis.gate_passages import gate_passages
 from rig.analysis.identified import Identified, identified
 from rig.analysis.last_passages import last_passages
-from rig.analysis.quantities import quantities
+from rig.analysis.quantities import measured, quantities
 from rig.analysis.result import Audit, DropResult
 from rig.analysis.verdict import judge
 from rig.records import Job
@@ -129,6 +131,7 @@ def fit_drop(
         fit.estimate.scatter,
         unmatched=unmatched_edges(fit),
         last_passages=alone,
+        gates=gate_passages(fit, fit.x, partial(measured, fit.model, fit.estimate)),
     )
     return result, fit
 

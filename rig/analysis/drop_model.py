@@ -262,6 +262,8 @@ class DropModel:
         x[self.unknowns["drop"]] = sum(starts) / len(starts) - self.protocol.drop.value
         clocks = [guess.clock for guess in self.guesses.values()]
         x[self.unknowns["clock"]] = sum(clocks) / len(clocks)
+        if "free" in self.guesses and self.protocol.surface is None:
+            x[self.unknowns["gravity"]] = self.guesses["free"].pull
         if "drag" in self.unknowns:
             kappa = max(guess.kappa for guess in self.guesses.values())
             x[self.unknowns["drag"]] = kappa - self._kappa

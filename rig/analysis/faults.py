@@ -103,8 +103,9 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
         groups.append((set(names.values()), "each chain"))
     for group, who in groups:
         one = protocol.chains[next(iter(group))]
-        yield _length(group, who, one.chain.heights[-1])
-        yield _rods(group, who, one.chain.rods)
+        if one.chain.rods > 1:  # one object has no length, and is no chain with rods missing
+            yield _length(group, who, one.chain.heights[-1])
+            yield _rods(group, who, one.chain.rods)
     for role, name in names.items():
         if upside_down(protocol.chains[name]) is not None:
             yield _turned(name, role)
@@ -157,8 +158,8 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
             drop=Quantity(setting.protocol.drop.value + d, setting.protocol.drop.u),
         ),
         lambda d, u: (
-            f"the chains hang {_size(d, u)} {_above(d)} above the contact point than the "
-            "protocol says"
+            f"{'it begins' if protocol.one_object else 'the chains hang'} {_size(d, u)} "
+            f"{_above(d)} above the contact point than the protocol says"
         ),
         _grid(60e-3, 10e-3),
         lambda _: {"drop": 1.0},

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,7 @@ from rig.analysis.pattern import (
     AIRS,
     ANY_ALPHA,
     EVER,
+    LONGEST,
     Guess,
     in_order,
     merged,
@@ -83,6 +84,8 @@ _OWN = {
     "strings",
 }
 """Unknowns that a side tells which is read by itself; each beam and post is of one side."""
+_PULLS = 0.7, 0.5
+"""By what share one object's acceleration may be less than stated, and more."""
 _CLOCKS = (-2.0, -1.0, 1.0, 2.0)  # standard uncertainties of the clock that are tried
 
 
@@ -272,6 +275,12 @@ class _Side:
                 return found
         if possible(record) < _LEAST * record.expected:
             return found  # whatever the air and the clock are
+        if self.protocol.one_object:
+            # Friction, rolling and a slope that is not as stated are what such a drop is for.
+            pulls = [self.guesses(window, kappa, clock, pull=pull) for pull in self._pulls()]
+            found = _best([*found, *self.judged(merged(*pulls))])
+            if _convincing(found):
+                return found
         near = near_alpha(record)
         others = [self.guesses(hint, one, clock, near) for one in (() if self.told else AIRS)]
         top = float(np.max(self.record.chain.chain.heights)) + self.protocol.drop.value
@@ -282,11 +291,25 @@ class _Side:
         return _best([*found, *self.judged(merged(*others))]) if others else found
 
     def guesses(
-        self, window: Span, kappa: float, clock: float, alphas: Span = ANY_ALPHA
+        self,
+        window: Span,
+        kappa: float,
+        clock: float,
+        alphas: Span = ANY_ALPHA,
+        pull: float = 0.0,
     ) -> list[Guess]:
-        drop, gravity = self.protocol.drop, self.protocol.gravity.value
-        record = self.record
-        return votes(record, drop, gravity, kappa, clock, window, alphas)
+        drop, gravity = self.protocol.drop, self.protocol.gravity.value + pull
+        found = votes(self.record, drop, gravity, kappa, clock, window, alphas)
+        return [replace(one, pull=pull) for one in found] if pull else found
+
+    def _pulls(self) -> list[float]:
+        """Accelerations to try beside the stated one, so near that votes overlap."""
+        gravity = self.protocol.gravity.value
+        lowest = min(float(train.levels.min(initial=0.0)) for train in self.record.trains)
+        fall = math.sqrt(2.0 * max(self.protocol.drop.value - lowest, 0.0) / gravity)
+        step = 2.0 * LONGEST / max(fall, LONGEST)
+        below, above = (int(share / step) for share in _PULLS)
+        return [gravity * step * n for n in sorted(range(-below, above + 1), key=abs) if n]
 
     def most_votes(self, window: Span) -> float:
         """Share of the expected edges that vote for the same fall, at most."""

@@ -37,7 +37,7 @@ AIRS = tuple(0.02 * n for n in range(1, 11))
 """κ that are tried where none is known and a fall in vacuum explains too little, 1/m."""
 _MOST = 8e-3  # how far off a rod may be and still vote, m
 _PART = 6.0  # and what part of the least distance of two rods: what is a rod off is well outside
-_LONGEST = 5e-3  # half width of a vote, s: at the very start a chain is too slow to tell more
+LONGEST = 5e-3  # half width of a vote, s: at the very start a chain is too slow to tell more
 _SHORTEST = 0.05e-3
 _SURE = 2.5  # standard uncertainties of the drop height within which starts are tried
 _FEWEST = 0.5  # of the most votes, below which a moment is not kept
@@ -64,6 +64,8 @@ class Guess:
         Of the air, 1/m.
     clock
         By what share the edges' clock is slow.
+    pull
+        By how much the fall is quicker than with the stated gravity, m/s².
     votes
         How many expected edges have one near where this fall puts them.
     """
@@ -74,6 +76,7 @@ class Guess:
     kappa: float = 0.0
     clock: float = 0.0
     votes: int = 0
+    pull: float = 0.0
 
 
 class _Paths(NamedTuple):
@@ -234,18 +237,18 @@ def _moments(
 ) -> Iterator[tuple[float, int, int]]:
     """Yield release, path and number of votes of the moments with most votes that are apart."""
     # A level passed fast tells the moment better; before it moves, a chain tells hardly anything.
-    half = np.clip(slack / np.maximum(paths.speeds, 1e-9), _SHORTEST, _LONGEST)
+    half = np.clip(slack / np.maximum(paths.speeds, 1e-9), _SHORTEST, LONGEST)
     # The larger α, the sooner; a level that no path comes by is near no moment.
     soonest, latest = paths.times[:, -1], paths.times[:, 0]
-    near = pairs.times - soonest[pairs.expected] >= window[0] - _LONGEST
-    near &= pairs.times - latest[pairs.expected] <= window[1] + _LONGEST
+    near = pairs.times - soonest[pairs.expected] >= window[0] - LONGEST
+    near &= pairs.times - latest[pairs.expected] <= window[1] + LONGEST
     times, expected = pairs.times[near], pairs.expected[near]
     if times.size == 0:
         return
     times, expected = _densest(times, expected, soonest[expected], latest[expected])
-    first = float((times - latest[expected]).min()) - 2.0 * _LONGEST
-    last = float((times - soonest[expected]).max()) + 2.0 * _LONGEST
-    first, last = max(first, window[0] - _LONGEST), min(last, window[1] + _LONGEST)
+    first = float((times - latest[expected]).min()) - 2.0 * LONGEST
+    last = float((times - soonest[expected]).max()) + 2.0 * LONGEST
+    first, last = max(first, window[0] - LONGEST), min(last, window[1] + LONGEST)
     step = float(half.min()) / 2.0
     bins = int((last - first) / step) + 2
     votes = np.zeros((paths.alphas.size, bins + 1), dtype=np.int32)
@@ -288,7 +291,7 @@ def _peaks(
     best = votes.max(axis=1)
     most = int(best.max())
     fastest = float(paths.speeds.max())
-    apart = min(_PART / 2.0 * slack / fastest, _LONGEST)
+    apart = min(_PART / 2.0 * slack / fastest, LONGEST)
     moments = first + step * (np.arange(votes.shape[1]) + 0.5)
     yielded = 0
     while yielded < _KEPT:

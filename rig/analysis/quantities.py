@@ -43,7 +43,7 @@ SCALES = frozenset(
 def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
     """Return everything the scene lets one measure, by its JSON name."""
     return {
-        name: _measured(model, estimate, value, gradient)
+        name: measured(model, estimate, value, gradient)
         for name, (value, gradient) in measurands(model, estimate.x).items()
     }
 
@@ -54,7 +54,8 @@ def measurands(model: DropModel, x: Array) -> dict[str, Value]:
     return {name: value for name, value in found if value is not None}
 
 
-def _measured(model: DropModel, estimate: Estimate, value: float, gradient: Array) -> Measured:
+def measured(model: DropModel, estimate: Estimate, value: float, gradient: Array) -> Measured:
+    """Put a value and its uncertainty together, from its derivatives by all unknowns."""
     u, budget = uncertainty(estimate, gradient, model.unknowns.groups)
     degrees = effective_degrees(u, budget, {"edges": estimate.degrees})
     moved = estimate.covariance @ (gradient * estimate.sd)
@@ -90,7 +91,16 @@ def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str,
 
 
 def _gravity(model: DropModel, x: Array) -> Value | None:
-    """The acceleration of a chain that strikes nothing."""
+    """The acceleration of what falls and strikes nothing."""
+    return None if model.protocol.track is not None else _acceleration(model, x)
+
+
+def _track_acceleration(model: DropModel, x: Array) -> Value | None:
+    """The acceleration of what goes down a track."""
+    return None if model.protocol.track is None else _acceleration(model, x)
+
+
+def _acceleration(model: DropModel, x: Array) -> Value | None:
     if "impact" in model.records:
         return None
     gradient = np.zeros(x.size)
@@ -234,5 +244,6 @@ COMPUTED: dict[str, Callable[[DropModel, Array], Value | None]] = {
     "speed_strike_m_s": _speed_strike,
     "fall_time_s": _fall_time,
     "gravity_m_s2": _gravity,
+    "acceleration_m_s2": _track_acceleration,
 }
 """How each row of `rig.measurands` follows from the unknowns; `None` where the scene has none."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.gate_passages import gate_passages
 from rig.analysis.quantities import effective_degrees, measurands, stated_places
 from rig.analysis.result import Measured
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.analysis.gate_passages import GatePassage
     from rig.analysis.joint_fit import JointDrop, JointFit
 
     Array = NDArray[np.float64]
@@ -68,6 +70,13 @@ class Budgets:
             name: self._measured(drop, lines, value, gradient * drop.model.unknowns.sd)
             for name, (value, gradient) in measurands(drop.model, drop.x).items()
         }
+
+    def gates(self, drop: JointDrop) -> tuple[GatePassage, ...]:
+        """How one object passed each gate."""
+        lines, sd = (_groups(drop), _common(drop)), drop.model.unknowns.sd
+        return gate_passages(
+            drop, drop.x, lambda value, slopes: self._measured(drop, lines, value, slopes * sd)
+        )
 
     def _measured(
         self, drop: JointDrop, places: tuple[Places, Places], value: float, gradient: Array

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.edge_classes import UnmatchedEdge
+    from rig.analysis.gate_passages import GatePassage
     from rig.protocol.protocol import Run
     from rig.units import Quantity
 
@@ -140,6 +141,8 @@ class DropResult:
         Every edge that is missing or belongs to no rod, and why.
     limits
         The verdict that a rejected drop has by its limits.
+    gates
+        How one object passed each gate.
     last_passages
         Some of the quantities by themselves, see `rig.analysis.last_passages`.
     """
@@ -156,6 +159,7 @@ class DropResult:
     unmatched: tuple[UnmatchedEdge, ...] = ()
     limits: Verdict | None = None
     last_passages: Mapping[str, Measured] = field(default_factory=dict)
+    gates: tuple[GatePassage, ...] = ()
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
@@ -166,6 +170,8 @@ class DropResult:
             "impact_chain": self.run.impact,
         }
         found |= {name: value.json() for name, value in self.quantities.items()}
+        if self.gates:
+            found["gates"] = [one.json() for one in self.gates]
         found["edges"] = self.audit.json()
         if self.matches:
             found["causes"] = [edge.json() for edge in self.unmatched]

@@ -240,6 +240,7 @@ def _fit_jointly(
             found[n],
             audit=found[n].audit.after(drop.matched),
             quantities=budgets.measured(drop),
+            gates=budgets.gates(drop),
             matches=drop.rods,
             learned=True,
             unmatched=unmatched_edges(drop),

@@ -15,8 +15,9 @@ from rig.predictions import predicted_parts, predicted_run
 from rig.protocol.protocol import Condition
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from rig.analysis.gate_passages import GatePassage
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol, Run
     from rig.units import Quantity
@@ -41,6 +42,32 @@ COMMON = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
+class GateMeans:
+    """One object at one gate, over all runs in which that gate saw it.
+
+    Attributes
+    ----------
+    mean
+        Of each run's `GatePassage`.
+    n
+        Number of runs.
+    speed_sd, interval_sd
+        Standard deviations between runs, m/s and s; `None` for a single one.
+    """
+
+    mean: GatePassage
+    n: int
+    speed_sd: float | None
+    interval_sd: float | None
+
+    def json(self) -> dict[str, Any]:
+        """One member of ``gates`` of the summary."""
+        found: dict[str, Any] = {**self.mean.json(), "n": self.n}
+        more = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd}
+        return found | {name: sd for name, sd in more.items() if sd is not None}
+
+
+@dataclass(frozen=True, slots=True)
 class Incline:
     """One line of the summary.
 
@@ -56,6 +83,8 @@ class Incline:
         What of each prediction moves with what the measured value moves with.
     causes
         What of each mean's uncertainty all runs share, by line of the budget.
+    gates
+        How one object passed each gate, on average.
     """
 
     incline_deg: float
@@ -66,6 +95,7 @@ class Incline:
     impact_chain: str | None = None
     parts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     causes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    gates: tuple[GateMeans, ...] = ()
 
     @property
     def condition(self) -> Condition:
@@ -91,6 +121,8 @@ class Incline:
             for name, causes in self.causes.items()
             for cause, u in causes.items()
         ]
+        if self.gates:
+            found["gates"] = [one.json() for one in self.gates]
         found["predicted"] = {name: model.value for name, model in self.predicted.items()}
         found["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
         main, *others = self.means
@@ -145,7 +177,24 @@ def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
         protocol.condition(run).impact_chain,
         predicted_parts(protocol, run),
         {name: _causes(found) for name, found in values.items()},
+        tuple(_gate_means(results)),
     )
+
+
+def _gate_means(results: Sequence[DropResult]) -> Iterator[GateMeans]:
+    """Average what each gate saw, in the order of the object's way."""
+    by_channel: dict[int, list[GatePassage]] = {}
+    for one in (gate for result in results for gate in result.gates):
+        by_channel.setdefault(one.channel, []).append(one)
+    for runs in sorted(by_channel.values(), key=lambda each: -each[0].height_m):
+        speeds = [one.speed for one in runs]
+        since = [one.interval for one in runs if one.interval is not None]
+        at = replace(runs[0], speed=mean(speeds), interval=mean(since) if since else None)
+        yield GateMeans(at, len(runs), _scatter(speeds), _scatter(since))
+
+
+def _scatter(values: Sequence[Measured]) -> float | None:
+    return stdev(one.value for one in values) if len(values) > 1 else None
 
 
 def _causes(runs: Sequence[Measured]) -> dict[str, float]:

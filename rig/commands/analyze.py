@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.commands.output import print_results, progress
 from rig.errors import SessionError
 from rig.report.columns import aligned
-from rig.report.parts import effects_parts, prior_part, scatter_part
+from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
 from rig.results import keep, results
 from rig.session.store import Session
 
@@ -46,7 +46,8 @@ def main(arguments: Namespace) -> int:
     if not arguments.json:
         asked = [scatter_part(found.analysis.summary)] if arguments.scatter else []
         asked += [prior_part(more["prior_sensitivity"])] if arguments.priors else []
-        for part in (*asked, *effects_parts(found.analysis.effects)):
+        asked += [*gate_parts(found.analysis.summary), *effects_parts(found.analysis.effects)]
+        for part in asked:
             print("\n".join(["", part.heading, *aligned(part.columns, part.records)]))
         if "monte_carlo" in more:
             from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise

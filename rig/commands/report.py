@@ -14,7 +14,7 @@ from rig.films import read_films
 from rig.report.estimate import page_parts
 from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
-from rig.report.parts import effects_parts
+from rig.report.parts import effects_parts, gate_parts
 from rig.report.pictures import pictures
 from rig.report.remarks import remarks
 from rig.results import protocol_of, results
@@ -49,8 +49,9 @@ def main(arguments: Namespace) -> int:
             films=read_films(session.path) if session.simulated else None,
             sections=sections,
         )
-        effects = found.analysis.effects
-        parts = sections.make("The paired differences", lambda: list(effects_parts(effects))) or []
+        effects, summary = found.analysis.effects, found.analysis.summary
+        parts = sections.make("The table of gates", lambda: list(gate_parts(summary))) or []
+        parts += sections.make("The paired differences", lambda: list(effects_parts(effects))) or []
         estimated = sections.make(
             "The estimate of the impacts", lambda: _estimated(protocol, found.analysis)
         )

@@ -43,7 +43,7 @@ class _Described:
 
 
 def read_chains(
-    node: Node, faults: FieldFaults, *, seen_by_gates: bool
+    node: Node, faults: FieldFaults, *, seen_by_gates: bool, struck: bool
 ) -> dict[str, RodChain] | None:
     """Read the ``chains`` mapping.
 
@@ -55,6 +55,8 @@ def read_chains(
         Where problems go.
     seen_by_gates
         Whether light beams measure the rods, so that their diameters are needed.
+    struck
+        Whether there is a surface, which one rod alone does not strike.
 
     Returns
     -------
@@ -78,7 +80,7 @@ def read_chains(
         lenient = one.base is not None and built.get(one.base) is None
         section = Section(inherited, fields.join("chains", name), faults, CHAIN_KEYS,
                           lenient=lenient)  # fmt: skip
-        built[name] = _chain(name, section, seen_by_gates=seen_by_gates)
+        built[name] = _chain(name, section, seen_by_gates=seen_by_gates, struck=struck)
     result = {name: chain for name in entries if (chain := built.get(name)) is not None}
     return result if result and len(result) == len(entries) else None
 
@@ -155,12 +157,17 @@ def _displaced(own: Mapping, base: Mapping) -> set[str | None]:
     return gone
 
 
-def _chain(name: str, section: Section, *, seen_by_gates: bool) -> RodChain | None:
+def _chain(name: str, section: Section, *, seen_by_gates: bool, struck: bool) -> RodChain | None:
     """Build one chain from its fields."""
-    rods = read_rods(section, seen_by_gates=seen_by_gates)
+    rods = read_rods(section, seen_by_gates=seen_by_gates, struck=struck)
     spacing = section.take("spacing", read_spacing, Spacing())
-    if isinstance(section.values.get("spacing"), Sequence):
-        length: float | None = math.nan
+    length: float | None
+    if rods is not None and len(rods.diameters) == 1:
+        length = 0.0
+        for key in (key for key in ("length", "spacing") if key in section):
+            section.fault(key, "one rod alone has none; leave it out", at_key=True)
+    elif isinstance(section.values.get("spacing"), Sequence):
+        length = math.nan
         if "length" in section:
             section.fault("length", "the listed spacing says it; leave it out", at_key=True)
     else:
@@ -170,7 +177,9 @@ def _chain(name: str, section: Section, *, seen_by_gates: bool) -> RodChain | No
     inertia = section.take("inertia", fields.exact(INERTIA), UNIFORM_ROD_INERTIA)
     alpha = section.take("alpha", fields.quantity(ALPHA), Quantity(math.nan))
     gamma = section.take("gamma", fields.exact(GAMMA), math.nan)
-    position_u = section.take("position_uncertainty", fields.exact(UNCERTAINTY), 0.0003)
+    alone = length == 0.0  # and is where its drop says
+    usual = 0.0 if alone else 0.0003
+    position_u = section.take("position_uncertainty", fields.exact(UNCERTAINTY), usual)
     width_u = section.take("width_uncertainty", fields.exact(UNCERTAINTY), 0.0001)
     if rods is None or length is None or rod_length is None or tilt is None or spacing is None:
         return None

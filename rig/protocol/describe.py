@@ -15,7 +15,7 @@ from rig.units import Quantity, format_quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.protocol import Drag, Gate, Protocol, RodChain
+    from rig.protocol.protocol import Drag, Gate, InclinedTrack, Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
 
@@ -56,7 +56,9 @@ def _number(value: float, unit: str) -> str:
 def _scene(protocol: Protocol) -> list[str]:
     """Say what is there."""
     names = " and ".join(protocol.chains)
-    if protocol.surface is None:
+    if protocol.track is not None:
+        lines = [f"{names} goes down a track; nothing is struck"]
+    elif protocol.surface is None:
         lines = [f"free fall of {names}; nothing is struck"]
     elif protocol.two_chains:
         lines = [f"two chains, {names}: one strikes the surface, the other falls beside it"]
@@ -73,7 +75,10 @@ def _scene(protocol: Protocol) -> list[str]:
             pile = format_quantity(surface.pile.restitution, "1")
             text += f"; below {_number(surface.pile.below_deg, 'deg')} a pile, restitution {pile}"
         lines.append(text)
-    lines.append(f"gravity: {format_quantity(protocol.gravity, 'm/s^2')}")
+    if protocol.track is not None:
+        lines.append(_track(protocol.track))
+    pull = "gravity" if protocol.track is None else "acceleration without friction"
+    lines.append(f"{pull}: {format_quantity(protocol.gravity, 'm/s^2')}")
     if surface is not None or protocol.gates is not None:
         datum = "contact point" if surface is not None else "datum of the gates"
         lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {datum}")
@@ -82,6 +87,12 @@ def _scene(protocol: Protocol) -> list[str]:
     if protocol.drag is not None:
         lines.append(f"drag: {_drag(protocol.drag)}")
     return lines
+
+
+def _track(track: InclinedTrack) -> str:
+    """Say what an object goes down."""
+    rolls = f", rolling: I/(m r²) = {track.rolling_inertia:g}" if track.rolling_inertia else ""
+    return f"track: {format_quantity(track.incline_deg, 'deg')}{rolls}; heights are along it"
 
 
 def _drag(drag: Drag) -> str:
@@ -97,12 +108,15 @@ def _chain(rods: RodChain) -> str:
     """Describe one chain on one line."""
     chain = rods.chain
     text = f"{rods.name}: {chain.rods} rods, {_number(chain.length, 'mm')} long"
+    if chain.rods == 1:
+        text = f"{rods.name}: one object"
     thin, thick = min(rods.widths), max(rods.widths)
     if thick > 0:
+        word = "wide" if chain.rods > 1 else "long"
         span = f"{thin * 1e3:.1f}" if thin == thick else f"{thin * 1e3:.1f} to {thick * 1e3:.1f}"
-        text += f", {span} mm wide in the beam"
+        text += f", {span} mm {word} in the beam"
     pitches = [high - low for low, high in pairwise(chain.heights)]
-    if max(pitches) - min(pitches) > _EVEN:
+    if pitches and max(pitches) - min(pitches) > _EVEN:
         text += f", rods {min(pitches) * 1e3:.1f} to {max(pitches) * 1e3:.1f} mm apart"
     if rods.weighed:
         text += f", {_number(math.fsum(chain.masses), 'g')}"
@@ -130,10 +144,12 @@ def _gates(protocol: Protocol) -> list[str]:
         passing = _passing(protocol, gate)
         rods = []
         for name, number in passing.items():
+            if protocol.one_object:
+                continue
             total = protocol.chains[name].chain.rods
             rods.append(f"{name} {total - number + 1}–{total}")
         place = f"{gate.side:6}  channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm"
-        lines.append(f"{place}  rods {', '.join(rods)}")
+        lines.append(f"{place}  rods {', '.join(rods)}" if rods else place)
     if protocol.gates is not None and lines:
         height, datum = (
             _number(u, "mm") for u in (protocol.gates.height_u, protocol.gates.datum_u)
@@ -246,7 +262,8 @@ def _left_out(protocol: Protocol) -> list[str]:
     """Say what the scene does not have, and what is therefore not computed."""
     lines = []
     if protocol.surface is None:
-        lines.append("no surface: no impact, no Δz, no V; the drop measures gravity")
+        what = "gravity" if protocol.track is None else "the acceleration, friction and all"
+        lines.append(f"no surface: no impact, no Δz, no V; the drop measures {what}")
     else:
         if len(protocol.chains) == 1:
             lines.append("no second chain: no free fall beside it, no Δz and no release skew")

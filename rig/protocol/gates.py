@@ -121,6 +121,7 @@ def check_clear(
     lowest = max(width for chain in chains for width in chain.widths) / 2 if surface else 0.0
     top = min(drop.value + chain.chain.length for chain in chains)
     spans = [(low, high) for low, high, _, _ in blocked]
+    alone = chains[0].name if all(chain.chain.rods == 1 for chain in chains) else None
     for gate, place, key in located:
         height = gate.height
         hit = next((b for b in blocked if b[0] < height < b[1]), None)
@@ -133,12 +134,13 @@ def check_clear(
         elif hit is not None:
             near = " or ".join(_mm(h) for h in _clear(height, spans, lowest, top))
             free = f"; the nearest clear heights are {near}" if near else ""
-            message = f"found {_mm(height)}, which rod {hit[2]} of chain {hit[3]} blocks before "
+            rod = f"rod {hit[2]} of chain {hit[3]}" if alone is None else alone
+            message = f"found {_mm(height)}, which {rod} blocks before "
             faults.add(place, key, f"{message}the release{free}")
         elif height > top:
-            message = (
-                f"found {_mm(height)}; no rod passes above {_mm(top)}, where the top rod hangs"
-            )
+            what = "no rod passes" if alone is None else f"{alone} does not pass"
+            where = "the top rod hangs" if alone is None else "it begins"
+            message = f"found {_mm(height)}; {what} above {_mm(top)}, where {where}"
             faults.add(place, key, message)
 
 

@@ -7,7 +7,7 @@ empty, and every later stage leaves it out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import nan
+from math import cos, hypot, nan, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.units import Quantity
@@ -128,6 +128,30 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
+class InclinedTrack:
+    """What one object slides or rolls down.
+
+    Attributes
+    ----------
+    incline_deg
+        Of the track, degrees.
+    rolling_inertia
+        I/(m r²) of what rolls; 0 of what slides.
+    """
+
+    incline_deg: Quantity
+    rolling_inertia: float = 0.0
+
+    def along(self, gravity: Quantity) -> Quantity:
+        """Acceleration without friction, g sin θ/(1 + I/(m r²)), m/s²."""
+        slope = radians(self.incline_deg.value)
+        share = 1.0 / (1.0 + self.rolling_inertia)
+        by_slope = gravity.value * cos(slope) * radians(self.incline_deg.u)
+        u = share * hypot(sin(slope) * gravity.u, by_slope)
+        return Quantity(share * gravity.value * sin(slope), u)
+
+
+@dataclass(frozen=True, slots=True)
 class Drag:
     """Drag of the air, as the square of the speed.
 
@@ -210,8 +234,13 @@ class Protocol:
     ----------
     chains
         By name. One chain: a single-chain or free-fall scene. Two: the two-chain experiment.
+    gravity
+        What pulls along the way, m/s²: of what goes down a track only the share that its slope
+        leaves, see `InclinedTrack.along`.
     surface
         `None` where nothing is struck: the rig's calibration drop.
+    track
+        `None` of what falls; else all heights are lengths along the track.
     drop
         Height of the bottom rod's middle above the contact point (with no surface: above the
         datum of the gate heights) before release; `None` where no gates measure it.
@@ -236,6 +265,7 @@ class Protocol:
     gravity: Quantity
     drop: Quantity
     surface: Surface | None = None
+    track: InclinedTrack | None = None
     gates: Gates | None = None
     release: ReleasePulse = field(default_factory=ReleasePulse)
     plan: Plan = field(default_factory=Plan)
@@ -248,6 +278,11 @@ class Protocol:
     blind: bool = False
     text: str = ""
     source: str = ""
+
+    @property
+    def one_object(self) -> bool:
+        """Whether a single body passes the gates: a ball, a card, a glider."""
+        return all(rods.chain.rods == 1 for rods in self.chains.values())
 
     @property
     def two_chains(self) -> bool:

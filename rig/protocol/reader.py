@@ -17,6 +17,7 @@ from rig.protocol.protocol import (
     PPS_U,
     Accept,
     Contact,
+    InclinedTrack,
     Plan,
     Priors,
     Protocol,
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 1_000_000
 KEYS = (
-    "protocol", "title", "chains", "surface", "drop", "initial_speed", "gravity", "site", "drag",
-    "contact", "gates", "priors", "reference", "release", "plan", "accept", "blind", "notes",
+    "protocol", "title", "chains", "surface", "track", "drop", "initial_speed", "gravity", "site",
+    "drag", "contact", "gates", "priors", "reference", "release", "plan", "accept", "blind",
+    "notes",
 )  # fmt: skip
 DROP = Range(Dimension.LENGTH, 0.0, 100.0, "m")
 INITIAL_SPEED = Range(Dimension.SPEED, 0.0, 1000.0, "m/s")
@@ -44,6 +46,8 @@ CONTACT = Range(Dimension.LENGTH, -0.1, 0.1, "mm")
 GRAVITY = Range(Dimension.ACCELERATION, 1e-3, 1000.0, "m/s^2")
 LATITUDE = Range(Dimension.ANGLE, -90.0, 90.0, "deg")
 HEIGHT = Range(Dimension.LENGTH, -500.0, 9000.0, "m")
+INCLINE = Range(Dimension.ANGLE, 0.1, 90.0, "deg")
+ROLLING = Range(Dimension.NUMBER, 0.0, 1.0, "1")
 REFERENCE = Range(Dimension.NUMBER, 0.0, 1e-3, "ppm", open_low=True)
 
 
@@ -134,7 +138,11 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     top.take("notes", fields.string, "")
     gravity = _gravity(top)
     has_surface, has_gates = "surface" in top, "gates" in top
-    chains = top.take("chains", _chains(seen_by_gates=has_gates), required="{A: {rods: 25, …}}")
+    chains = top.take(
+        "chains",
+        _chains(seen_by_gates=has_gates, struck=has_surface),
+        required="{A: {rods: 25, …}}",
+    )
     count = _count(top.values.get("chains"))
     if not has_surface and count > 1:
         message = f"found {count} chains; a scene with no surface has one"
@@ -143,6 +151,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     example = "180 mm ± 2 mm" if has_surface or has_gates else ""
     drop = top.take("drop", fields.quantity(DROP), Quantity(0.0), required=example)
     start = top.take("initial_speed", fields.quantity(INITIAL_SPEED), AT_REST)
+    track = top.take("track", _track(chains, struck=has_surface))
     drag = _drag(top, chains) if "drag" in top else None
     contact = top.take("contact", _contact(struck=has_surface), Contact())
     reference = top.take("reference", fields.exact(REFERENCE), PPS_U)
@@ -159,9 +168,10 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     return Protocol(
         title=title,
         chains=chains,
-        gravity=gravity,
+        gravity=gravity if track is None else track.along(gravity),
         drop=drop,
         surface=surface,
+        track=track,
         gates=gates,
         release=release,
         plan=plan,
@@ -249,11 +259,30 @@ def _gates(top: Section, chains: dict[str, RodChain] | None, drop: Quantity | No
     return gates
 
 
-def _chains(*, seen_by_gates: bool) -> Converter[dict[str, RodChain]]:
+def _track(chains: dict[str, RodChain] | None, *, struck: bool) -> Converter[InclinedTrack]:
+    """Return the converter to what one object goes down."""
+
+    def convert(node: Node, key: str, faults: FieldFaults) -> InclinedTrack | None:
+        inner = fields.mapping(node, key, faults)
+        if inner is None:
+            return None
+        if struck or (chains is not None and any(c.chain.rods > 1 for c in chains.values())):
+            message = "only one object that strikes nothing goes down a track; leave it out"
+            faults.add(node.place, key, message)
+            return None
+        section = Section(inner, key, faults, ("incline", "rolling_inertia"))
+        incline = section.take("incline", fields.quantity(INCLINE), required="5 deg ± 0.1 deg")
+        rolling = section.take("rolling_inertia", fields.exact(ROLLING), 0.0)
+        return None if incline is None or rolling is None else InclinedTrack(incline, rolling)
+
+    return convert
+
+
+def _chains(*, seen_by_gates: bool, struck: bool) -> Converter[dict[str, RodChain]]:
     """Return the converter to the chains."""
 
     def convert(node: Node, _key: str, faults: FieldFaults) -> dict[str, RodChain] | None:
-        return read_chains(node, faults, seen_by_gates=seen_by_gates)
+        return read_chains(node, faults, seen_by_gates=seen_by_gates, struck=struck)
 
     return convert
 

@@ -40,11 +40,11 @@ class _Group:
     mass: float | None
 
 
-def read_rods(section: Section, *, seen_by_gates: bool) -> Rods | None:
+def read_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods | None:
     """Read ``rods``, and ``diameter`` and ``mass`` common to them, from a chain's section.
 
     Masses are those given, else proportional to the cross-section (like material) with the
-    bottom rod's as 1, else all 1.
+    bottom rod's as 1, else all 1. One rod alone is any object, which may fall and never strikes.
     """
     common = section.take("diameter", fields.exact(DIAMETER))
     each = section.take("mass", fields.exact(MASS))
@@ -54,8 +54,12 @@ def read_rods(section: Section, *, seen_by_gates: bool) -> Rods | None:
     if "mass" in section and each is None:
         return None
     total = sum(group.count for group in groups)
-    if not 2 <= total <= MOST_RODS:
-        section.fault("rods", f"found {total} rods; 2 to {MOST_RODS} are wanted")
+    if total > MOST_RODS:
+        section.fault("rods", f"found {total} rods; at most {MOST_RODS} are wanted")
+        return None
+    if total == 1 and struck:
+        message = "found 1 rod; a chain that strikes a surface has 2 or more"
+        section.fault("rods", f"{message}: leave surface out for one object that falls")
         return None
     weights = [each if group.mass is None else group.mass for group in groups]
     if len({mass is None for mass in weights}) > 1:
@@ -82,7 +86,7 @@ def _spread(values: list[float], counts: list[int]) -> tuple[float, ...]:
 def _groups(node: Node, key: str, faults: FieldFaults) -> list[_Group] | None:
     """Convert a number of rods, or a list of groups."""
     if isinstance(node, ScalarNode):
-        count = fields.whole(2, MOST_RODS)(node, key, faults)
+        count = fields.whole(1, MOST_RODS)(node, key, faults)
         return None if count is None else [_Group(count, None, None)]
     items: Sequence | None = fields.sequence(node, key, faults)
     if items is None:

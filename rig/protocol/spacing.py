@@ -64,6 +64,8 @@ def place_rods(
         Shape ``(rods,)``; `None` if there is a fault.
     """
     last = len(diameters) - 1
+    if last == 0:
+        return (0.0,)
     if spacing.rule == "listed":
         if len(spacing.gaps) != last:
             message = f"found {len(spacing.gaps)} distances; {last} are between {last + 1} rods"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rig.analysis.result import Audit
-from rig.measurands import GRAVITY, averaged, listed
+from rig.measurands import acceleration_in, averaged, listed
 from rig.report.numbers import MINUS, fixed, plus_minus, value_of
 from rig.text_table import text_table
 
@@ -39,7 +39,7 @@ def degrees(incline_deg: float) -> str:
 
 def summary_incline(line: Incline) -> str:
     """Write the inclination of a mean; nothing where nothing is struck, so nothing is inclined."""
-    return "" if GRAVITY.name in line.means else degrees(line.incline_deg)
+    return "" if acceleration_in(line.means) else degrees(line.incline_deg)
 
 
 def run_incline(one: DropResult) -> str:

@@ -7,7 +7,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, averaged
+from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
 from rig.report.bars import LABELS, bar
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
 from rig.report.numbers import fixed, value_of
@@ -149,11 +149,12 @@ def gravity_figure(
         SVG.
     """
     runs = sorted(analysis.runs, key=attrgetter("run.number"))
+    row = acceleration_in({name for one in runs for name in one.quantities}) or GRAVITY
     mean = None
     if analysis.summary:
-        mean = analysis.summary[0].means.get(GRAVITY.name)
+        mean = analysis.summary[0].means.get(row.name)
         if site_m_s2 is None:
-            site_m_s2 = value_of(analysis.summary[0].predicted.get(GRAVITY.name))
+            site_m_s2 = value_of(analysis.summary[0].predicted.get(row.name))
     with canvas((3.2,), simulated=simulated) as drawing:
         (axes,) = drawing.axes
         if mean is not None:
@@ -167,14 +168,15 @@ def gravity_figure(
             )
             axes.axhline(mean.value, color=MODEL, label="mean of runs")
         if site_m_s2 is not None:
+            expected = "site" if row is GRAVITY else "without friction"
             axes.axhline(
                 site_m_s2,
                 color=SECOND,
                 linestyle=(0, (5, 2.5)),
-                label=f"site, {fixed(site_m_s2, GRAVITY.decimals)} {GRAVITY.unit}",
+                label=f"{expected}, {fixed(site_m_s2, row.decimals)} {row.unit}",
             )
-        run_points(axes, runs, GRAVITY)
-        axes.set_ylabel(GRAVITY.axis)
+        run_points(axes, runs, row)
+        axes.set_ylabel(row.axis)
         axes.ticklabel_format(axis="y", useOffset=False)
         legend_above(axes)
         run_axis(axes)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.pairs import Effects
     from rig.analysis.result import Measured
-    from rig.analysis.summary import Incline
+    from rig.analysis.summary import GateMeans, Incline
     from rig.measurands import Measurand
 
 _SCATTER: tuple[Column[Mapping[str, str]], ...] = (
@@ -65,6 +65,29 @@ def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
             tuple(_effect_columns()),
             effects,
         )
+
+
+_GATES: tuple[Column[GateMeans], ...] = (
+    Column("channel", lambda one: str(one.mean.channel)),
+    Column("height (mm)", lambda one: fixed(one.mean.height_m * 1e3, 1)),
+    Column("n", lambda one: str(one.n)),
+    Column("speed ± U (m/s)", lambda one: plus_minus(one.mean.speed, 1.0)),
+    Column("SD (mm/s)", lambda one: _scaled(one.speed_sd)),
+    Column("since the gate before ± U (ms)", lambda one: plus_minus(one.mean.interval, 1e3)),
+    Column("SD (ms)", lambda one: _scaled(one.interval_sd)),
+)
+
+
+def gate_parts(summary: Sequence[Incline]) -> Iterator[Part]:
+    """Yield the section on what each gate saw of one object, where there is one."""
+    for line in summary:
+        if line.gates:
+            said = "Speed and time as the object's middle passes each beam, averaged over the runs."
+            yield Part("Gate by gate", [said], _GATES, line.gates)
+
+
+def _scaled(value: float | None) -> str:
+    return "" if value is None else fixed(value * 1e3, 3)
 
 
 def _effect_columns() -> Iterator[Column[Effects]]:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.measurands import GRAVITY, SEPARATION, SPEED
+from rig.measurands import SEPARATION, SPEED, acceleration_in
 from rig.report.embed import PageFigure
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.film import film_figure
@@ -73,12 +73,12 @@ def pictures(
                 "Every run in the order of execution. Bars are expanded uncertainties (95 %).",
             )
         )
-    if GRAVITY.name in measured:
+    if acceleration_in(measured):
         drawn.append(
             (
                 lambda: gravity_figure(analysis, simulated, site_m_s2),
                 "Acceleration of each run",
-                "Acceleration in free fall, run by run. Bars are expanded uncertainties (95 %).",
+                "Acceleration, run by run. Bars are expanded uncertainties (95 %).",
             )
         )
     for one in analysis.runs:

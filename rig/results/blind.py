@@ -48,6 +48,8 @@ def veiled_drop(result: DropResult) -> DropResult:
         quantities={name: result.quantities[name] for name in told},
         matches={},
         unmatched=(),
+        last_passages={},
+        gates=(),
         learned=False,
     )
 

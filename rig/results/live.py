@@ -250,7 +250,7 @@ class LiveAnalysis:
         known = self._known.get(job)
         if known is None or abs(known.hz / scale.hz - 1.0) > _SAME_SCALE:
             result, fit = fit_drop(protocol, run, drop, scale, known=self.identified)
-            falls = result.verdict in GOOD and protocol.drag is None
+            falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)
         self.done = len(self._known)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rig.session.reading import Reader
 
-_LISTS = ("budget", "causes")  # of objects, for which a cell has no room
+_LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
 _UNITS = {
     "_deg": "degrees",
     "_m_s2": "m/s²",
@@ -37,6 +37,8 @@ _MEANINGS = {
     "normalized_error": "difference from the prediction over its expanded uncertainty; within ±1 "
     "they agree",
     "channel": "gate",
+    "height_m": "of the gate's beam",
+    "interval_s": "since the object passed the gate before",
     "time_s": "time since the release (imported edges: since a whole second)",
     "state": "of the run; in edges.csv 1 is a blocked beam, 0 a clear one",
     "tick": "device clock, 32 bits",
@@ -61,8 +63,8 @@ def export_csv(
 ) -> None:
     """Write ``runs.csv``, ``summary.csv``, ``edges.csv``, ``states.csv``, ``pings.csv``, a README.
 
-    Columns are those the scene has; ``edges.csv`` is in the import format. Each file is replaced
-    as a whole.
+    Columns are those the scene has; ``edges.csv`` is in the import format. Of one object there is
+    ``gates.csv`` too. Each file is replaced as a whole.
 
     Parameters
     ----------
@@ -102,6 +104,13 @@ def export_csv(
         ],
         "pings.csv": [ping._asdict() for ping in session.pings()],
     }
+    gates = [
+        {"run": run["run"], "attempt": run["attempt"], **flatten(gate)}
+        for run in latest
+        for gate in run.get("gates", ())
+    ]
+    if gates:
+        tables["gates.csv"] = gates
     for name, rows in tables.items():
         write_atomic(place / name, csv_text(_columns(rows), rows))
     write_edges(place / "edges.csv", session.latest_drops(), tick_hz)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.measurands import GRAVITY, RELEASE_SKEW, averaged
+from rig.measurands import RELEASE_SKEW, acceleration_in, averaged
 from rig.records import Job
 from rig.tui.motion import motions, separation
 from rig.tui.plotting import Picture, Series
@@ -231,7 +231,8 @@ def control_pictures(view: SessionView) -> list[Picture]:
     points = [(one, _gravity(view, one)) for one in runs]
     if view.gravity or any(point for _, point in points):
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
-        found.append(_chart("g of the free chain (m/s²)", view, expected, points))
+        what = "g of the free chain" if view.protocol.track is None else "a down the track"
+        found.append(_chart(f"{what} (m/s²)", view, expected, points))
     return found
 
 
@@ -242,6 +243,8 @@ def meaning(label: str) -> str:
             "skew: how much later the free chain left; beyond the limit a drop is void; "
             "a drift says that a release wears"
         )
+    if label.startswith("a "):
+        return "a: acceleration down the track, friction and all, beside that without friction"
     return (
         "g: gravity by each free chain; bars that keep off the protocol's mean wrong heights, "
         "clock or side"
@@ -254,8 +257,9 @@ def _point(measured: Measured | None, scale: float = 1.0) -> tuple[float, float]
 
 
 def _gravity(view: SessionView, one: DropResult) -> tuple[float, float] | None:
+    row = acceleration_in(one.quantities)
     seen = view.gravity.get(Job(one.run.number, one.attempt))
-    return _point(one.quantities.get(GRAVITY.name, seen))
+    return _point(seen if row is None else one.quantities[row.name])
 
 
 def _chart(

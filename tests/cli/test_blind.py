@@ -26,6 +26,7 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(tmp_path)
         assert run["verdict"] == "accepted"
         assert "separation_m" not in run
         assert "speed_m_s" not in run
+        assert "last_passages" not in run
         assert "release_skew_s" in run
     assert not door.open(session).analyze().runs[0].quantities.keys() - {"release_skew_s"}
     report = rig("report", session, "-o", page)

@@ -30,7 +30,11 @@ ENDLESS = GOOD.replace("drop: 180 mm ± 2 mm", "drop: 100 m").replace("9.81 m/s^
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
 def test_ordinary_drops_are_recorded_as_ever(path):
-    assert record_ms(read(path)) == LEAST_RECORD_MS == 1500
+    protocol = read(path)
+    if protocol.track is None:  # down a gentle slope it takes longer
+        assert record_ms(protocol) == LEAST_RECORD_MS == 1500
+    else:
+        assert longest_fall(protocol) * 1e3 < record_ms(protocol)
 
 
 @pytest.mark.parametrize("text", [LONG, SLOW])

@@ -88,7 +88,7 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
         ("title: on", "titel: on", "f:2:1: titel: unknown key; did you mean title?"),
         ("title: on", "title: true", "f:2:8: title: found true, which is a boolean"),
         ("title: on", "title: a\ntitle: b", "f:3:1: title: repeated key, first given on line 2"),
-        ("rods: 25", "rods: 1", "f:4:13: chains.A.rods: found 1; a whole number from 2 to"),
+        ("rods: 25", "rods: 1", "f:4:13: chains.A.rods: found 1 rod; a chain that strikes"),
         ("rods: 25, ", "", "f:4:6: chains.A.rods: missing"),
         ("1165 mm", "1165", "f:4:25: chains.A.length: found '1165' without a unit"),
         ("1165 mm", "1165 ± 1 mm", "f:4:25: chains.A.length: found '1165 ± 1 mm'; no uncert"),

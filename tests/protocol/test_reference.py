@@ -38,14 +38,14 @@ def around(path: str) -> dict:
     chain |= {"diameter": "12.7 mm", "rod_length": "100 mm"}
     if path.startswith(("surface", "contact", "gates.impact", "plan.incline")):
         data["surface"] = {"restitution": 0.5}
+    if path.startswith("track"):
+        data["chains"] = {"A": {"rods": 1}}
+        data["track"] = {"incline": "3 deg"}
     if path.startswith("surface.pile"):
         data["surface"]["pile"] = {"below": "30 deg", "restitution": -0.37}
-    if path.startswith("plan.order"):
+    if path.startswith("plan.order") or path.endswith(".like"):
         data["surface"] = {"restitution": 0.5}
-        data["chains"]["B"] = {"like": "A"}
-    if path.endswith(".like"):
-        data["surface"] = {"restitution": 0.5}
-        data["chains"]["B"] = {}
+        data["chains"]["B"] = {} if path.endswith(".like") else {"like": "A"}
     if path.startswith("drag"):
         chain["mass"] = "14 g"
         data["drag"] = {} if "terminal" in path else {"coefficient": 1.1}

@@ -98,6 +98,8 @@ def scene(seed: int, drops: int = 4) -> Scene:
     """
     chance = random.Random(f"scene {seed}")
     kind = chance.choices(("fence", "single", "two", "predicted"), (3, 4, 6, 1))[0]
+    if kind == "fence" and seed % 3 == 0:  # and nothing else is drawn of other scenes
+        kind = "object"
     text = _scene(chance, kind, drops)
     if kind != "predicted":
         text = _with_gates(chance, text)
@@ -110,9 +112,14 @@ def _scene(chance: random.Random, kind: str, drops: int) -> str:
     lines = ["protocol: 1", *([f'title: "{title}"'] if title else [])]
     rods = chance.choices((2, 3, 4, 5, 8, 12, 25, 40, 60), (8, 8, 8, 8, 8, 8, 6, 1, 1))[0]
     two = kind == "two" or (kind == "predicted" and chance.random() < 0.5)
-    given = kind != "fence" and chance.random() < 0.2
-    lines += ["chains:", *_chains(chance, rods, two=two, given=given)]
-    if kind != "fence":
+    struck = kind not in {"fence", "object"}
+    given = struck and chance.random() < 0.2
+    if kind == "object":
+        lines += ["chains:", f"  ball: {{rods: 1, diameter: {chance.choice((5, 12, 25))} mm}}"]
+        lines += chance.choice(([], ["track: {incline: 12 deg ± 0.2 deg, rolling_inertia: 0.4}"]))
+    else:
+        lines += ["chains:", *_chains(chance, rods, two=two, given=given)]
+    if struck:
         bare = given and chance.random() < 0.5
         lines.append(f"surface: {'{}' if bare else chance.choice(SURFACES)}")
     drop = chance.choice((30, 60, 180, 400, 900))
@@ -178,7 +185,7 @@ def _unlike(
 
 def _plan(chance: random.Random, kind: str, drops: int, *, two: bool) -> list[str]:
     """The plan's keys."""
-    inclines = "" if kind == "fence" else chance.choice(INCLINES)
+    inclines = "" if kind in {"fence", "object"} else chance.choice(INCLINES)
     found = [f"incline: {inclines}"] if inclines else []
     repeats = [n for n in (1, 2, 3, 4, 6, 8) if n * (inclines.count(",") + 1) <= drops]
     found.append(f"repeats: {chance.choice(repeats)}")

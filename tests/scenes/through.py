@@ -24,7 +24,7 @@ LONGEST_S = 60.0
 """Processor time of one command, far beyond what any of them needs."""
 DONE, BAD_INPUT, VOID = 0, 2, 3
 QUANTITIES = ("separation_m", "separation_raw_m", "separation_strike_m", "speed_m_s",
-              "release_skew_s", "gravity_m_s2")  # fmt: skip
+              "release_skew_s", "gravity_m_s2", "acceleration_m_s2")  # fmt: skip
 _NO_NUMBER = re.compile(r"(?<![\w.])[-−+]?(?:nan|NaN|inf|Infinity|None)(?!\w)")
 _EXPONENT = re.compile(r"±\s*[\d.]+e[+-]?\d+")
 _PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous")
@@ -47,7 +47,9 @@ def lacking(scene: Scene) -> tuple[str, ...]:
     """Words of what a scene does not have."""
     surface = scene.protocol.surface
     if surface is None:
-        return (*_PAIR, *_IMPACT, "pile")
+        words = (*_PAIR, *_IMPACT, "pile")
+        of_tracks = () if scene.protocol.track is None else ("inclin", "friction")
+        return tuple(word for word in words if word not in of_tracks)
     words = () if scene.protocol.two_chains else (*_PAIR, "free side", "free chain")
     if all(rods.chain.alpha is not None for rods in scene.protocol.chains.values()):
         return (*words, "restitution", "friction", "pile")

@@ -97,6 +97,11 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
             limit = view.protocol.accept.release_skew * row.scale
             line += f"{f'limit ±{limit:g}':>16}"
         lines.append(Content(line))
+    for one in result.gates:
+        line = f"{f'at gate {one.channel}':15}{plus_minus(one.speed, 1.0):>20} m/s "
+        if wide and one.interval is not None:
+            line += f"{plus_minus(one.interval, 1e3):>16} ms since the gate before"
+        lines.append(Content(line))
     counts = " · ".join(f"{kind} {count}" for kind, count in result.audit.json().items())
     lines.append(Content(f"{'edges':15}{counts}"))
     return Content("\n").join(lines)
