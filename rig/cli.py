@@ -134,6 +134,37 @@ def _parser() -> Parser:
         added.set_defaults(module=module or name)
         return added
 
+    demo = command("demo", "drop chains in simulation, and compare with the truth it hides")
+    demo.add_argument("-o", "--output", metavar="DIR", help="folder for all files (default: out/…)")
+    demo.add_argument(
+        "--repeats", type=_count, default=1, metavar="N", help="drops at each incline (default 1)"
+    )
+    demo.add_argument(
+        "--seed", type=_seed, default=1, metavar="N", help="of the chains (default 1)"
+    )
+    demo.add_argument("--open", action="store_true", help="show the report in a browser anyway")
+
+    new = command("new", "write a protocol from a few answers, draw it, and try it")
+    new.add_argument("output", metavar="FILE.yaml", help="the new protocol")
+    new.add_argument(
+        "--scene",
+        choices=("two-chains", "one-chain", "object", "track", "picket-fence"),
+        help="what falls; an object is a ball, a card, a cylinder",
+    )
+    new.add_argument("--board", choices=(*BOARDS, "other"), help="the timer")
+    new.add_argument("--gates", metavar="N", help="how many photogates there are")
+    new.add_argument("--rods", metavar="N", help="of a chain, or bars of a fence")
+    new.add_argument("--length", metavar="L", help='of a chain or a fence, as "1165 mm"')
+    new.add_argument("--diameter", metavar="D", help="of a rod; of an object its length in a beam")
+    new.add_argument("--aim", choices=("separation", "coefficients"), help="what is to be learned")
+    new.add_argument("--incline", metavar="A", help='of board or track, as "40 deg, 60 deg"')
+    new.add_argument("--drop", metavar="H", help='as "180 mm ± 2 mm"')
+    new.add_argument("--repeats", metavar="N", help="drops of a kind")
+    new.add_argument("--title", metavar="TEXT", help="of the protocol (default: the file's name)")
+    new.add_argument(
+        "--yes", action="store_true", help="ask nothing: the usual answer for the rest"
+    )
+
     run = command("run", "carry out a protocol, or what is left of it")
     _protocol(run)
     run.add_argument("--port", required=True, help="device path or URL; sim:// needs no hardware")

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 GROUPS: dict[str, tuple[str, ...]] = {
+    "The first minutes": ("demo", "new"),
     "Before a session": ("check", "predict", "design", "sweep"),
     "The board": ("ports", "flash", "selftest", "doctor"),
     "A session": ("run", "tui", "daemon", "import"),
@@ -19,6 +20,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
 """Every command, in the order in which they are met."""
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
+    "new": ("rig new my-ball.yaml",
+            'rig new my-chains.yaml --scene two-chains --board mega --gates 8 --yes'),
+    "demo": ("rig demo", "rig demo --repeats 12 -o my-demo"),
     "check": ("rig check protocols/inclined-uniform.yaml", "rig check --keys"),
     "predict": ("rig predict protocols/graded-chain.yaml", "rig predict --figure 3 -o figure.svg"),
     "design": (

@@ -28,7 +28,10 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
         "measure the gates from the contact point, not from the board, and write that",
     ),
     ("post is .* (higher|lower)", "measure that post's zero against the other post's"),
-    ("chains hang .* (higher|lower)", "measure the drop again and write it into the protocol"),
+    (
+        "(chains hang|it begins) .* (higher|lower)",
+        "measure the drop again and write it into the protocol",
+    ),
     ("clock is", "say how well the timer's clock is known, or compare it: rig import --help"),
     ("gravity is", "look up gravity for your latitude and height: site: in the protocol"),
     ("air speeds up", _COMPARE),

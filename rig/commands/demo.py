@@ -1,0 +1,112 @@
+"""``rig demo``: a small session in simulation, and its results beside the truth that it hides."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from argparse import Namespace
+from datetime import UTC, datetime
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.result import GOOD
+from rig.commands import report
+from rig.commands.output import VOID, say
+from rig.files import make_folder, write_atomic
+from rig.measurands import averaged
+from rig.ports import truth_file
+from rig.protocol.reader import parse
+from rig.ready import ready_protocol
+from rig.recorder.interrupts import Interrupts
+from rig.report.columns import Column, aligned
+from rig.report.numbers import fixed, plus_minus
+from rig.runner import Operator, run_protocol
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rig.analysis.session import Analysis
+
+_PROTOCOL = "inclined-uniform"
+_REPEATS = "repeats: 12 "
+
+
+def main(arguments: Namespace) -> int:
+    """Drop the paper's chains in simulation, and say how well the truth was found."""
+    folder = make_folder(arguments.output or f"out/demo-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+    protocol, session = (folder / f"{_PROTOCOL}.{end}" for end in ("yaml", "session"))
+    text = ready_protocol(_PROTOCOL).read_text("utf-8")
+    assert _REPEATS in text
+    text = text.replace(_REPEATS, f"repeats: {arguments.repeats} ")
+    inclines = len(parse(text).plan.inclines)
+    write_atomic(protocol, text)
+    say(f"{inclines * arguments.repeats} drops of two chains, {arguments.repeats} at each incline")
+    interrupts = Interrupts()
+    with interrupts.caught():
+        found = run_protocol(
+            str(protocol), "sim://", str(session), Operator(say), arguments.seed, interrupts
+        )
+    print("SIMULATED DATA")
+    print("\n".join(beside_truth(found.analysis, session)))
+    page = folder / "report.html"
+    code = report.main(
+        Namespace(session=str(session), output=str(page), figures=str(folder), bars="U95")
+    )
+    if arguments.open or _has_screen():
+        import webbrowser  # noqa: PLC0415 - only where somebody looks
+
+        webbrowser.open(page.absolute().as_uri())
+    say(f"go on with it: rig tui --session {session}; or with your own: rig check {protocol}")
+    return code or (VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0)
+
+
+def beside_truth(analysis: Analysis, session: Path) -> list[str]:
+    """Write what each good drop measured beside what really happened.
+
+    Parameters
+    ----------
+    session
+        Of a simulation, which keeps its truth beside it.
+
+    Returns
+    -------
+    list of str
+        A table, and how many intervals hold the truth.
+    """
+    truths: dict[tuple[int, int], dict[str, Any]] = {}
+    for line in truth_file(session).read_text("utf-8").splitlines():
+        one = json.loads(line)
+        truths[one["run"], one["attempt"]] = one
+    rows: list[dict[str, str]] = []
+    held = of = 0
+    measured = [row for row in averaged() if any(row.name in r.quantities for r in analysis.runs)]
+    for result in analysis.runs:
+        true = truths.get((result.run.number, result.attempt))
+        if true is None or result.verdict not in GOOD:
+            continue
+        cells = {"incline (°)": f"{result.run.incline_deg:g}"}
+        for row in measured:
+            value, hidden = result.quantities.get(row.name), true.get(row.name)
+            if value is None or hidden is None:
+                continue
+            cells[f"{row.symbol} ± U ({row.unit})"] = plus_minus(value, row.scale, row.decimals)
+            cells[f"true {row.symbol}"] = fixed(hidden * row.scale, row.decimals)
+            of += 1
+            held += abs(value.value - hidden) <= value.expanded
+        rows.append(cells)
+    rows.sort(key=lambda cells: float(cells["incline (°)"]))
+    if not rows:
+        return ["no drop was good, so there is nothing to compare"]
+    headings = max(rows, key=len)
+    columns = [Column(name, itemgetter(name)) for name in headings]
+    return [
+        *aligned(columns, [dict.fromkeys(headings, "") | cells for cells in rows]),
+        f"{held} of {of} results hold the hidden truth within ± U, which is meant to hold 95 %",
+    ]
+
+
+def _has_screen() -> bool:
+    """Whether a page can be shown to somebody: a browser in a terminal would be in the way."""
+    shown = sys.platform == "darwin" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+    return sys.stdout.isatty() and bool(shown)

@@ -1,0 +1,210 @@
+"""A protocol file written from a few answers, with comments, and gates where they can be read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
+
+from rig.errors import InputError
+from rig.protocol.reader import parse
+
+if TYPE_CHECKING:
+    from rig.protocol.protocol import Protocol, Side
+
+Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
+SCENES: dict[Scene, str] = {
+    "two-chains": "two like chains, one strikes a board: separation and end speed",
+    "one-chain": "one chain strikes a board: end speed",
+    "object": "one object falls freely: gravity",
+    "track": "one object goes down a track: acceleration",
+    "picket-fence": "bars fall freely: gravity",
+}
+STRUCK: tuple[Scene, ...] = ("two-chains", "one-chain")
+
+# Lowest first in importance: of the end speed first, then where the chain is before anything
+# strikes. Each is a height in m that is meant, and the share of the free way that it may take.
+_LOW: dict[Side, tuple[tuple[float, float], ...]] = {
+    "impact": ((0.025, 0.11), (0.070, 0.38), (0.130, 0.75), (0.045, 0.22)),
+    "free": ((0.020, 0.08), (0.080, 0.44), (0.150, 0.87), (0.110, 0.62)),
+}
+_HIGH = (0.02, 0.15, 0.5, 0.9, 0.3, 0.7, 0.08, 0.4, 0.6, 0.8, 0.22, 0.98)
+"""Shares of the length near which gates between hanging rods are put, in order of importance."""
+_CLEAR = 1.5e-3
+_FIRST = 0.06  # share of its way after which one object is first seen
+_LAST = 0.1  # of the drop, the lowest gate
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What somebody has and wants, as written in a protocol file.
+
+    Attributes
+    ----------
+    rods, length, diameter
+        Of a chain or a picket fence; of one object the last alone, its length in a beam.
+    inclines
+        Of the board, or the one of the track.
+    gates
+        How many there are.
+    """
+
+    title: str
+    scene: Scene
+    gates: int
+    rods: int
+    length: str
+    diameter: str
+    drop: str
+    inclines: str
+    repeats: int
+
+    def trial(self) -> Draft:
+        """Return the same with four drops, at the incline that stands in the middle."""
+        found = [one.strip() for one in self.inclines.split(",") if one.strip()]
+        return replace(self, inclines=found[len(found) // 2] if found else "", repeats=4)
+
+
+def draft_text(draft: Draft) -> str:
+    """Write the protocol.
+
+    Raises
+    ------
+    InputError
+        Where no protocol can be made of these answers: with what is wrong with each.
+    """
+    without = "\n".join(_lines(draft, ["gates: {}"]))
+    try:
+        bare = parse(without.replace("gates: {}\n", ""), draft.title)
+    except InputError as error:
+        found = [f"{one.key}: {one.message}" for one in error.problems]
+        raise InputError("; ".join(found) or str(error), "rig new --help") from None
+    text = "\n".join(_lines(draft, _gates(bare, draft))) + "\n"
+    parse(text, draft.title)
+    return text
+
+
+def _lines(draft: Draft, gates: list[str]) -> list[str]:
+    struck = draft.scene in STRUCK
+    lines = [
+        "# Written by rig new. Put in what you measured; rig check FILE says what follows from it.",
+        "# A quantity may have its standard uncertainty: 180 mm ± 2 mm.",
+        "protocol: 1",
+        f"title: {json.dumps(draft.title, ensure_ascii=False)}",
+        "",
+        *_chains(draft),
+        "",
+    ]
+    if struck:
+        lines += [
+            "surface:                 # guesses, until rig estimate has found them",
+            "  restitution: 0.50 ± 0.10",
+            "  friction: 0.20 ± 0.10",
+            "",
+        ]
+    if draft.scene == "track":
+        lines += [
+            f"track: {{incline: {draft.inclines}}}   # rolling_inertia: 0.4 if a ball rolls",
+            "# Gates and drop are lengths along the track, above any mark below them.",
+        ]
+    else:
+        where = "above the contact point" if struck else "above any level below the gates"
+        lines.append(f"# Heights are {where}; the drop is that of the lowest rod's middle.")
+    lines += [
+        f"drop: {draft.drop}",
+        "gravity: 9.81 m/s^2      # or  site: {latitude: 50 deg, height: 100 m}",
+        "",
+        *gates,
+        "",
+        "release: {channel: 0, pulse: 80 ms}",
+    ]
+    if not struck:
+        lines += [
+            "# What the air takes is an unknown too, unless you know it: m g = C ρ A v²/2 tells v.",
+            "# drag: {terminal_speed: 60 m/s ± 6 m/s}   # a steel ball of 20 mm",
+        ]
+    incline = f"incline: [{draft.inclines}], " if struck else ""
+    order = ", order: ABBA" if draft.scene == "two-chains" else ""
+    lines += [
+        f"plan: {{{incline}repeats: {draft.repeats}{order}, settle: 10 s}}",
+        "# Limits for a valid drop, fixed before any result is seen; of few edges one is much.",
+        f"accept: {{missed_edges: {5 if struck else 15} %}}",
+    ]
+    return lines
+
+
+def _chains(draft: Draft) -> list[str]:
+    if draft.scene in {"object", "track"}:
+        return ["chains:", f"  body: {{rods: 1, diameter: {draft.diameter}}}  # length in a beam"]
+    rods = f"rods: {draft.rods}, length: {draft.length}, diameter: {draft.diameter}"
+    lines = ["chains:                  # length: middle of the lowest rod to that of the highest"]
+    if draft.scene == "picket-fence":
+        return [*lines, f"  fence: {{{rods}, position_uncertainty: 0.1 mm}}"]  # they are printed
+    lines.append(f"  A: {{{rods}}}")
+    return [*lines, "  B: {like: A}"] if draft.scene == "two-chains" else lines
+
+
+def _gates(protocol: Protocol, draft: Draft) -> list[str]:
+    """Put the gates where hanging rods leave their beams clear."""
+    sides = _shared_out(draft)
+    lines, channel = ["gates:"], 0
+    for side, number in sides.items():
+        heights = _struck(protocol, side, number) if protocol.surface else _even(protocol, number)
+        lines.append(f"  {side}:")
+        for height in sorted(heights):
+            lines.append(f"    - {{channel: {channel}, height: {height * 1e3:.1f} mm}}")
+            channel += 1
+    lines.append("  height_uncertainty: 0.5 mm   # of each beam above its post's zero")
+    return lines
+
+
+def _shared_out(draft: Draft) -> dict[Side, int]:
+    """How many gates each side gets: of few, most where the free chain is seen."""
+    if draft.scene == "one-chain":
+        return {"impact": draft.gates}
+    if draft.scene != "two-chains":
+        return {"free": draft.gates}
+    if draft.gates < 2:
+        raise InputError("two chains need two gates, one on each side", "take one-chain for one")
+    impact = 1 if draft.gates < 5 else draft.gates // 2
+    return {"impact": impact, "free": draft.gates - impact}
+
+
+def _struck(protocol: Protocol, side: Side, number: int) -> list[float]:
+    """Low gates for the end, and some between hanging rods for the beginning."""
+    (rods, *_), drop = protocol.chains.values(), protocol.drop
+    half = max(rods.widths) / 2.0
+    lowest, below = half + _CLEAR, drop.value - half - max(_CLEAR, drop.u)
+    found = [
+        max(lowest, min(meant, lowest + share * (below - lowest))) for meant, share in _LOW[side]
+    ][:number]
+    gaps = [
+        drop.value + (low + high) / 2.0
+        for low, high in pairwise(rods.chain.heights)
+        if high - low > 2.0 * (half + max(_CLEAR, drop.u))
+    ]
+    for share in _HIGH:
+        if len(found) == number or not gaps:
+            break
+        wanted = drop.value + share * rods.chain.length
+        gap = min(gaps, key=lambda one, wanted=wanted: abs(one - wanted))  # type: ignore[misc]
+        gaps.remove(gap)
+        found.append(gap)
+    if len(found) < number:
+        raise InputError(
+            f"there is no place for {number} gates on one side of such a chain",
+            f"take {len(found)} a side, a longer drop or thinner rods",
+        )
+    return found
+
+
+def _even(protocol: Protocol, number: int) -> list[float]:
+    """Evenly from just below where it begins down to near the lowest level."""
+    (body,), drop = protocol.chains.values(), protocol.drop
+    clear = max(body.widths) / 2.0 + max(_CLEAR, drop.u)
+    first = drop.value - max(clear + _CLEAR, _FIRST * drop.value)
+    last = _LAST * drop.value
+    if number == 1:
+        return [last]
+    return [first + (last - first) * n / (number - 1) for n in range(number)]

@@ -1,0 +1,99 @@
+"""``rig new``: answers become a protocol that is read, drawn and tried."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from rig.protocol.draft import SCENES, Draft, draft_text
+from rig.protocol.measurable import check_recordable
+from rig.protocol.reader import parse, read
+
+
+def drafted(scene, gates, **changes):
+    body, fence = scene in {"object", "track"}, scene == "picket-fence"
+    usual = {
+        "rods": 1 if body else 8 if fence else 25,
+        "length": "350 mm" if fence else "1165 mm",
+        "diameter": "20 mm" if body else "25 mm" if fence else "12.7 mm",
+        "drop": "400 mm ± 2 mm" if fence else "900 mm" if body else "180 mm ± 2 mm",
+        "inclines": "3 deg" if scene == "track" else "40 deg, 60 deg",
+        "repeats": 8,
+    }
+    return Draft(f'What "{scene}" says', scene, gates, **(usual | changes))
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("gates", [2, 3, 4, 6, 12])
+def test_any_number_of_gates_finds_a_place(scene, gates):
+    protocol = parse(draft_text(drafted(scene, gates)))
+    check_recordable(protocol)
+    assert protocol.title == f'What "{scene}" says'
+    assert len(protocol.gates.gates) == gates
+    assert len({(gate.side, gate.height) for gate in protocol.gates.gates}) == gates
+    assert {gate.side for gate in protocol.gates.gates} == (
+        {"impact", "free"} if scene == "two-chains" else {"impact"} if scene == "one-chain"
+        else {"free"}
+    )  # fmt: skip
+    assert (protocol.track is not None) == (scene == "track")
+    trial = parse(draft_text(drafted(scene, gates).trial()))
+    assert (len(trial.plan.inclines), trial.plan.repeats) == (1, 4)
+
+
+def test_a_protocol_with_drawings_and_four_drops(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("new", "my-ball.yaml", "--scene", "object", "--gates", "3", "--board", "mega",
+                "--drop", "700 mm ± 1 mm", "--yes")  # fmt: skip
+    assert done.code in {0, 3}, done.err
+    protocol = read("my-ball.yaml")
+    assert (protocol.title, len(protocol.gates.gates)) == ("my ball", 3)
+    assert protocol.drop.value == pytest.approx(0.7)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "my-ball.yaml", "my-ball-mounting.svg", "my-ball-wiring.svg"
+    }  # fmt: skip
+    assert "Mega" in (tmp_path / "my-ball-wiring.svg").read_text("utf-8")
+    assert "SIMULATED DATA" in done.out
+    assert "trial drops" in done.out or "predicted g (m/s²)" in done.out
+    assert done.err.count("run ") >= 4
+    again = call("new", "my-ball.yaml", "--yes")
+    assert (again.code, "is there already" in again.err) == (2, True)
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tried = []
+    monkeypatch.setattr("rig.commands.new._tried", lambda draft: tried.append(draft) or 0)
+    answers = ["fence", "picket-fence", "", "2", "6", "250 mm", "", "350 mm ± 1 mm", "5"]
+    monkeypatch.setattr("sys.stdin", Terminal("\n".join(answers) + "\n"))
+    done = call("new", "f.yaml")
+    assert done.code == 0, done.err
+    assert "accepted: two-chains" in done.err
+    (draft,) = tried
+    assert (draft.rods, draft.length, draft.diameter) == (6, "250 mm", "25 mm")
+    assert (draft.drop, draft.repeats, draft.gates) == ("350 mm ± 1 mm", 5, 2)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--scene", "two-chains", "--gates", "1"], "two chains need two gates"),
+        (["--scene", "one-chain", "--gates", "14"], "found 12; the board (Arduino Uno) has gates"),
+        (["--gates", "many"], "--gates: found many; a whole number"),
+        (["--diameter", "20"], "diameter"),
+        (["--drop", "900 mm}"], "drop"),
+        (["--scene", "one-chain", "--rods", "3", "--length", "50 mm", "--gates", "9"], "no place"),
+    ],
+)
+def test_answers_that_make_no_protocol_are_refused(options, said, call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("new", "x.yaml", *options, "--yes")
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
+    assert not (tmp_path / "x.yaml").exists()
