@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 from rig.commands.output import say
 from rig.doctor import checks
 from rig.doctor.checks import Finding
-from rig.doctor.gathering import look_at_board, look_at_disk, look_at_port, look_at_session
+from rig.doctor.gathering import (
+    look_at_board,
+    look_at_disk,
+    look_at_packages,
+    look_at_port,
+    look_at_session,
+)
 from rig.errors import DeviceError, SessionError
 from rig.link.port import open_port, port_clock
 from rig.usb.listing import serial_ports
@@ -44,6 +50,7 @@ def main(arguments: Namespace) -> int:
 
 
 def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
+    yield checks.other_packages(look_at_packages())
     # Without a name no port is opened: that would restart the board behind it.
     named = [url] if url and "://" not in url else []
     free = True

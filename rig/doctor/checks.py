@@ -44,6 +44,22 @@ class Finding:
         return f"{self.name}: {self.what}"
 
 
+def other_packages(names: Sequence[str]) -> Finding:
+    """See that no other installed package has modules of the name `rig`, and mixes them with ours.
+
+    Parameters
+    ----------
+    names
+        Of these packages.
+    """
+    name = "packages called rig"
+    if not names:
+        return Finding(name, "only this one")
+    said = ", ".join(names)
+    advice = f"python -m pip uninstall {' '.join(names)} chainrig, then install chainrig again"
+    return Finding(name, f"{said} too: files of both are in one folder", advice)
+
+
 def permission(port: PortFacts) -> Finding:
     """See that this user may read and write the port."""
     name = f"permission for {port.path}"

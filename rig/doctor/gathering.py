@@ -9,6 +9,7 @@ import os
 import shutil
 from contextlib import suppress
 from dataclasses import replace
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,6 +65,11 @@ def look_at_port(path: str, proc: Path = _PROC, udev: Path = _UDEV) -> PortFacts
         modem_manager=any(name == "ModemManager" for _, name in _processes(proc)),
         left_alone=_left_alone(place, udev),
     )
+
+
+def look_at_packages() -> tuple[str, ...]:
+    """Name installed packages that have modules called `rig` beside ours."""
+    return tuple(sorted(set(packages_distributions().get("rig", ())) - {"chainrig"}))
 
 
 def look_at_disk(folder: Path) -> DiskFacts:

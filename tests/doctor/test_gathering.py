@@ -10,8 +10,15 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
+from rig.doctor.checks import other_packages
 from rig.doctor.facts import Owner
-from rig.doctor.gathering import look_at_board, look_at_disk, look_at_port, look_at_session
+from rig.doctor.gathering import (
+    look_at_board,
+    look_at_disk,
+    look_at_packages,
+    look_at_port,
+    look_at_session,
+)
 from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
@@ -234,3 +241,15 @@ def test_without_a_port_nothing_is_opened_and_a_damaged_session_is_said(doctor, 
     assert "not a session: there is nothing of a session in it\n  do: " in out
     assert doctor()[0] == 0
     assert doctor("--session", tmp_path / "none")[0] == 4
+
+
+def test_another_package_of_the_same_name_is_named(tmp_path, monkeypatch):
+    for name, module in (("rig", "rig"), ("chainrig", "rig"), ("harmless", "tool")):
+        info = tmp_path / f"{name}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "RECORD").write_text(f"{module}/__init__.py,,\n")
+    monkeypatch.setattr("sys.path", [str(tmp_path)])
+    assert look_at_packages() == ("rig",)
+    assert "pip uninstall rig chainrig" in other_packages(look_at_packages()).advice
+    assert not other_packages(()).advice
