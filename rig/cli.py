@@ -211,6 +211,9 @@ def _parser() -> Parser:
 
     design = command("design", "predict what a gate layout will tell, and propose better heights")
     _protocol(design)
+    design.add_argument(
+        "-o", "--output", metavar="NEW.yaml", help="write the protocol with the proposed heights"
+    )
     design.add_argument("--repeats", type=_count, metavar="N", help="drops at each incline")
     design.add_argument(
         "--learned", metavar="SESSION", help="scatter as an earlier session of the rig taught it"

@@ -10,10 +10,12 @@ from rig.analysis.components import stated
 from rig.commands.output import print_json, say
 from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import forecast
+from rig.design.rewriting import with_heights
 from rig.design.search import better, readable, room
 from rig.design.trials import trials, trials_text
 from rig.errors import InputError
 from rig.estimate.coefficients import KNOWN
+from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
@@ -35,6 +37,8 @@ SPACING_M = 0.01
 
 def main(arguments: Namespace) -> int:
     """Predict what a layout will tell, and look for a better one."""
+    if arguments.output and arguments.no_search:
+        raise InputError("-o writes what is proposed, and --no-search proposes nothing")
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
     there = beams_of(protocol)
@@ -57,6 +61,9 @@ def main(arguments: Namespace) -> int:
     if not arguments.no_search:
         proposed = better(protocol, components, limits, say)
         found["proposed"] = _said(protocol, proposed, components)
+        if arguments.output:
+            write_atomic(arguments.output, with_heights(protocol, proposed))
+            say(f"protocol: {arguments.output}")
     if arguments.json:
         print_json(found)
     else:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
 from rig.link.messages import pack_label
+from rig.protocol import reader
 from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.cli.lab import PROTOCOLS
@@ -73,12 +75,27 @@ def test_a_design_of_what_is_there(call, tmp_path):
     assert again["inclines"][0]["u_mean"] < speed["inclines"][0]["u_mean"]
 
 
-def test_a_design_proposes_heights(call):
-    done = call("design", FENCE, "--lowest", "40 mm", "--spacing", "5 cm")
-    assert done.code == 0
-    assert "proposed, free side (mm): " in done.out
+def test_a_design_proposes_heights_and_writes_them(call, tmp_path):
+    new = tmp_path / "new.yaml"
+    done = call("design", FENCE, "--lowest", "40 mm", "--spacing", "5 cm", "-o", new)
+    assert done.code == 0, done.err
+    (line,) = re.findall(r"^proposed, free side \(mm\): (.*)$", done.out, re.MULTILINE)
+    proposed = [float(one) * 1e-3 for one in line.split(", ")]
     assert "sweep 1" in done.err
     assert "±" not in done.out
+    written, before = (
+        [gate.height for gate in reader.read(path).gates.gates] for path in (new, FENCE)
+    )
+    assert sorted(written) == pytest.approx(sorted(proposed), abs=0.06e-3)
+    assert written != before
+    changed = [
+        (old, now) for old, now in zip(FENCE.read_text("utf-8").splitlines(),
+                                       new.read_text("utf-8").splitlines(), strict=True)
+        if old != now
+    ]  # fmt: skip
+    assert 1 <= len(changed) <= len(proposed)
+    assert all("height: " in old and "height: " in now for old, now in changed)
+    assert call("design", FENCE, "--no-search", "-o", new).code == 2
 
 
 def test_a_design_by_the_scatter_that_a_session_taught(call, finished):
