@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 from rig.errors import InputError
 from rig.ports import check_name
 from rig.tui.app import RigApp
-from rig.tui.ascii import wanted
-from rig.tui.context import Options
+from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def _options(arguments: Namespace) -> Options:
         offline=offline,
         last=_last(),
         bell=arguments.bell,
-        ascii=arguments.ascii or wanted(os.environ),
+        ascii=arguments.ascii or ascii_only(os.environ),
     )
 
 

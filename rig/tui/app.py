@@ -11,20 +11,18 @@ from textual import events
 from textual.app import App, ComposeResult
 from textual.css.query import NoMatches
 from textual.theme import Theme
-from textual.widgets import ContentSwitcher, Input
+from textual.widgets import ContentSwitcher, Input, Label
 
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands, selectors
 from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, Action, hindrance, shown_key
-from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
 from rig.tui.screens.ask import Ask, AskReason, Confirm, Pick
 from rig.tui.screens.help import Help
 from rig.tui.screens.palette import Choice, Palette
-from rig.tui.screens.protocol import ProtocolPage
 from rig.tui.stillness import Stillness
 from rig.tui.widgets.status import StatusBar
 from rig.tui.widgets.stopbar import StopBar, StopLine
@@ -42,6 +40,7 @@ if TYPE_CHECKING:
     from rig.tui.screens.dialog import Dialog
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
+    from rig.tui.screens.protocol import ProtocolPage
     from rig.tui.state import DaemonState
 
 TICK_S = 0.1
@@ -114,10 +113,10 @@ THEMES = (
 _PAGES = ("protocol", "device", "run", "result", "session", "history")
 
 
-def _page(name: str) -> type[Page]:
-    """Load a page, which the first paint may not need; safe in any thread."""
+def _page(name: str) -> Callable[..., Page]:
+    """Load a page, which the first paint does not need; safe in any thread."""
     module = import_module(f"rig.tui.screens.{name}")
-    kind: type[Page] = getattr(module, f"{name.title()}Page")
+    kind: Callable[..., Page] = getattr(module, f"{name.title()}Page")
     return kind
 
 
@@ -158,14 +157,12 @@ class RigApp(App[None], inherit_bindings=False):
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
         self.driver = Driver(flow, self.client, self.follower, self.begin)
-        self.protocols = ProtocolPage(options.files, options.session, options.last)
-        self.pages: dict[str, Page] = {ProtocolPage.NAME: self.protocols}
+        self.pages: dict[str, Page] = {}
         self._turning = asyncio.Lock()
         self._turned_to = ""
         self._stillness = Stillness(options.still_s)
         self._last = monotonic()
         self._spent = process_time()
-        self._ascii = AsciiFilter()
         self._told, self._told_s = "", 0.0
         self._followed = ""
         self._rang_at = start
@@ -175,14 +172,18 @@ class RigApp(App[None], inherit_bindings=False):
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """What goes over every line that is drawn."""
-        more = (self._ascii,) if self.options.ascii else ()
-        return (*super().get_line_filters(), *more)
+        if not self.options.ascii:
+            return super().get_line_filters()
+        from rig.tui.ascii import AsciiFilter  # noqa: PLC0415 - most terminals know more
+
+        return (*super().get_line_filters(), AsciiFilter())
 
     # ------------------------------------------------------------------ life
 
     def compose(self) -> ComposeResult:
         yield StatusBar()
-        yield ContentSwitcher(id="pages")
+        with ContentSwitcher(initial="loading", id="pages"):
+            yield Label("loading …", id="loading")
         yield StopBar()
 
     async def on_mount(self) -> None:
@@ -321,9 +322,19 @@ class RigApp(App[None], inherit_bindings=False):
     @property
     def history(self) -> HistoryPage:
         """The page with the tape."""
-        if "history" not in self.pages:
-            self.pages["history"] = _page("history")()
-        return cast("HistoryPage", self.pages["history"])
+        return cast("HistoryPage", self._made("history"))
+
+    @property
+    def protocols(self) -> ProtocolPage:
+        """The page with the files."""
+        return cast("ProtocolPage", self._made("protocol"))
+
+    def _made(self, name: str) -> Page:
+        if name not in self.pages:
+            options = self.options
+            given = (options.files, options.session, options.last) if name == "protocol" else ()
+            self.pages[name] = _page(name)(*given)
+        return self.pages[name]
 
     def turn(self, page: str) -> None:
         """Show a page: at once where it was shown before."""
@@ -336,13 +347,12 @@ class RigApp(App[None], inherit_bindings=False):
     async def _make(self, page: str) -> None:
         """Make a page and show it, if it is still wanted then."""
         async with self._turning:  # it may have been asked for twice
-            if page not in self.pages:
-                self.pages[page] = (await asyncio.to_thread(_page, page))()
+            await asyncio.to_thread(_page, page)
             if not self._open():
                 return
             switcher = self.screen_stack[0].query_one("#pages", ContentSwitcher)
-            if not self.pages[page].is_mounted:
-                await switcher.add_content(self.pages[page], id=page)
+            if not self._made(page).is_mounted:
+                await switcher.add_content(self._made(page), id=page)
         if self._open() and page == self._turned_to:
             self._show(page)
 

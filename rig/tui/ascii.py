@@ -11,8 +11,6 @@ from textual.filter import LineFilter
 from rig.tui.braille import ROWS, dots_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from textual.color import Color
 
 _LIKE = str.maketrans({
@@ -25,15 +23,6 @@ _LIKE = str.maketrans({
 })  # fmt: skip
 """Characters of the same width that say the same."""
 _MANY = 5  # dots that fill a character
-
-
-def wanted(environment: Mapping[str, str]) -> bool:
-    """Whether a terminal shows ASCII only, by its type or its locale."""
-    if environment.get("TERM", "") in {"linux", "vt100", "vt220", "ansi", "dumb"}:
-        return True
-    names = ("LC_ALL", "LC_CTYPE", "LANG")
-    locale = next((found for name in names if (found := environment.get(name))), "UTF-8")
-    return "utf8" not in locale.casefold().replace("-", "")
 
 
 def in_ascii(text: str) -> str:

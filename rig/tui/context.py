@@ -23,6 +23,15 @@ if TYPE_CHECKING:
     from rig.tui.screens.protocol import ProtocolPage
 
 
+def ascii_only(environment: Mapping[str, str]) -> bool:
+    """Whether a terminal shows ASCII only, by its type or its locale."""
+    if environment.get("TERM", "") in {"linux", "vt100", "vt220", "ansi", "dumb"}:
+        return True
+    names = ("LC_ALL", "LC_CTYPE", "LANG")
+    locale = next((found for name in names if (found := environment.get(name))), "UTF-8")
+    return "utf8" not in locale.casefold().replace("-", "")
+
+
 @dataclass(frozen=True, slots=True)
 class Options:
     """What the command line says.
@@ -70,13 +79,15 @@ class CommandContext(Protocol):
     driver: Driver
     page: str
     pages: dict[str, Page]
-    protocols: ProtocolPage
 
     @property
     def model(self) -> Model: ...
 
     @property
     def history(self) -> HistoryPage: ...
+
+    @property
+    def protocols(self) -> ProtocolPage: ...
 
     def turn(self, page: str) -> None: ...
 

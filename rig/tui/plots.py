@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from rig.analysis.result import DropResult, Measured
-    from rig.protocol.protocol import Protocol, Run
     from rig.results.live import SessionView
     from rig.tui.motion import ChainFall, Table
 
@@ -27,26 +26,18 @@ _TIME = "t (ms)"
 
 
 def chain_pictures(
-    protocol: Protocol | None,
-    run: Run | None,
-    edges: Table,
-    hz: float,
-    matches: Mapping[int, int] | None,
-    skew_s: float | None = None,
+    found: tuple[ChainFall, ...], skew_s: float | None = None
 ) -> tuple[Picture | None, Picture | None]:
     """Draw z(t) of each chain and Δz(t), with the model's curves; `None` for what is not there.
 
     Parameters
     ----------
-    protocol, run, edges, hz, matches
-        As for `rig.tui.motion.motions`.
+    found
+        The chains of a drop.
     skew_s
         What was measured of the release: Δz is then that of chains let go together, or else as it
         fell; z(t) always is as it fell.
     """
-    if protocol is None or run is None or protocol.gates is None:
-        return None, None
-    found = motions(protocol, run, edges, hz, matches)
     if not found:
         return None, None
     end = max((float(one.times[-1]) for one in found if one.times.size), default=0.0)
@@ -93,14 +84,14 @@ def drop_pictures(
     """Draw a recorded drop, or its first `edges`, with rods and skew as the analysis found them."""
     result, hz = view.results[job], view.scales[job].hz
     skew = result.quantities.get(RELEASE_SKEW.name)
-    return chain_pictures(
+    found = motions(
         view.protocol,
         view.plan[job.run],
         view.drops[job].edges if edges is None else edges,
         hz,
         result.matches or None,
-        None if skew is None else skew.value,
     )
+    return chain_pictures(found, None if skew is None else skew.value)
 
 
 def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:

@@ -156,7 +156,9 @@ class Lab:
         if name and app.client:
             app.client.name = name
         async with app.run_test(size=size) as pilot:
-            yield Operator(app, pilot)
+            operator = Operator(app, pilot)
+            await operator.until(lambda: app.page)
+            yield operator
             if app.client and app.client.daemon:
                 self.daemons.append(app.client.daemon)
 

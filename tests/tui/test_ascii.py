@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
 from rig.tui.app import RigApp
-from rig.tui.ascii import in_ascii, wanted
-from rig.tui.context import Options
+from rig.tui.ascii import in_ascii
+from rig.tui.context import Options, ascii_only
 from rig.tui.pictures import QUIET, FakeClient
 from rig.tui.state import DaemonState
 from tests.tui.lab import KEYS, run
@@ -28,7 +28,7 @@ def test_what_matters_can_still_be_told():
 
 
 @pytest.mark.parametrize(
-    ("environment", "ascii_only"),
+    ("environment", "true"),
     [
         ({}, False),
         ({"LANG": "de_DE.UTF-8"}, False),
@@ -38,8 +38,8 @@ def test_what_matters_can_still_be_told():
         ({"LANG": "de_DE.UTF-8", "TERM": "linux"}, True),
     ],
 )
-def test_terminal_and_locale_say_when(environment, ascii_only):
-    assert wanted(environment) is ascii_only
+def test_terminal_and_locale_say_when(environment, true):
+    assert ascii_only(environment) is true
 
 
 def test_a_whole_screen_is_ascii():

@@ -21,11 +21,14 @@ from rig.tui.widgets.gates import GateBoard, named
 from rig.tui.widgets.text import Words, duration, plain
 
 if TYPE_CHECKING:
+    from collections.abc import Hashable
+
     from textual.app import ComposeResult
 
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.tui.model import Model
+    from rig.tui.motion import ChainFall
 
 _FALLING = (Stage.LIVE, Stage.JUDGING)
 _WAITING = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
@@ -53,6 +56,8 @@ class RunPage(Page):
         super().__init__()
         self._of: Job | None = None
         self._table = as_table(())  # its edges
+        self._seen: Hashable = None
+        self._falls: tuple[ChainFall, ...] = ()
         self._expects_of: tuple[Protocol | None, Run | None] = None, None
         self._expects = ""
 
@@ -97,18 +102,21 @@ class RunPage(Page):
         hz = float(drop.get("tick_hz") or 1e6)
         live = model.stage in _FALLING
         edges = model.state.edges if live else ()
-        key = (model.job, model.run, len(edges), live)
-        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
+        key = (id(model.protocol), model.job, model.run, len(edges), live)
         if model.job != self._of or len(edges) < len(self._table):
             self._of, self._table = model.job, as_table(())
         # Only what is new is taken over: there may be thousands, and they come every tick.
         self._table = np.concatenate([self._table, as_table(edges[len(self._table) :])])
+        if key != self._seen:
+            self._seen, self._falls = key, ()
+            if model.protocol is not None and model.run is not None:
+                self._falls = motions(model.protocol, model.run, self._table, hz)
         self._chains(model, hz, live=live)
-        if not z.wants(key):
-            return
-        first, second = chain_pictures(model.protocol, model.run, self._table, hz, None)
-        z.show(first, key)
-        dz.show(second, key)
+        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
+        if z.wants(key):
+            first, second = chain_pictures(self._falls)
+            z.show(first, key)
+            dz.show(second, key)
 
     def _chains(self, model: Model, hz: float, *, live: bool) -> None:
         """Draw both chains where the latest edge has them."""
@@ -116,9 +124,8 @@ class RunPage(Page):
         if not live or model.protocol is None or model.run is None:
             view.show(None)
             return
-        falls = motions(model.protocol, model.run, self._table, hz)
         time_s = float(self._table[-1, 0]) / hz if len(self._table) else 0.0
-        view.show(drawing(model.protocol, model.run, falls, model.indicators, time_s))
+        view.show(drawing(model.protocol, model.run, self._falls, model.indicators, time_s))
 
 
 def _card(model: Model, expected: str, *, low: bool) -> Content:

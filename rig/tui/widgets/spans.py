@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from rich.segment import Segment
 from rich.style import Style
+from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
@@ -23,13 +25,15 @@ class SpanView(Widget):
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
         super().__init__(id=id)
         self._rows: Sequence[Sequence[Span]] = []
+        self._plain = Style()
 
     def take(self, rows: Sequence[Sequence[Span]]) -> None:
         """Show these instead."""
-        if rows != self._rows:
-            higher = len(rows) != len(self._rows)
-            self._rows = rows
-            self.refresh(layout=higher and self.styles.is_auto_height)
+        before, self._rows = self._rows, rows
+        if len(rows) != len(before):
+            self.refresh(layout=bool(self.styles.is_auto_height))
+        elif other := [y for y, row in enumerate(rows) if row != before[y]]:
+            self.refresh(*(Region(0, y, self.size.width, 1) for y in other))
 
     @property
     def said(self) -> str:
@@ -41,12 +45,19 @@ class SpanView(Widget):
         del container, viewport, width
         return len(self._rows)
 
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Render lines, in the widget's own style, which is sought once for all of them."""
+        self._plain = self.rich_style
+        return super().render_lines(crop)
+
     def render_line(self, y: int) -> Strip:
         """One line."""
-        plain, colors = self.rich_style, self.app.theme_variables
+        plain, colors = self._plain, self.app.theme_variables
         row = self._rows[y] if y < len(self._rows) else ()
-        line = [
-            Segment(span.text, plain + Style(color=colors.get(span.color), bold=span.bold or None))
-            for span in row
-        ]
+        line = [Segment(text, _styled(plain, colors.get(color), bold)) for text, color, bold in row]
         return Strip(line).adjust_cell_length(self.size.width, plain)
+
+
+@lru_cache(maxsize=256)
+def _styled(plain: Style, color: str | None, bold: bool) -> Style:
+    return plain + Style(color=color, bold=bold or None)
