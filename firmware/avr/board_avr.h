@@ -12,6 +12,7 @@
 #include <util/atomic.h>
 
 #define BOARD_HZ F_CPU
+#define BOARD_BYTES_WAIT 0
 #define BOARD_FLASH PROGMEM
 /* A stamp may be off when the interrupt before it was still running: three passes through the
  * interrupt, with room to spare. */

@@ -30,6 +30,7 @@
  * BOARD_REACH: for how many ticks hardware can end a pulse of the release by itself. A longer one
  *   is put off on its way.
  * BOARD_SHORT: a pulse of fewer ticks may be too short for that hardware.
+ * BOARD_BYTES_WAIT: 1 where bytes on the line wait until they are taken, 0 where they are lost.
  * BOARD_FLASH: attribute of tables that stay in flash; BOARD_KEPT: of variables that a reset leaves
  *   as they are.
  * board_type, board_channels: tables of text, what the board and its gate pins are called. */
@@ -44,6 +45,9 @@
 #endif
 #if !defined BOARD_REACH || !defined BOARD_SHORT
 #error "board.h must bring BOARD_REACH and BOARD_SHORT"
+#endif
+#if !defined BOARD_BYTES_WAIT
+#error "board.h must bring BOARD_BYTES_WAIT"
 #endif
 #if !defined BOARD_FLASH || !defined BOARD_KEPT
 #error "board.h must bring BOARD_FLASH and BOARD_KEPT"
@@ -63,7 +67,7 @@ NEEDS_FUNCTION(board_count, uint16_t (*)(void), "uint16_t board_count(void)");
 NEEDS_FUNCTION(board_count_roughly, uint16_t (*)(void), "uint16_t board_count_roughly(void)");
 
 /* Which half of the counter's range has begun for sure: goes into every entry (ticks.h). A board
- * that knows all 32 bits of a stamp writes its bits 15 to 22 there itself. */
+ * that knows all 32 bits of a stamp writes its bits 15 to 22 there itself, less one. */
 NEEDS_FUNCTION(board_publish_half, void (*)(uint8_t), "void board_publish_half(uint8_t half)");
 
 /* -- gates */

@@ -36,8 +36,18 @@ void receive_reset(void)
 
 void receive_take(uint8_t byte)
 {
-    if ((uint8_t)(taken_end - taken_first) < TAKEN)
+    if (receive_has_room())
         taken[taken_end++ % TAKEN] = byte;
+}
+
+bool receive_has_room(void)
+{
+    return (uint8_t)(taken_end - taken_first) < TAKEN;
+}
+
+bool receive_idle(void)
+{
+    return taken_first == taken_end;
 }
 
 static void unstuffed(uint8_t byte, struct request *request)

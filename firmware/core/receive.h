@@ -22,12 +22,16 @@ void receive_reset(void);
 /* Keep a byte until it is read; with 64 waiting, the next ones are lost. */
 void receive_take(uint8_t byte);
 
-/* Take what is on the line: it keeps only two bytes, so this is called from wherever much is
+/* Whether another one could be kept, and whether none is. */
+bool receive_has_room(void);
+bool receive_idle(void);
+
+/* Take what is on the line: an AVR's keeps only two bytes, so this is called from wherever much is
  * done. */
 static inline void receive_pass(void)
 {
     uint8_t byte;
-    while (board_receive(&byte))
+    while ((!BOARD_BYTES_WAIT || receive_has_room()) && board_receive(&byte))
         receive_take(byte);
 }
 

@@ -23,6 +23,7 @@
 #define BOARD_LATE 256
 #define BOARD_REACH 0xF800
 #define BOARD_SHORT (10 * (BOARD_HZ / 1000000u))
+#define BOARD_BYTES_WAIT 0
 #define BOARD_FLASH
 #define BOARD_KEPT
 

@@ -6,7 +6,7 @@ import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.link import messages as wire
-from rig_emulator.avr import Change
+from rig_emulator.controller import Change
 from rig_emulator.fuzz import Fuzz, Judge
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make

@@ -12,7 +12,8 @@ import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import InputError
-from rig_emulator.avr import FILL, Avr, EmulatorError, Stop
+from rig_emulator.avr import FILL, Avr
+from rig_emulator.controller import EmulatorError, Stop
 from rig_emulator.image import Image, read_image
 from tests.firmware.conftest import STRICT
 from tests.firmware.emulated import EMULATOR, MCUS

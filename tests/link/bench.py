@@ -41,10 +41,12 @@ class Bench(ABC):
     """A device and its hands. `lab` is what its gates will see at the next ARM and FIRE.
 
     What a bench has no hand for it leaves as it is here, and the tests that need it are skipped.
-    `tick_tolerance` is how far a stamp may be off besides the resonator's own error.
+    `tick_tolerance` is how far a stamp may be off besides the resonator's own error;
+    `brown_out_cause` what BOOT says of a supply that sank.
     """
 
     tick_tolerance = 1
+    brown_out_cause = 4
     can_preset_tick = False
     can_stop = False
     can_reference = False

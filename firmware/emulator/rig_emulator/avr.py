@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import re
-from enum import IntEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from rig.errors import DeviceError, InputError
+from rig.errors import InputError
 from rig_emulator._harness import ffi, lib
+from rig_emulator.controller import Change, EmulatorError, Sent, Stop
 from rig_emulator.image import Image, read_image
 
 if TYPE_CHECKING:
@@ -20,33 +20,6 @@ FILL = 0xC5
 _FOR_EVER = b"\xff\xcf"  # rjmp to itself
 _ROOM = 256  # of the buffers in which C hands over what happened
 _COLOURS = re.compile("\x1b\\[[0-9;]*m")
-
-
-class EmulatorError(DeviceError):
-    """The firmware did what no firmware should: a bad instruction or address, an endless sleep."""
-
-
-class Stop(IntEnum):
-    """Why `Avr.run` came back."""
-
-    REACHED = 0
-    PIN = 1
-    SENT = 2
-
-
-class Change(NamedTuple):
-    """An output pin (such as ``"PE4"``) driven high or no longer, by the instruction at `cycle`."""
-
-    cycle: int
-    pin: str
-    high: bool
-
-
-class Sent(NamedTuple):
-    """A byte of the board's, complete at `cycle`."""
-
-    cycle: int
-    value: int
 
 
 class Avr:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.frames import Decoder
-from rig_emulator.avr import Avr, Change, Stop
+from rig_emulator.avr import Avr
+from rig_emulator.controller import Change, Controller, Stop
 from rig_emulator.line import LineToHost
 from rig_emulator.name import NAME_AT, name_record
 
@@ -23,11 +24,10 @@ if TYPE_CHECKING:
     from rig_emulator.wiring import Wiring
     from sim.lab_interface import Lab
 
-CRYSTAL_HZ = 16_000_000
 _ARM = wire.CODES[wire.Arm]
 _ARMED = wire.CODES[wire.Armed]
 _BOOT = wire.CODES[wire.Boot]
-_POWERED_CYCLES = CRYSTAL_HZ // 10  # the board has been on for a while when the port is opened
+_POWERED_S = 0.1  # the board has been on for a while when the port is opened
 _PULSE_NS = 10**7  # width of the reference's pulses
 _HISTORY = 10_000
 
@@ -78,12 +78,11 @@ class EmulatedBoard:
     ) -> None:
         self.wiring = wiring
         self.lab = lab
-        self.hz = CRYSTAL_HZ * (1.0 + ppm * 1e-6)
-        self.avr = Avr(program, wiring.mcu, CRYSTAL_HZ, baudrate)
-        self.line = LineToHost(baudrate)
+        self.hz = wiring.clock_hz * (1.0 + ppm * 1e-6)
         self.history: deque[Change] = deque(maxlen=_HISTORY)
         draw = hashlib.sha256(f"emulated board {seed}".encode()).digest()
-        self.avr.eeprom_write(NAME_AT, name_record(draw[:8]))
+        self.avr = self.controller(wiring, program, baudrate, draw[:8])
+        self.line = LineToHost(baudrate)
         self.avr.watch(wiring.sync)
         for pin in (*wiring.gates, wiring.stop, wiring.reference, wiring.sense):
             if pin is not None:
@@ -95,9 +94,17 @@ class EmulatedBoard:
         self._pulses = 0
         self._sniff()
         self._origin = 0
-        self._run(_POWERED_CYCLES + int.from_bytes(draw[8:10]))
+        self._run(round(_POWERED_S * wiring.clock_hz) + int.from_bytes(draw[8:10]))
         self._origin = self.avr.cycle
         self.line = LineToHost(baudrate)  # nobody listened
+
+    def controller(
+        self, wiring: Wiring, program: Path | Image, baudrate: int, name: bytes
+    ) -> Controller:
+        """Put the controller on the board, with the program in it and the name it gave itself."""
+        avr = Avr(program, wiring.mcu, wiring.clock_hz, baudrate)
+        avr.eeprom_write(NAME_AT, name_record(name))
+        return avr
 
     # -- what a port needs
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from rig_emulator.avr import Change
+    from rig_emulator.controller import Change
     from rig_emulator.wiring import Wiring
 
 _US = 16  # cycles

@@ -19,6 +19,7 @@ from rig_emulator.wiring import board_named, firmware_for
 from sim.pty import main
 
 if TYPE_CHECKING:
+    from rig_emulator.avr import Avr
     from sim.scene import Scene
 
 BAUDRATE = 500_000
@@ -28,6 +29,8 @@ _EVENT = struct.Struct("<IH")  # in firmware/core/events.h
 
 class GlassBoard(EmulatedBoard):
     """An emulated board that can be looked into."""
+
+    avr: Avr
 
     def phase(self) -> int:
         """Tell what it is doing, see `rig.link.messages.Phase`."""

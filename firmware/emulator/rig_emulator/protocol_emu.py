@@ -2,8 +2,8 @@
 """``emu://``: falling chains before the pins of an emulated board, as a pyserial port.
 
 ``emu://?protocol=FILE&seed=N&truth=FILE&board=mega&elf=FILE&<dial>=<value>…``: as ``sim://``, but
-the answers come from the real firmware. ``board`` is ``mega`` or ``uno``; ``elf`` is another
-firmware than the built one.
+the answers come from the real firmware. ``board`` is ``mega``, ``uno`` or ``pico``; ``elf`` is
+another firmware than the built one (for a Pico a UF2 file).
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, TypeVar
 from rig.errors import InputError
 from rig.ports import read_settings
 from rig_emulator.board import EmulatedBoard
-from rig_emulator.wiring import board_named, firmware_for
+from rig_emulator.pico_board import USB_RATE, EmulatedPico
+from rig_emulator.pico_chip import need_pico
+from rig_emulator.wiring import PICO, board_named, firmware_for
 from sim.clock import VirtualClock
 from sim.scene import set_scene
 from sim.serial_port import SimulatedSerial
@@ -32,6 +34,18 @@ _PATIENCE_NS = 10**9  # how far a read without a time-out looks ahead at once
 
 class EmulatedSerial(SimulatedSerial):
     """A port with an emulated board behind it."""
+
+    def open(self) -> None:
+        """Open the port; an Arduino restarts, a Pico is told."""
+        super().open()
+        if isinstance(self.board, EmulatedPico):
+            self.board.opened(self.clock.now_ns(), True)
+
+    def close(self) -> None:
+        """Close the port; a Pico is told."""
+        if self.is_open and isinstance(self.board, EmulatedPico):
+            self.board.opened(self.clock.now_ns(), False)
+        super().close()
 
     def upcoming(self, board: Board, end_ns: int | None) -> tuple[int | None, bool]:
         """Let the board run ahead of a read: as long as it lasts, the host sends nothing."""
@@ -52,6 +66,9 @@ class Serial(EmulatedSerial):
         settings = read_settings(str(self.port))
         wiring = board_named(settings.pop("board", "mega"))
         program = settings.pop("elf", "")
+        if wiring is PICO:
+            need_pico()
+            self.reset_on_open = False
         scene = set_scene("emu", settings)
         self.clock = VirtualClock(scene.pace)
         self.disturb(scene.seed, **scene.line())
@@ -62,6 +79,8 @@ class Serial(EmulatedSerial):
 
 def board_before(scene: Scene, wiring: Wiring, program: Path, baudrate: int) -> EmulatedBoard:
     """Put a board before a scene, see `put_before`."""
+    if wiring is PICO:
+        return put_before(scene, wiring, program, USB_RATE, EmulatedPico)
     return put_before(scene, wiring, program, baudrate, EmulatedBoard)
 
 

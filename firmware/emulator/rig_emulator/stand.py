@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from rig_emulator.avr import Change
+    from rig_emulator.controller import Change
     from rig_emulator.wiring import Wiring
 
 _BOOT_CYCLES = 500_000

@@ -28,6 +28,8 @@ class Wiring:
         Input of the 1 Hz reference; rising edges count.
     sense
         Input that tells that the chain has left, if there is one.
+    clock_hz
+        Of the controller.
     """
 
     mcu: str
@@ -38,6 +40,7 @@ class Wiring:
     stop: str
     reference: str
     sense: str | None
+    clock_hz: int = 16_000_000
 
 
 def _pins(port: str, first: int, last: int) -> tuple[str, ...]:
@@ -66,6 +69,19 @@ BOARDS = {
         sense=None,
     ),
 }
+"""The AVR boards."""
+
+PICO = Wiring(
+    mcu="rp2040",
+    gates=tuple(f"GP{pin}" for pin in range(16)),
+    releases=("GP16", "GP17"),
+    sync="GP18",
+    led="GP25",
+    stop="GP19",
+    reference="GP21",
+    sense="GP20",
+    clock_hz=120_000_000,
+)
 
 
 def board_named(name: str) -> Wiring:
@@ -76,9 +92,10 @@ def board_named(name: str) -> Wiring:
     InputError
         When there is none of that name.
     """
-    if name not in BOARDS:
-        raise InputError(f"emu://: there is no board {name!r}", f"boards are {', '.join(BOARDS)}")
-    return BOARDS[name]
+    boards = BOARDS | {"pico": PICO}
+    if name not in boards:
+        raise InputError(f"emu://: there is no board {name!r}", f"boards are {', '.join(boards)}")
+    return boards[name]
 
 
 def firmware_for(wiring: Wiring) -> Path:
@@ -90,9 +107,13 @@ def firmware_for(wiring: Wiring) -> Path:
         When there is neither.
     """
     package = Path(rig.__file__).parent
-    built = package.parent / "firmware" / "build" / wiring.mcu / "firmware.elf"
-    shipped = package / "flash" / f"{wiring.mcu}.hex"
+    avr = wiring is not PICO
+    built = package.parent / "firmware/build" / wiring.mcu / f"firmware.{'elf' if avr else 'uf2'}"
+    shipped = package / "flash" / f"{wiring.mcu}.{'hex' if avr else 'uf2'}"
     for path in (built, shipped):
         if path.is_file():
             return path
-    raise InputError(f"no firmware for {wiring.mcu}", f"build it: make -C firmware ({built})")
+    raise InputError(
+        f"no firmware for {wiring.mcu}",
+        f"build it: make -C firmware{'' if avr else ' pico'} ({built})",
+    )

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import pytest
 
-from rig_emulator.avr import Change, Sent, Stop
+from rig_emulator.controller import Change, Sent, Stop
 
 HERE = Path(__file__).parent
 _INSTALLED = HERE / "node_modules" / "avr8js" / "package.json"

@@ -1,0 +1,330 @@
+#include "usb.h"
+
+#include <stdbool.h>
+
+#include "board.h"
+#include "clocks.h"
+#include "descriptors.h"
+#include "registers.h"
+
+/* Where the packets are in the controller's memory. */
+#define AT_CONTROL 0x100u
+#define AT_NOTICES 0x180u
+#define AT_OUT 0x200u
+#define AT_IN 0x240u
+#define MEMORY(at) ((volatile uint8_t *)(USB_MEMORY + (at)))
+
+#define BUFFER_FULL (1u << 15)
+#define BUFFER_DATA1 (1u << 13)
+#define BUFFER_STALL (1u << 11)
+#define BUFFER_AVAILABLE (1u << 10)
+#define BUFFER_SIZE 0x3FFu
+
+#define ENDPOINT_ON (1u << 31 | 1u << 29)
+#define ENDPOINT_BULK (2u << 26)
+#define ENDPOINT_INTERRUPT (3u << 26)
+
+#define STATUS_BUS_RESET (1u << 19)
+#define STATUS_SETUP (1u << 17)
+#define DONE_IN(endpoint) (1u << 2 * (endpoint))
+#define DONE_OUT(endpoint) (2u << 2 * (endpoint))
+
+#define SIE_INTERRUPT_EACH (1u << 29)
+#define SIE_PULL_UP (1u << 16)
+
+/* Requests: type and code. */
+#define GET_STATUS 0x8000
+#define GET_STATUS_INTERFACE 0x8100
+#define GET_STATUS_ENDPOINT 0x8200
+#define CLEAR_FEATURE_ENDPOINT 0x0201
+#define SET_ADDRESS 0x0005
+#define GET_DESCRIPTOR 0x8006
+#define GET_CONFIGURATION 0x8008
+#define SET_CONFIGURATION 0x0009
+#define SET_INTERFACE 0x010B
+#define SET_LINE_CODING 0x2120
+#define GET_LINE_CODING 0xA121
+#define SET_LINES 0x2122
+#define SEND_BREAK 0x2123
+#define LINE_CODING 7
+#define READY 1 /* the host's end of the line is open */
+
+static const uint8_t *number;
+static uint8_t address, configured;
+static bool address_waits; /* until its request is answered */
+static bool listening;
+static uint8_t coding[LINE_CODING] = {0x20, 0xA1, 0x07, 0, 0, 0, 8}; /* 500,000 baud; any will do */
+static bool coding_comes;
+
+/* The answer being sent to a control request. */
+static struct {
+    const uint8_t *next;
+    uint16_t left;
+    bool data1;
+    bool short_end; /* a packet that is not full must tell the host that there is no more */
+    bool thanks;    /* the host says when it has it all */
+} control;
+
+static bool out_data1, in_data1, in_flight;
+static uint8_t out_at, out_size; /* of the packet being read */
+static uint8_t waiting[PACKET - 1], waiting_size; /* a short packet always: the host need not wait for more */
+
+/* Hand a buffer over. The controller runs on another clock, so the last bit is set a little later
+ * than the others (data sheet, 4.1.2.5.1). */
+static void hand_over(uint32_t buffer, uint32_t what)
+{
+    REGISTER(buffer) = what;
+    __asm__ volatile("nop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop");
+    REGISTER(buffer) = what | BUFFER_AVAILABLE;
+}
+
+static uint32_t toggled(bool *data1)
+{
+    uint32_t bit = *data1 ? BUFFER_DATA1 : 0;
+    *data1 = !*data1;
+    return bit;
+}
+
+/* -- control requests */
+
+static void control_send(void)
+{
+    uint16_t size = control.left < PACKET ? control.left : PACKET, n;
+    for (n = 0; n < size; n++)
+        MEMORY(AT_CONTROL)[n] = control.next[n];
+    control.next += size;
+    control.left = (uint16_t)(control.left - size);
+    if (size < PACKET)
+        control.short_end = false;
+    hand_over(USB_IN(0), BUFFER_FULL | toggled(&control.data1) | size);
+}
+
+static void control_expect(uint32_t size)
+{
+    hand_over(USB_OUT(0), BUFFER_DATA1 | size);
+}
+
+static void control_answer(const uint8_t *data, uint16_t size, uint16_t asked)
+{
+    control.next = data;
+    control.left = size < asked ? size : asked;
+    control.short_end = size < asked;
+    control.thanks = asked != 0;
+    control_send();
+}
+
+static void control_accept(void)
+{
+    control_answer(0, 0, 0);
+}
+
+static void control_stall(void)
+{
+    REGISTER(USB_STALL_ARM) = 3;
+    REGISTER(USB_IN(0)) = BUFFER_STALL;
+    REGISTER(USB_OUT(0)) = BUFFER_STALL;
+}
+
+static void bytes_expect(void)
+{
+    out_at = out_size = 0;
+    hand_over(USB_OUT(BYTES), toggled(&out_data1) | PACKET);
+}
+
+/* The host's end of the line is open or not. What nobody has read is lost when it closes; what was
+ * sent before it ever opened, BOOT, waits. */
+static void listen(bool open)
+{
+    if (listening && !open)
+        waiting_size = 0;
+    listening = open;
+}
+
+static void configure(uint8_t value)
+{
+    configured = value;
+    if (!value)
+        return;
+    REGISTER(USB_IN_CTRL(NOTICES)) = ENDPOINT_ON | ENDPOINT_INTERRUPT | AT_NOTICES;
+    REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN;
+    REGISTER(USB_OUT_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_OUT;
+    out_data1 = in_data1 = in_flight = false;
+    bytes_expect();
+}
+
+static void setup(void)
+{
+    static const uint8_t nothing[2];
+    volatile uint8_t *packet = MEMORY(0);
+    uint16_t request = (uint16_t)(packet[0] << 8 | packet[1]);
+    uint16_t value = (uint16_t)(packet[2] | packet[3] << 8);
+    uint16_t asked = (uint16_t)(packet[6] | packet[7] << 8), size;
+    const uint8_t *found;
+    control.data1 = true;
+    coding_comes = false;
+    switch (request) {
+    case GET_DESCRIPTOR:
+        found = descriptor((uint8_t)(value >> 8), (uint8_t)value, number, &size);
+        if (found)
+            control_answer(found, size, asked);
+        else
+            control_stall();
+        break;
+    case SET_ADDRESS:
+        address = (uint8_t)(value & 127);
+        address_waits = true;
+        control_accept();
+        break;
+    case SET_CONFIGURATION:
+        listen(false);
+        configure((uint8_t)value);
+        control_accept();
+        break;
+    case GET_CONFIGURATION:
+        control_answer(&configured, 1, asked);
+        break;
+    case GET_STATUS:
+    case GET_STATUS_INTERFACE:
+    case GET_STATUS_ENDPOINT:
+        control_answer(nothing, 2, asked);
+        break;
+    case GET_LINE_CODING:
+        control_answer(coding, LINE_CODING, asked);
+        break;
+    case SET_LINE_CODING:
+        coding_comes = true;
+        control_expect(PACKET);
+        break;
+    case SET_LINES:
+        listen(value & READY);
+        control_accept();
+        break;
+    case CLEAR_FEATURE_ENDPOINT:
+        if (packet[4] == BYTES)
+            out_data1 = false;
+        else if (packet[4] == (0x80 | BYTES))
+            in_data1 = false;
+        control_accept();
+        break;
+    case SET_INTERFACE:
+    case SEND_BREAK:
+        control_accept();
+        break;
+    default:
+        control_stall();
+    }
+}
+
+static void control_sent(void)
+{
+    if (address_waits) {
+        REGISTER(USB_ADDRESS) = address;
+        address_waits = false;
+    }
+    if (control.left || control.short_end) {
+        control_send();
+    } else if (control.thanks) {
+        control.thanks = false;
+        control_expect(0);
+    }
+}
+
+static void control_received(void)
+{
+    uint8_t n;
+    if (!coding_comes)
+        return;
+    for (n = 0; n < LINE_CODING; n++)
+        coding[n] = MEMORY(AT_CONTROL)[n];
+    coding_comes = false;
+    control_accept();
+}
+
+/* -- the line */
+
+bool board_receive(uint8_t *byte)
+{
+    if (out_at == out_size)
+        return false;
+    *byte = MEMORY(AT_OUT)[out_at++];
+    if (out_at == out_size)
+        bytes_expect();
+    return true;
+}
+
+/* While nobody listens, what comes first stays (it is BOOT), and the rest is lost. */
+bool board_send_ready(void)
+{
+    return !listening || waiting_size < sizeof waiting;
+}
+
+void board_send(uint8_t byte)
+{
+    if (waiting_size < sizeof waiting)
+        waiting[waiting_size++] = byte;
+}
+
+static void bytes_send(void)
+{
+    uint8_t n;
+    for (n = 0; n < waiting_size; n++)
+        MEMORY(AT_IN)[n] = waiting[n];
+    hand_over(USB_IN(BYTES), BUFFER_FULL | toggled(&in_data1) | waiting_size);
+    in_flight = true;
+    waiting_size = 0;
+}
+
+/* -- the bus */
+
+static void bus_reset(void)
+{
+    REGISTER(USB_ADDRESS) = 0;
+    address_waits = false;
+    configure(0);
+    listen(false);
+}
+
+void usb_pass(uint8_t whole)
+{
+    uint32_t status = REGISTER(USB_SIE_STATUS), done = REGISTER(USB_BUFFERS);
+    if (done)
+        REGISTER(USB_BUFFERS) = done;
+    if (status & STATUS_BUS_RESET) {
+        REGISTER(USB_SIE_STATUS) = STATUS_BUS_RESET;
+        bus_reset();
+    }
+    if (done & DONE_IN(0))
+        control_sent();
+    if (done & DONE_OUT(0))
+        control_received();
+    if (status & STATUS_SETUP) {
+        REGISTER(USB_SIE_STATUS) = STATUS_SETUP;
+        setup();
+    }
+    if (done & DONE_IN(BYTES))
+        in_flight = false;
+    if (done & DONE_OUT(BYTES)) {
+        out_at = 0;
+        out_size = (uint8_t)(REGISTER(USB_OUT(BYTES)) & BUFFER_SIZE);
+        if (!out_size)
+            bytes_expect();
+    }
+    if (configured && listening && !in_flight && waiting_size &&
+        (whole || waiting_size == sizeof waiting))
+        bytes_send();
+}
+
+void usb_start(const uint8_t own[8])
+{
+    uint32_t at;
+    number = own;
+    blocks_start(RESET_USB);
+    for (at = 0; at < 0x180; at += 4)
+        REGISTER(USB_MEMORY + at) = 0;
+    REGISTER(USB_MUXING) = 1u << 0 | 1u << 3; /* to the chip's own transceiver */
+    REGISTER(USB_POWER) = 1u << 2 | 1u << 3;  /* plugged in: it has no other supply */
+    REGISTER(USB_MAIN_CTRL) = 1;
+    REGISTER(USB_SIE_CTRL) = SIE_INTERRUPT_EACH;
+    REGISTER(USB_INTE) = 1u << 4 | 1u << 12 | 1u << 16; /* packets, bus reset, requests */
+    TO_SET(USB_SIE_CTRL) = SIE_PULL_UP;
+}

@@ -1,0 +1,48 @@
+"""The Pico's image and its emulator, or the reason why there is none."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rig.errors import InputError
+from rig_emulator.pico_chip import need_pico
+from tests.firmware.toolchain import FIRMWARE, make, need
+
+FOLDER = FIRMWARE / "build" / "rp2040"
+
+
+def build() -> Path:
+    """Build the image, and see that there is an emulator for it."""
+    need("arm-none-eabi-gcc", "node")
+    try:
+        need_pico()
+    except InputError as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(str(error))
+    make("pico")
+    return FOLDER / "firmware.uf2"
+
+
+def symbol(name: str) -> int:
+    """Say where a variable of the firmware is."""
+    table = subprocess.run(
+        ["arm-none-eabi-nm", FOLDER / "firmware.elf"], capture_output=True, text=True, check=True
+    ).stdout
+    return next(
+        int(line.split()[0], 16) for line in table.splitlines() if line.endswith(f" {name}")
+    )
+
+
+def programs() -> list[int]:
+    """Read the words that PIO runs out of the image."""
+    build()
+    image = (FOLDER / "firmware.bin").read_bytes()
+    # The part that is copied to RAM begins where its first vector says the stack ends, again.
+    first = image[0x100:0x104]
+    at = image.index(first, 0x104) + symbol("programs") - symbol("load_to")
+    return [int.from_bytes(image[n : n + 2], "little") for n in range(at, at + 64, 2)]

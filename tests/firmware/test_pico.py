@@ -1,0 +1,124 @@
+"""The Pico's image, in its emulator, against the suite every device must pass."""
+
+from __future__ import annotations
+
+import pytest
+
+import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.errors import InputError
+from rig.link.client import Device
+from rig.link.messages import Phase
+from rig.link.port import open_port
+from rig_emulator.controller import EmulatorError
+from rig_emulator.pico_board import USB_RATE, EmulatedPico
+from rig_emulator.protocol_emu import EmulatedSerial
+from rig_emulator.wiring import PICO
+from tests.firmware.pico import build, programs, symbol
+from tests.link.bench import LABEL, ScriptedLab, falling_rods
+from tests.link.conformance import DeviceConformance
+from tests.link.talk import arm
+from tests.link.virtual import VirtualBench
+
+HZ = 20_000_000
+CYCLES = 6 * HZ
+
+
+class PicoBench(VirtualBench):
+    serial_type = EmulatedSerial
+    brown_out_cause = 1  # the chip cannot tell it from power
+
+    def __init__(self, lab: ScriptedLab) -> None:
+        board = EmulatedPico(PICO, build(), lab, seed=1, ppm=2000, baudrate=USB_RATE)
+        super().__init__(lab, board)
+
+    def touch(self, gates):
+        super().touch(gates)
+        self.clock().sleep(1e-3)  # nothing shorter than 50 ns is seen
+
+    def preset_tick(self, seconds_before_wrap):
+        chip = self.now().avr
+        looked = symbol("looked") + 2
+        upper = 2**16 - round(seconds_before_wrap * HZ) // 2**16
+        chip.ahead(upper - int.from_bytes(chip.peek(looked, 2), "little") << 16)
+        chip.poke(looked, upper.to_bytes(2, "little"))
+
+
+def test_an_afternoon_with_one():
+    """All that matters once, in a few seconds: the whole suite is below."""
+    bench = PicoBench(ScriptedLab(changes=falling_rods()))
+    chip = bench.board.avr
+    device = Device(bench.port(), bench.clock())
+    identity = device.connect()
+    assert chip.texts == ["chainrig", "chainrig on a Pico", identity.unique_id.hex().upper()]
+    assert (identity.tick_hz, identity.gates) == (HZ, 16)
+
+    suite = TestPico()
+    drop = suite.drop(device)
+    suite.check(bench, drop, identity)
+    assert drop.certificate.supply_mv == pytest.approx(5000, abs=5)
+    suite.release(device, drop)
+
+    # The release rests; then the emergency stop ends a pulse, and the board says by how much.
+    bench.clock().sleep(1)
+    device.fire(arm(device, LABEL + 1, pulse_us=400_000, record_ms=100))
+    bench.clock().sleep(0.02)
+    bench.stop(True)
+    drop = device.collect(LABEL + 1)
+    assert any("emergency stop" in fault for fault in drop.faults)
+    on, off = (c.cycle for c in list(bench.board.history)[-3:-1])
+    assert drop.certificate.pulse_ticks == (off - on) // 6
+    assert off - on == pytest.approx(0.0203 * 1.002 * CYCLES, rel=0.1)
+    suite.release(device, drop)
+    bench.stop(False)
+
+    suite.restart(bench, device)
+    assert device.status().phase is Phase.IDLE
+    bench.serial.close()
+
+
+@pytest.mark.parametrize(
+    ("patched", "named", "hint"),
+    [
+        ("shutil.which", "needs node", "nodejs"),
+        ("rig_emulator.pico_chip.HERE", "rp2040js", "npm ci"),
+    ],
+)
+def test_without_its_emulator_it_says_what_to_install(monkeypatch, tmp_path, patched, named, hint):
+    monkeypatch.setattr(patched, tmp_path if "HERE" in patched else lambda _: None)
+    with pytest.raises(InputError, match=named) as caught:
+        open_port("emu://?board=pico")
+    assert hint in caught.value.hint
+
+
+def test_a_program_that_does_what_is_not_modelled_is_named(tmp_path):
+    """Its first word of PIO is a WAIT: an error with the reason, and no silence."""
+    image = bytearray(build().read_bytes())
+    words = b"".join(word.to_bytes(2, "little") for word in programs())
+    at = image.index(words[:16])
+    image[at : at + 2] = (0x2000).to_bytes(2, "little")
+    (file := tmp_path / "odd.uf2").write_bytes(image)
+    with pytest.raises(EmulatorError, match="WAIT"):
+        EmulatedPico(PICO, file, baudrate=USB_RATE)
+
+
+@pytest.mark.slow
+class TestPico(DeviceConformance):
+    @pytest.mark.parametrize("seed", [1])
+    def test_one_percent_of_damaged_bytes_changes_nothing(self, bench, seed):
+        super().test_one_percent_of_damaged_bytes_changes_nothing(bench, seed)
+
+    def make(self, lab):
+        return PicoBench(lab)
+
+    def test_a_short_pulse_is_an_event_and_no_edge(self, bench):
+        """Not here: what is seen at all is seen as two edges."""
+        pulse = [(0.01, 0, True), (0.01 + 0.2e-6, 0, False)]
+        bench.lab.changes = [*pulse, (0.02, 1, True), (0.03, 1, False)]
+        device = Device(bench.port(), bench.clock())
+        device.connect()
+        drop = self.drop(device)
+        assert drop.faults == ()
+        assert drop.certificate.glitches == 0
+        first, second, *_ = drop.edges
+        assert (first[1:], second[1:]) == ((0, True), (0, False))
+        assert second.tick - first.tick == 4
