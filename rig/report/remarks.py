@@ -96,7 +96,7 @@ def clock_lines(said: Mapping[str, Any]) -> list[str]:
         where = "as the board states it"
     else:
         return [f"time scale: as the file gives it, ± {u} ppm (95 %)", *said["notes"]]
-    rate = fixed(said["rate_ppm"], 2)
+    rate = fixed(said["rate_ppm"], decimals_for(expanded))
     return [f"time scale: board {rate} ± {u} ppm off (95 %), {where}", *said["notes"]]
 
 

@@ -22,7 +22,7 @@ from rig.tui.state import DaemonState, state_of
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from textual.pilot import Pilot
@@ -137,21 +137,33 @@ def draw(
     list of Path
         The files: page, size and theme of each in its name.
     """
+    make_folder(folder)
+    written = []
+    for name, size, theme, svg in seen(session, keys, files, sizes, themes, _as_svg):
+        path = folder / f"{name}-{size[0]}x{size[1]}-{theme}.svg"
+        path.write_text(svg, "utf-8")
+        written.append(path)
+    return written
+
+
+def seen(
+    session: Path,
+    keys: Mapping[str, str],
+    files: tuple[Path, ...],
+    sizes: Sequence[tuple[int, int]],
+    themes: Sequence[str],
+    look: Callable[[RigApp], str],
+) -> Iterator[tuple[str, tuple[int, int], str, str]]:
+    """Look at every page: its name, the size, the theme and what was seen; else as `draw`."""
     live = LiveAnalysis(session)
     view = live.read()
     if view.lagging:
         live.fit_jointly(view)
         view = live.read()
-    make_folder(folder)
-    written = []
     for shot in screenshots(view):
-        for size, theme, svg in asyncio.run(
-            _pictures(shot, live, Options(files, session=session), keys, sizes, themes)
-        ):
-            path = folder / f"{shot.name}-{size[0]}x{size[1]}-{theme}.svg"
-            path.write_text(svg, "utf-8")
-            written.append(path)
-    return written
+        options = Options(files, session=session)
+        for one in asyncio.run(_looks(shot, live, options, keys, sizes, themes, look)):
+            yield shot.name, *one
 
 
 def screenshots(view: SessionView) -> list[Screenshot]:
@@ -192,15 +204,16 @@ def _falling(state: DaemonState, view: SessionView, job: Job) -> DaemonState:
     )
 
 
-async def _pictures(
+async def _looks(
     shot: Screenshot,
     live: LiveAnalysis,
     options: Options,
     keys: Mapping[str, str],
     sizes: Sequence[tuple[int, int]],
     themes: Sequence[str],
+    look: Callable[[RigApp], str],
 ) -> list[tuple[tuple[int, int], str, str]]:
-    """Draw one moment in every size and theme: each with its picture."""
+    """Look at one moment in every size and theme."""
     client = FakeClient(shot.state)
     app = RigApp(options, keys, client)
     app.driver.flow = shot.flow
@@ -229,9 +242,12 @@ async def _pictures(
             await pilot.resize_terminal(*size)
             for theme in themes:
                 app.theme = f"rig-{theme}"
-                svg = await at_rest(app, pilot, lambda: app.export_screenshot(title="chainrig"))
-                found.append((size, theme, portable(svg)))
+                found.append((size, theme, await at_rest(app, pilot, lambda: look(app))))
     return found
+
+
+def _as_svg(app: RigApp) -> str:
+    return portable(app.export_screenshot(title="chainrig"))
 
 
 def _all_counted(app: RigApp, shot: Screenshot) -> bool:

@@ -52,7 +52,7 @@ def chain_pictures(
         thin = slice(None, None, 1 + one.times.size // _MOST)
         times, heights = one.times[thin], one.heights[thin]
         series.append(Series("dots", times * 1e3, heights * 1e2, color, mark,
-                             f"{one.role} side"))  # fmt: skip
+                             one.role))  # fmt: skip
         if one.model is not None and times.size:
             off = heights - one.model.heights(times - one.delay_s)[0]
             left.append(Series("dots", times * 1e3, off * 1e3, color, mark))
@@ -62,10 +62,10 @@ def chain_pictures(
     if len(found) < 2:
         return chains, None
     gap = separation(found, end, skew_s)
-    how = "as it fell" if skew_s is None else "as if let go together"
+    how = "as it fell" if skew_s is None else "corrected"
     off = gap.gaps - gap.expected if gap.expected.size else gap.expected
     apart = Picture(
-        f"Δz (cm) {how}",
+        f"Δz {how} (cm)",
         _TIME,
         (
             Series("line", gap.curve * 1e3, gap.model * 1e2, "accent", label="model"),
@@ -115,7 +115,7 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
         else:
             some = f"{len(others)} others" if not curves else ""
             curves.append(dots._replace(color="foreground", marker="·", label=some))
-    title = "Δz (cm) as if let go together"
+    title = "Δz corrected (cm)"
     return Picture(title, _TIME, tuple(curves)) if curves else None
 
 

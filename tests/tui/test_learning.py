@@ -111,7 +111,7 @@ def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path
             await op.press("down")
             await op.sees("drop 2 of 4", "note: a [draught]")
             await op.press("k")
-            await op.sees("3 others", "mean SD", "as if let go together")
+            await op.sees("3 others", "mean SD", "Δz corrected (cm)")
             await op.press("f", *"nothing", "enter")
             await op.sees("No drop is nothing")
             await op.press("f", *["backspace"] * 7, *"40 B", "enter")

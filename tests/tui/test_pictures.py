@@ -1,27 +1,52 @@
-"""Pictures of the screens: the same session gives the same pictures, and they need no server."""
+"""Pictures of all pages, from a recorded session: in words against text files, and as SVG.
+
+``looks.session.xz`` is what ``rig run`` recorded of `tests.cli.lab.short` at ``sim://?seed=4``;
+``GOLDENS=write ./run test tests/tui`` writes the files anew; look at the difference.
+"""
 
 from __future__ import annotations
 
+import lzma
+import os
 import re
+from pathlib import Path
 
-from rig.tui.pictures import draw
-from tests.cli.lab import rig
+import pytest
+
+from rig.tui.pictures import SIZES, draw, seen
+from tests.cli.lab import short
 from tests.tui.lab import KEYS
+from tests.tui.screen import text_of
+from tests.tui.test_looks import GOLDENS
+
+RECORDED = Path(__file__).with_name("looks.session.xz")
+PAGES = ["protocol", "device", "run", "live", "result", "session", "history"]
 
 
-def test_the_same_session_gives_the_same_pictures(tmp_path, fence):
-    protocol, session = tmp_path / "fence.yaml", tmp_path / "fence.session"
-    protocol.write_text(fence.replace("TITLE", "A fence"), "utf-8")
-    done = rig("run", protocol, "--port", "sim://", "--session", session, "--yes")
-    assert done.returncode == 0, done.stderr
-    how = (protocol,), [(80, 24)], ["light"]
-    first = draw(session, tmp_path / "one", KEYS, *how)
-    assert [path.stem.removesuffix("-80x24-light") for path in first] == [
-        "protocol", "device", "run", "live", "result", "session", "history"
-    ]  # fmt: skip
-    for path, other in zip(first, draw(session, tmp_path / "two", KEYS, *how), strict=True):
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    """A session and its protocol in the working folder, so that no screen shows another's name."""
+    monkeypatch.chdir(tmp_path)
+    protocol, session = Path("looks.yaml"), Path("looks.session")
+    protocol.write_text(short(), "utf-8")
+    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
+    return session, (protocol,)
+
+
+def test_all_pages_look_as_they_did(recorded):
+    session, files = recorded
+    found = list(seen(session, KEYS, files, SIZES, ["dark"], text_of))
+    assert [name for name, size, *_ in found if size == SIZES[0]] == PAGES
+    for name, (columns, lines), _, text in found:
+        golden = GOLDENS / f"page-{name}-{columns}x{lines}.txt"
+        if os.environ.get("GOLDENS") == "write":
+            golden.write_text(text + "\n", "utf-8")
+        assert text + "\n" == golden.read_text("utf-8"), golden.name
+
+
+def test_pictures_say_that_they_are_simulated_and_need_no_server(recorded, tmp_path):
+    session, files = recorded
+    for path in draw(session, tmp_path / "drawn", KEYS, files, [(80, 24)], ["light"]):
         text = path.read_text("utf-8")
-        assert text == other.read_text("utf-8"), path.stem
-        assert "SIMULATED" in text
-        assert "A&#160;fence" in text
+        assert "SIMULATED" in text or path.name.startswith("protocol"), path.name
         assert not re.search(r"url\(['\"]?http", text)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from rig.campaign.events import Stage
-from rig.report.numbers import fixed
+from rig.report.numbers import decimals_for, fixed
 from rig.tui.screens.page import Page
 from rig.tui.widgets.gates import GateBoard, named
 from rig.tui.widgets.text import Words, plain
@@ -95,8 +95,10 @@ def _clock(model: Model) -> str:
     details = model.view.clock.details if model.view else {}
     if "error_ppm" not in details or not details.get("samples"):
         return "not compared yet: needs a second or two"
+    u = 2.0 * details["u_ppm"]
+    digits = decimals_for(u)
     return (
-        f"off by {fixed(details['error_ppm'], 1)} ± {2 * details['u_ppm']:.1f} ppm, from "
+        f"off by {fixed(details['error_ppm'], digits)} ± {fixed(u, digits)} ppm, from "
         f"{details['samples']} comparisons; times are corrected for it"
     )
 
