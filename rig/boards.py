@@ -43,7 +43,8 @@ class Capabilities:
 
 MEGA = Capabilities("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
 UNO = Capabilities("Arduino Uno", 12, 2, 0.5, 191, streams=True)
+PICO = Capabilities("Raspberry Pi Pico", 16, 2, 0.5, 16384, streams=False)
 BOARDS = {"mega": MEGA, "uno": UNO}
 """By the word for them at the command line."""
-FLASHED = {**BOARDS, "nano-old": UNO}
+FLASHED = {**BOARDS, "nano-old": UNO, "pico": PICO}
 """By the word for them where they are flashed: to all else an old Nano is an Uno."""

@@ -333,11 +333,17 @@ def _parser() -> Parser:
         help="its kind; nano-old: a Nano whose boot loader listens at 57,600 baud only",
     )
     flash.add_argument(
-        "--port", required=True, metavar="PATH", help="its device, such as /dev/ttyACM0"
+        "--port", metavar="PATH", help="its device, such as /dev/ttyACM0; not wanted of a Pico"
     )
     flash.add_argument(
-        "--hex", metavar="FILE", help="the firmware, if not the one that comes with this program"
+        "--drive",
+        metavar="DIR",
+        help="of a Pico: where its drive is mounted, if not found by itself",
     )
+    flash.add_argument(
+        "--hex", metavar="FILE",
+        help="the firmware, if not the one that comes with this program; UF2 for a Pico",
+    )  # fmt: skip
     flash.add_argument("--avrdude", metavar="PATH", help="where avrdude is, if not found by itself")
 
     ports = command("ports", "list the ports where a board may be; opens none by itself")

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.commands.output import say
-from rig.flash.steps import flash
+from rig.errors import InputError
+from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.steps import flash, flash_drive
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -13,7 +15,19 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Flash a board and say what it is now."""
-    found = flash(arguments.board, arguments.port, arguments.hex, arguments.avrdude, say)
+    board, port = arguments.board, arguments.port
+    if board not in TARGETS:
+        if arguments.avrdude is not None:
+            raise InputError(f"--avrdude does not write a {DRIVE.board.name}", "leave it out")
+        found = flash_drive(arguments.drive, port, arguments.hex, say)
+    elif arguments.drive is not None:
+        raise InputError(f"--drive is for a {DRIVE.board.name}", "an Arduino has a --port")
+    elif port is None:
+        raise InputError(
+            "rig flash: --port is missing", "such as /dev/ttyACM0; rig ports lists them"
+        )
+    else:
+        found = flash(board, port, arguments.hex, arguments.avrdude, say)
     print(
         f"{found.board}, {found.firmware}, {found.gates} gates, "
         f"id {found.unique_id.hex()}: flashed and verified"

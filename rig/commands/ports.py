@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
+from rig.flash.drive import waiting_drives
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from rig.usb.listing import SerialPort, serial_ports
@@ -33,6 +34,8 @@ def main(arguments: Namespace) -> int:
     ids = Counter(who["identity"]["unique_id"] for who in asked.values() if who["identity"])
     for shared in (one for one, count in ids.items() if count > 1):
         say(f"several boards have the id {shared}: erase the EEPROM of all but one")
+    for drive in waiting_drives():
+        say(f"a Pico waits for firmware at {drive}: rig flash --board pico")
     if not any(port.candidate for port in ports):
         say("no board found: is its cable plugged in, and one that carries data?")
     return 0

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFacts
-from rig.flash.boards import TARGETS
-from rig.flash.image import read_image
+from rig.flash.image import shipped_firmware
 from rig.link.client import Device
 from rig.link.gatewatch import watch_gates
 from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.clock.host import Clock
-    from rig.link.messages import Identity
     from rig.link.port import Port
     from rig.records import Edge
 
@@ -170,15 +168,16 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
         edges, unwatched, stopped = _recorded(device, ((1 << identity.gates) - 1) & ~states.stuck)
     held = unpack_label(state.label) if state.phase is Phase.HOLDING else None
     return BoardFacts(
-        identity, _shipped(identity), tuple(pings), held, states, edges, WATCH_S, unwatched, stopped
+        identity,
+        shipped_firmware(identity.board),
+        tuple(pings),
+        held,
+        states,
+        edges,
+        WATCH_S,
+        unwatched,
+        stopped,
     )
-
-
-def _shipped(identity: Identity) -> str:
-    for target in TARGETS.values():
-        if target.board.name == identity.board:
-            return read_image(target.shipped, target).firmware
-    return ""
 
 
 def _recorded(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str, bool]:

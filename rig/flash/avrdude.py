@@ -15,7 +15,7 @@ from rig.errors import DeviceError, InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rig.flash.boards import Target
+    from rig.flash.boards import AvrTarget
 
 _LOOK_S = 0.2
 _RESET = "wrong --board (nano-old for an old Nano)? Press the board's reset button and try again"
@@ -61,7 +61,7 @@ def find_avrdude(path: str | None) -> str:
     raise InputError("avrdude is not installed", "apt-get install avrdude, or say --avrdude PATH")
 
 
-def write_flash(avrdude: str, target: Target, port: str, image: Path) -> None:
+def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None:
     """Write an image into a board's flash; avrdude reads it back and compares.
 
     Parameters

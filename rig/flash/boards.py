@@ -1,11 +1,11 @@
-"""The boards that can be flashed: how avrdude calls them, and what they call themselves."""
+"""The boards that can be flashed: how, and what they call themselves."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.boards import MEGA, UNO, Capabilities
+from rig.boards import MEGA, PICO, UNO, Capabilities
 
 FIRMWARE = "chainrig"
 """What a firmware of this project begins its name with; its version follows."""
@@ -19,18 +19,13 @@ class Target:
     ----------
     board
         The board.
-    part, programmer, baudrate
-        The chip and the boot loader's protocol and rate, as avrdude wants them.
     image
         File name of the firmware that comes with this program.
     flash_limit
-        First address that belongs to the boot loader.
+        How much of its flash a firmware may take.
     """
 
     board: Capabilities
-    part: str
-    programmer: str
-    baudrate: int
     image: str
     flash_limit: int
 
@@ -40,10 +35,28 @@ class Target:
         return Path(__file__).with_name(self.image)
 
 
+@dataclass(frozen=True, slots=True)
+class AvrTarget(Target):
+    """A board that avrdude writes.
+
+    Attributes
+    ----------
+    part, programmer, baudrate
+        The chip and the boot loader's protocol and rate, as avrdude wants them.
+    """
+
+    part: str
+    programmer: str
+    baudrate: int
+
+
 TARGETS = {
-    "mega": Target(MEGA, "m2560", "wiring", 115200, "atmega2560.hex", 0x3E000),
-    "uno": Target(UNO, "m328p", "arduino", 115200, "atmega328p.hex", 0x7E00),
-    "nano-old": Target(UNO, "m328p", "arduino", 57600, "atmega328p.hex", 0x7800),
+    "mega": AvrTarget(MEGA, "atmega2560.hex", 0x3E000, "m2560", "wiring", 115200),
+    "uno": AvrTarget(UNO, "atmega328p.hex", 0x7E00, "m328p", "arduino", 115200),
+    "nano-old": AvrTarget(UNO, "atmega328p.hex", 0x7800, "m328p", "arduino", 57600),
 }
 """By the word for ``--board``. All boot loaders' rates are those of the makers' own tools. A
 Nano is an Uno on a smaller board; those sold before 2018, and many since, have another loader."""
+
+DRIVE = Target(PICO, "rp2040.uf2", 2 << 20)
+"""The Pico, which shows a drive that its firmware is copied to."""

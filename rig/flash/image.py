@@ -1,4 +1,4 @@
-"""A firmware image (Intel HEX): whether it is whole, for which board, and of which version.
+"""A firmware image (Intel HEX, UF2): whether it is whole, for which board, and of which version.
 
 Both names are read from the image itself, where the firmware keeps them for `Identity`: so what a
 board must answer after flashing is written down nowhere a second time.
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError, Problem
-from rig.flash.boards import FIRMWARE, TARGETS
+from rig.flash.boards import DRIVE, FIRMWARE, TARGETS
+from rig.flash.uf2 import read_blocks
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,14 +59,12 @@ def read_image(path: Path, target: Target) -> Image:
         The file is damaged, is no firmware of this project, or is for another board.
     """
     try:
-        text = path.read_text("ascii")
+        data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is no Intel HEX file") from None
-    flash = _flash(text, path)
+    flash = read_blocks(data, path) if target is DRIVE else _records(data, path)
     versions = set(_VERSION.findall(flash))
-    names = {one.board.name for one in TARGETS.values()}
+    names = {one.board.name for one in (*TARGETS.values(), DRIVE)}
     boards = [name for name in names if name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
         raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
@@ -74,6 +73,22 @@ def read_image(path: Path, target: Target) -> Image:
     if len(flash) > target.flash_limit:
         raise InputError(f"{path} would overwrite the boot loader of an {target.board.name}")
     return Image(path, versions.pop().decode(), len(flash))
+
+
+def shipped_firmware(board: str) -> str:
+    """Say which firmware comes with this program for a board of that name; empty for none."""
+    for target in (*TARGETS.values(), DRIVE):
+        if target.board.name == board:
+            return read_image(target.shipped, target).firmware
+    return ""
+
+
+def _records(data: bytes, path: Path) -> bytes:
+    """Read Intel HEX."""
+    try:
+        return _flash(data.decode("ascii"), path)
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is no Intel HEX file") from None
 
 
 def _flash(text: str, path: Path) -> bytes:

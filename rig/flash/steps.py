@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.avrdude import find_avrdude, write_flash
-from rig.flash.boards import TARGETS
+from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.drive import choose_drive, copy_to, new_port, pico_ports
 from rig.flash.image import read_image
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
@@ -65,6 +66,43 @@ def flash(
     write_flash(program, target, port, file.path)
     say("written; asking the board who it is")
     return identify(port, target, file.firmware)
+
+
+def flash_drive(
+    drive: str | None, port: str | None, image: str | None, say: Callable[[str], None]
+) -> Identity:
+    """Copy the firmware to a Pico that waits for it, and verify it.
+
+    Parameters
+    ----------
+    drive
+        Folder at which its drive is mounted; `None`: wherever it is.
+    port
+        Device path that it will have; `None`: whichever appears.
+    image
+        UF2 file; `None`: the one that comes with this program.
+    say
+        Told what happens.
+
+    Returns
+    -------
+    Identity
+        What the board answered.
+
+    Raises
+    ------
+    InputError
+        No such drive, or a file that must not be flashed.
+    DeviceError
+        No Pico waits, writing failed, or the board does not say what it should.
+    """
+    file = read_image(DRIVE.shipped if image is None else Path(image), DRIVE)
+    folder = choose_drive(drive)
+    before = pico_ports()
+    say(f"copying {file.firmware} ({file.size} bytes) to the {DRIVE.board.name} at {folder}")
+    copy_to(folder, file.path)
+    say("copied; asking the board who it is")
+    return identify(port or new_port(before), DRIVE, file.firmware)
 
 
 def identify(port: str, target: Target, firmware: str) -> Identity:

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.boards import MEGA, UNO
+from rig.boards import MEGA, PICO, UNO
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -38,8 +38,10 @@ class Known:
 
 _MEGA, _UNO = MEGA.name, UNO.name
 
-# Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8. Chips: their makers'.
+# Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
+# gives any serial port on it. Chips: their makers'.
 KNOWN = (
+    Known(0x2E8A, 0x000A, PICO.name, board=True),
     Known(0x2341, 0x0010, _MEGA, board=True),
     Known(0x2341, 0x0042, _MEGA, board=True),
     Known(0x2341, 0x0210, _MEGA, board=True),

@@ -9,21 +9,26 @@ from pathlib import Path
 
 import pytest
 
-from rig.flash.boards import TARGETS
+from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image
 from tests.firmware.toolchain import FIRMWARE, need
 
-SOURCES = ("core", "avr", "atmega2560", "atmega328p", "Makefile", "size.py")
-BOTH = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
+SOURCES = ("core", "avr", "atmega2560", "atmega328p", "rp2040", "Makefile", "size.py")
+EACH = pytest.mark.parametrize("target", [*TARGETS.values(), DRIVE], ids=[*TARGETS, "pico"])
+COMPILERS = {"avr-gcc": "PREBUILT_WITH", "arm-none-eabi-gcc": "PICO_PREBUILT_WITH"}
 
 
 def built_in(folder: Path) -> Path:
     """Copy the sources there, build them, and say where the images are."""
-    need("make", "avr-gcc", "avr-objcopy")
-    wanted = re.search(r"^PREBUILT_WITH = (.+)$", (FIRMWARE / "Makefile").read_text(), re.MULTILINE)
-    found = subprocess.run(["avr-gcc", "-dumpversion"], capture_output=True, text=True, check=True)
-    if found.stdout.strip() != wanted[1]:
-        pytest.skip(f"the images are made with avr-gcc {wanted[1]}, here is {found.stdout}")
+    need("make", *COMPILERS, "avr-objcopy")
+    makefile = (FIRMWARE / "Makefile").read_text()
+    for compiler, name in COMPILERS.items():
+        wanted = re.search(rf"^{name} = (.+)$", makefile, re.MULTILINE)
+        found = subprocess.run(
+            [compiler, "-dumpversion"], capture_output=True, text=True, check=True
+        )
+        if found.stdout.strip() != wanted[1]:
+            pytest.skip(f"the images are made with {compiler} {wanted[1]}, here is {found.stdout}")
     firmware, images = folder / "firmware", folder / "rig" / "flash"
     images.mkdir(parents=True)
     firmware.mkdir()
@@ -45,19 +50,19 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     ]
 
 
-@BOTH
+@EACH
 def test_the_shipped_image_is_what_the_sources_make(target, images):
     stale = "the sources have changed since: make -C firmware prebuilt"
     assert (images[0] / target.image).read_bytes() == target.shipped.read_bytes(), stale
 
 
-@BOTH
+@EACH
 def test_the_folder_makes_no_difference(target, images):
     one, other = ((folder / target.image).read_bytes() for folder in images)
     assert one == other
 
 
-@BOTH
+@EACH
 def test_the_shipped_image_is_whole_and_for_its_board(target):
     version = re.search(r"^VERSION = (.+)$", (FIRMWARE / "Makefile").read_text(), re.MULTILINE)
     image = read_image(target.shipped, target)

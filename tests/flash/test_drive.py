@@ -1,0 +1,161 @@
+"""``rig flash --board pico``: a folder for its drive, and a board that is there afterwards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from serial.tools.list_ports_common import ListPortInfo
+
+from rig.cli import main
+from rig.errors import DeviceTimeoutError, InputError
+from rig.flash import drive as drives
+from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.image import read_image, shipped_firmware
+from tests.flash.pty_board import PtyBoard
+
+VERSION = shipped_firmware(DRIVE.board.name)
+NAMES = {"board": DRIVE.board.name, "firmware": VERSION}
+
+
+def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
+    """Mount drives of boards that wait for firmware, among other file systems."""
+    made = []
+    for name in names:
+        (drive := folder / name).mkdir()
+        (drive / "INFO_UF2.TXT").write_text("UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\n"
+                                            "Board-ID: RPI-RP2\n")  # fmt: skip
+        made.append(drive)
+    (folder / "stick").mkdir()
+    lines = ["proc /proc proc rw 0 0", f"/dev/sdb1 {folder}/stick vfat rw 0 0"]
+    lines += [f"/dev/sdc1 {str(one).replace(' ', chr(92) + '040')} vfat rw 0 0" for one in made]
+    (mounts := folder / "mounts").write_text("\n".join(lines) + "\n")
+    monkeypatch.setattr(drives.waiting_drives, "__defaults__", (mounts,))
+    monkeypatch.setattr(drives.choose_drive, "__defaults__", (mounts,))
+    return made
+
+
+def plugged(monkeypatch, path: str, after: int = 1) -> None:
+    """Have a Pico's port appear, at the look after so many."""
+    looks = []
+
+    def ports():
+        looks.append(path)
+        info = ListPortInfo(path)
+        info.vid, info.pid = 0x2E8A, 0x000A
+        return [info] if len(looks) > after else []
+
+    monkeypatch.setattr("serial.tools.list_ports.comports", ports)
+    monkeypatch.setattr(drives, "_LOOK_S", 0.001)
+
+
+@pytest.fixture
+def flash(capsys):
+    def call(*arguments):
+        code = main(["flash", "--board", "pico", *map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return code, out, err
+
+    return call
+
+
+def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):
+    (drive,) = picos(tmp_path, monkeypatch, "RPI-RP2 of mine")
+    with PtyBoard(**NAMES) as there:
+        plugged(monkeypatch, there.path, after=3)
+        code, out, err = flash()
+    assert code == 0, err
+    assert out.startswith(f"Raspberry Pi Pico, {VERSION}, 16 gates, id ")
+    assert out.endswith(": flashed and verified\n")
+    assert (drive / "chainrig.uf2").read_bytes() == DRIVE.shipped.read_bytes()
+
+
+def test_a_drive_and_a_port_that_are_named(flash, tmp_path, monkeypatch):
+    _, drive = picos(tmp_path, monkeypatch, "one", "other")
+    with PtyBoard(**NAMES) as there:
+        code, _, err = flash("--drive", drive, "--port", there.path, "--hex", DRIVE.shipped)
+    assert code == 0, err
+    assert (drive / "chainrig.uf2").exists()
+
+
+def test_no_drive_says_how_to_make_it_appear(flash, tmp_path, monkeypatch):
+    picos(tmp_path, monkeypatch)
+    code, out, err = flash()
+    assert (code, out) == (4, "")
+    assert "no Pico waits for firmware" in err
+    assert "hold its BOOTSEL button" in err
+
+
+def test_several_drives_are_named(flash, tmp_path, monkeypatch):
+    one, other = picos(tmp_path, monkeypatch, "one", "other")
+    code, _, err = flash()
+    assert code == 4
+    assert f"{one}, {other}" in err
+    assert "--drive" in err
+
+
+def test_what_is_no_such_drive_is_left_alone(flash, tmp_path):
+    code, _, err = flash("--drive", tmp_path)
+    assert code == 2
+    assert "is no drive of a Pico" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_port_appears(tmp_path, monkeypatch):
+    plugged(monkeypatch, "/dev/ttyACM0", after=99)
+    with pytest.raises(DeviceTimeoutError, match="no port of a Pico appears"):
+        drives.new_port(set(), patience_s=0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["flash", "--board", "mega"], "--port is missing"),
+        (["flash", "--board", "mega", "--drive", "x"], "--drive is for a Raspberry Pi Pico"),
+        (["flash", "--board", "pico", "--avrdude", "x"], "--avrdude does not write"),
+    ],
+)
+def test_options_of_the_other_boards(capsys, arguments, message):
+    assert main(arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_ports_tells_of_a_board_that_waits(capsys, tmp_path, monkeypatch):
+    (drive,) = picos(tmp_path, monkeypatch, "RPI-RP2")
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    assert main(["ports"]) == 0
+    assert f"a Pico waits for firmware at {drive}" in capsys.readouterr().err
+
+
+def _without(at: int, size: int):
+    return lambda data: data[:at] + data[at + size :]
+
+
+def _with(at: int, value: bytes):
+    return lambda data: data[:at] + value + data[at + len(value) :]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_without(0, 1), "no whole UF2 file"),
+        (lambda _: b"", "no whole UF2 file"),
+        (_without(512, 512), "not whole: block 0"),
+        (_with(512 + 12, bytes(4)), "not whole: block 1"),
+        (_with(28, bytes(4)), "not for an RP2040"),
+        (_with(0, b"X"), "no UF2 file, or damaged: block 0"),
+        (lambda data: data.replace(b"Raspberry Pi Pico\0", b"Raspberry Pi Pika\0"), "no firmware"),
+    ],
+)
+def test_a_file_that_must_not_be_flashed(tmp_path, change, message):
+    (file := tmp_path / "it.uf2").write_bytes(change(DRIVE.shipped.read_bytes()))
+    with pytest.raises(InputError, match=message):
+        read_image(file, DRIVE)
+
+
+def test_an_image_of_another_kind(tmp_path):
+    with pytest.raises(InputError):
+        read_image(TARGETS["mega"].shipped, DRIVE)
+    with pytest.raises(InputError, match="is no Intel HEX file"):
+        read_image(DRIVE.shipped, TARGETS["mega"])
