@@ -58,6 +58,15 @@ def _parser() -> argparse.ArgumentParser:
 
     link = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
 
+    mutation = benches.add_parser("mutation", help="faults put into the software: who notices?")
+    mutation.add_argument("--mutants", type=_count, default=200, metavar="N", help="in all")
+    mutation.add_argument("--seed", type=int, default=1, help="which ones")
+    mutation.add_argument("--rooms", nargs="+", metavar="ROOM", help="only in these")
+    mutation.add_argument("--where", default="", metavar="TEXT", help="only those that have it")
+    mutation.add_argument("--jobs", type=_count, default=1, metavar="N", help="side by side")
+    mutation.add_argument("--list", action="store_true", help="only say which they are")
+    mutation.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
+
     stop = benches.add_parser("stop", help="how long STOP takes to the wire, whatever is going on")
     stop.add_argument("--stops", type=_count, default=50, metavar="N", help="in each condition")
 
@@ -65,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     tui.add_argument(
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
-    for one in (clock, faults, link, stop, tui):
+    for one in (clock, faults, link, mutation, stop, tui):
         one.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser
 

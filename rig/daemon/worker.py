@@ -215,21 +215,26 @@ class Worker:
         if not is_simulated(self._url):
             self._trying(self.controller.connect)
         while not self._ending:
+            patience_s = self._patience()
+            self._beat(patience_s)
+            job = None
             with suppress(queue.Empty):
-                patience_s = self._patience()
-                self._beat(patience_s)
                 job = self._jobs.get(timeout=patience_s)
-                self._beat()
-                self._do(job)
-            self._attend()
-            self._trying(self.controller.finish)
-            self._trying(self.controller.notice)
-            self._idle()
+            self._beat()
+            self._turn(job)
         self._stop = self._stop or "the daemon ended"
         self._attend()
         self._drain(StoppedError("the daemon ends", "start it again: rig daemon"))
         self._trying(self.controller.close)
         self._due_s = math.inf
+
+    def _turn(self, job: _Job | None) -> None:
+        """Do what was asked for, then whatever is due."""
+        self._do(job)
+        self._attend()
+        self._trying(self.controller.finish)
+        self._trying(self.controller.notice)
+        self._idle()
 
     def _do(self, job: _Job | None) -> None:
         if job is None or not job.outcome.set_running_or_notify_cancel():

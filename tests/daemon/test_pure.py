@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rig.daemon import rpc
 from rig.daemon.client_protocol import Replica
 from rig.daemon.lease import LEASE_S, ControlError, Lease
+from rig.daemon.stopper import Stopper
 from rig.errors import (
     DeviceError,
     DeviceTimeoutError,
@@ -188,3 +189,21 @@ def test_a_replica_does_not_swallow_a_gap():
     replica.snapshot({"n": 3, "state": {"edges": []}})
     with pytest.raises(ValueError, match="change 5 behind 3"):
         replica.change({"n": 5})
+
+
+@pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])
+def test_stop_is_sent_five_times_unless_the_worker_takes_over(worker_comes, times):
+    sent = []
+
+    def send():
+        sent.append(1)
+        stopper._ending = True  # behind what is asked for now
+        stopper._asked.set()
+        if worker_comes:
+            stopper.taken_over()
+        return True
+
+    stopper = Stopper(send)  # never started: this thread is its thread
+    stopper.ask()
+    stopper._run()
+    assert len(sent) == times

@@ -83,6 +83,13 @@ def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
         Client(tmp_path / "rig.sock", "t")
 
 
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"cannot use .*Not a directory") as caught:
+        prepare_folder(tmp_path / "file" / "door")
+    assert "--socket" in caught.value.hint
+
+
 def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
     tmp_path.chmod(0o700)
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)

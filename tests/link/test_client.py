@@ -12,6 +12,7 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.boards import LONGEST_RECORD_MS
 from rig.clock.host import SystemClock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
@@ -131,6 +132,28 @@ def test_repeats_have_the_same_seq_and_back_off(clock):
     assert 1.5 < clock.ns * 1e-9 < 3
 
 
+def test_what_is_asked_and_asked_again_is_counted(clock):
+    port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
+    one = device_at(port, tries=3)
+    one.ping()
+    with pytest.raises(DeviceTimeoutError):
+        one.status()
+    counted = one.statistics()
+    assert (counted["requests"], counted["repeats"]) == (2, 2)
+    assert counted["tx_bytes"] == sum(map(len, port.written))
+    assert counted["rx_bytes"] == len(encode(Frame(wire.CODES[wire.Pong], 1, 1, bytes(4))))
+
+
+def test_five_aborts_leave_before_an_armed_board_switches_itself_off(clock):
+    port = FakePort(clock, {})
+    begun = []
+    port.write = lambda data: begun.append(clock.ns)
+    port.read = lambda size=1: clock.sleep(0.001) or b""
+    with pytest.raises(DeviceTimeoutError):
+        device_at(port).abort()
+    assert sum(at < wire.HOST_SILENCE_MS * 1e6 for at in begun) >= 5
+
+
 @pytest.mark.parametrize("noise", [b"\x55" * 4096, bytes(range(256)) * 16, b"\0" * 4096])
 def test_a_flood_from_who_knows_whom_is_ended_after_a_mebibyte(clock, noise):
     port, kept = FakePort(clock, {}), []
@@ -172,6 +195,19 @@ def test_reading_from_a_closed_port_is_a_lost_connection(clock):
     port.read = lambda size=1: (_ for _ in ()).throw(serial.PortNotOpenError())
     with pytest.raises(DeviceError, match="connection lost"):
         Device(port, clock).poll()
+
+
+def test_counting_on_a_closed_port_is_a_lost_connection(clock, monkeypatch):
+    def closed(_port):
+        raise serial.PortNotOpenError
+
+    monkeypatch.setattr(FakePort, "in_waiting", property(closed))
+    with pytest.raises(DeviceError, match="connection lost"):
+        device(clock, {}).statistics()
+
+
+def test_what_a_board_can_do_is_in_seconds():
+    assert IDENTITY.capabilities().longest_pulse == 0.5
 
 
 def test_the_tap_comes_before_everything(clock):
@@ -329,7 +365,7 @@ def test_a_recording_without_end_is_a_time_out(clock):
     state = wire.State(wire.Phase.RECORDING, 0, 1, 3)
     with pytest.raises(DeviceTimeoutError, match="never ends"):
         device(clock, {wire.Status: [state]}).collect(1, timeout=1)
-    assert clock.ns < 80e9
+    assert clock.ns * 1e-3 == pytest.approx(LONGEST_RECORD_MS * 1e3, rel=0.03)
 
 
 # -- the transcript alone

@@ -14,6 +14,7 @@ from sim.board import VirtualBoard
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.talk import arm
 from tests.link.tcp_bridge import TcpBridge
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -60,6 +61,18 @@ def test_a_connection_that_ends_is_said(bridge):
     with pytest.raises(DeviceError, match=r"socket disconnected|reset by peer|Broken pipe"):
         device.status()
     port.close()
+
+
+def test_what_has_arrived_is_counted():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = open_port(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        other, _ = server.accept()
+        with other:
+            other.sendall(bytes(300))
+            until(lambda: port.in_waiting == 300)
+            assert port.read(300) == bytes(300)
+            assert port.in_waiting == 0
+        port.close()
 
 
 def test_nothing_listens():

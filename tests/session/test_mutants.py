@@ -22,6 +22,7 @@ from rig.errors import SessionError
 from rig.recover.examine import describe, examine
 from rig.session import foreign
 from rig.session.store import Session
+from tests.session.altering import unguarded
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +110,25 @@ def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp
             Session.open(path, readonly=readonly)
     assert main(["recover", str(path)]) == SessionError.exit_code
     assert "rig cannot read it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("sql", "what"),
+    [
+        ("UPDATE bytes SET direction = 'up' WHERE id = 3", "bytes of no direction"),
+        ("UPDATE run_state SET reasons = '{}' WHERE id = 1", "makes no sense"),
+        ("UPDATE run_state SET reasons = '[1]' WHERE id = 1", "makes no sense"),
+        ("UPDATE identity SET json = '[]' WHERE id = 1", "makes no sense"),
+    ],
+)
+def test_a_value_of_the_wrong_form_is_refused(sql, what, sound, tmp_path):
+    path = tmp_path / "altered"
+    path.write_bytes(sound.read_bytes())
+    with unguarded(path) as connection:
+        connection.execute("PRAGMA ignore_check_constraints = ON")
+        connection.execute(sql)
+    with pytest.raises(SessionError, match=what):
+        read_through(path)
 
 
 def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):

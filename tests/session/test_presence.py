@@ -12,7 +12,7 @@ import pytest
 
 from bench.mutants import make_session
 from bench.process_fixture import FENCE
-from rig.errors import DeviceError, SessionError
+from rig.errors import DeviceError, InputError, SessionError
 from rig.recorder.controller import Controller
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -134,3 +134,23 @@ def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
     simulated = Controller("sim://")
     simulated.open_session(str(protocol), str(session))
     simulated.close()
+
+
+def test_results_of_less_than_there_will_be_are_gone_when_a_session_is_gone_on_with(rig, tmp_path):
+    made, protocol, session = rig
+    made.session.put_results([{"run": 1, "attempt": 1}], "0")
+    made.close()
+    again = Controller("sim://")
+    again.open_session(str(protocol), str(session))
+    with Session.open(session, readonly=True) as found:  # what is committed
+        assert found.results() == []
+    again.close()
+
+
+def test_a_scene_without_gates_makes_no_session(tmp_path):
+    protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
+    text = FENCE.replace("RUNS", "1")
+    protocol.write_text(text[: text.index("gates:")] + text[text.index("release:") :], "utf-8")
+    with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
+        Controller("sim://").open_session(str(protocol), str(session))
+    assert not session.exists()

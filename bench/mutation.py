@@ -1,0 +1,329 @@
+"""Faults put into the software, one at a time, and whether any test notices.
+
+A fault is tried on a copy of the project, by the tests of its room that run through its line, the
+quickest first, until one fails. Which those are is known from one run of each room's tests.
+"""
+
+from __future__ import annotations
+
+import ast
+import csv
+import hashlib
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+from tempfile import TemporaryDirectory
+from time import monotonic
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from bench.mutation_plugin import RECORD, SELECT
+from bench.mutators import c_faults, python_faults
+from rig.commands.output import say
+from rig.errors import InputError
+from rig.text_table import text_table
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterable, Iterator
+
+    from bench.mutators import Fault
+
+ROOT = Path(__file__).parent.parent
+KEPT = ROOT / "out" / "mutation"
+"""Where the records of which test runs through which line stay."""
+_MEMORY_BYTES = 6 << 30
+_PATIENCE = 10.0
+"""How many times as long as before tests may take until a fault counts as one that hangs."""
+_START_S = 120.0  # until pytest has loaded everything, on a busy machine
+
+
+class Room(NamedTuple):
+    """Where faults are put, and the tests that shall notice."""
+
+    sources: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+ROOMS = {
+    "analysis": Room(("rig/analysis",), ("tests/analysis",)),
+    "link": Room(("rig/link",), ("tests/link",)),
+    "session": Room(("rig/session",), ("tests/session", "tests/recover")),
+    "model": Room(("rig/model",), ("tests/model",)),
+    "daemon": Room(("rig/daemon", "rig/recorder"), ("tests/daemon", "tests/recorder")),
+    "core": Room(("firmware/core",), ("tests/firmware/test_core.py",)),
+}
+LEAST_KILLED = 0.9
+
+
+class Mutant(NamedTuple):
+    """One fault at its place."""
+
+    room: str
+    path: str
+    fault: Fault
+
+    def __str__(self) -> str:
+        """Say where it is and what."""
+        return f"{self.path}:{self.fault.line} {self.fault}"
+
+
+class Outcome(NamedTuple):
+    """What became of it: `by` is the test that noticed, empty when none did."""
+
+    mutant: Mutant
+    by: str
+    tests: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """Which tests run through what, from one run of a room's tests.
+
+    Attributes
+    ----------
+    seconds
+        Of each test.
+    lines
+        For each file, tests by line; what runs only when a file is loaded has none.
+    """
+
+    seconds: dict[str, float]
+    lines: dict[str, dict[int, set[str]]]
+
+    def tests(self, path: str, line: int) -> list[str]:
+        """List the tests that may notice a fault, the quickest first.
+
+        Where none is known to run through the line (it runs when the file is loaded, or in a
+        process that was killed), all that run through the file are, else all of the room.
+        """
+        by_line = self.lines.get(path, {})
+        whole = set().union(*by_line.values())
+        found = set().union(*(by_line.get(at, ()) for at in _statement(path, line)))
+        return sorted(found or whole or self.seconds, key=lambda one: (self.seconds[one], one))
+
+
+def _statement(path: str, line: int) -> range:
+    """Lines of the innermost statement that a line is of."""
+    if not path.endswith(".py"):
+        return range(line, line + 1)
+    spans = [
+        (node.lineno, node.end_lineno or node.lineno)
+        for node in ast.walk(ast.parse((ROOT / path).read_text("utf-8")))
+        if isinstance(node, ast.stmt)
+    ]
+    first, last = min(
+        (span for span in spans if span[0] <= line <= span[1]), key=lambda span: span[1] - span[0]
+    )
+    return range(first, last + 1)
+
+
+def main(arguments: Namespace) -> int:
+    """Put faults in and print what was noticed; 1 when less than nine of ten were."""
+    rooms = arguments.rooms or list(ROOMS)
+    mutants = list(_sampled(rooms, arguments.mutants, arguments.seed, arguments.where))
+    if arguments.list:
+        print("\n".join(map(str, mutants)))
+        return 0
+    copies: SimpleQueue[Path] = SimpleQueue()
+    with TemporaryDirectory(prefix="rig-mutation-") as folder:
+        for number in range(arguments.jobs):
+            copies.put(_copied(Path(folder) / str(number)))
+        reached = {room: _reached(room, copies) for room in rooms}
+        outcomes = list(_tried(mutants, reached, copies, arguments.jobs))
+    if arguments.output:
+        _write(Path(arguments.output) / "mutation.csv", outcomes)
+    rows = [["room", "faults", "noticed", "share", "tests each", "s each"]]
+    for room in [*rooms, "all"]:
+        some = [one for one in outcomes if room in {"all", one.mutant.room}]
+        if some:
+            rows.append([room, *_counted(some)])
+    if arguments.json:
+        print(json.dumps([[*map(str, one)] for one in outcomes]))
+    else:
+        print("\n".join(text_table(rows, left={0}, rule=True)))
+    survived = [one for one in outcomes if not one.by]
+    for one in survived:
+        say(f"not noticed: {one.mutant}")
+    return int(len(survived) > (1.0 - LEAST_KILLED) * len(outcomes))
+
+
+def _counted(some: list[Outcome]) -> list[str]:
+    noticed = sum(bool(one.by) for one in some)
+    means = [sum(values) / len(some) for values in zip(*(one[2:] for one in some), strict=True)]
+    return [
+        str(len(some)),
+        str(noticed),
+        f"{noticed / len(some):.0%}",
+        *(f"{m:.0f}" for m in means),
+    ]
+
+
+def _sampled(rooms: list[str], count: int, seed: int, where: str) -> Iterator[Mutant]:
+    """Draw as many faults of each room, one by one in turn, so that fewer are the first of more."""
+    turns = []
+    for room in rooms:
+        found = [
+            Mutant(room, str(path.relative_to(ROOT)), fault)
+            for folder in ROOMS[room].sources
+            for path in sorted((ROOT / folder).glob("*.c" if room == "core" else "*.py"))
+            for fault in (c_faults if room == "core" else python_faults)(path.read_text("utf-8"))
+        ]
+        random.Random(f"{room} {seed}").shuffle(found)  # noqa: S311 - a sample, no secrets
+        turns.append([one for one in found if where in str(one)])
+    in_turn = (
+        some[n] for n in range(max(map(len, turns), default=0)) for some in turns if some[n:]
+    )
+    for one, _ in zip(in_turn, range(count), strict=False):
+        yield one
+
+
+# ---------------------------------------------------------------- copies of the project
+
+
+def _copied(place: Path) -> Path:
+    """Copy what tests need; what was built too, with its times."""
+    skipped = shutil.ignore_patterns(".*", "out", "__pycache__", "*.egg-info")
+    shutil.copytree(ROOT, place, ignore=skipped, symlinks=True)
+    return place
+
+
+def _reached(room: str, copies: SimpleQueue[Path]) -> Reached:
+    """Read which tests run through which lines, or run them to find out."""
+    kept = KEPT / f"{room}-{_state_of(ROOMS[room])}.json"
+    if not kept.exists():
+        KEPT.mkdir(parents=True, exist_ok=True)
+        copy = copies.get()
+        say(f"{room}: which tests run through which lines")
+        sources = [str(copy / one) for one in ROOMS[room].sources]
+        asked = {RECORD: os.pathsep.join([str(kept.with_suffix(".new")), *sources])}
+        code, told = _pytest(copy, asked, _tests_of(room), None)
+        copies.put(copy)
+        if code:
+            raise InputError(f"tests of {room} fail without any fault\n{told[-2000:]}")
+        kept.with_suffix(".new").replace(kept)
+    record = json.loads(kept.read_text("utf-8"))
+    lines = {
+        path: {int(line): set(tests) for line, tests in by_line.items()}
+        for path, by_line in record["lines"].items()
+    }
+    return Reached(record["seconds"], lines)
+
+
+def _state_of(room: Room) -> str:
+    found = hashlib.sha256()
+    for folder in (*room.sources, *room.tests):
+        for path in sorted((ROOT / folder).rglob("*.[pch]*")) or [ROOT / folder]:
+            if path.is_file() and "__pycache__" not in path.parts:
+                found.update(path.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def _tests_of(room: str) -> list[str]:
+    return [one for one in ROOMS[room].tests if (ROOT / one).exists()]
+
+
+def _pytest(
+    copy: Path, asked: dict[str, str], tests: Iterable[str], patience_s: float | None
+) -> tuple[int | None, str]:
+    """Run tests on a copy; give the exit code, `None` when it hangs, and what was said."""
+    process = subprocess.Popen(  # noqa: S603 - our own tests
+        [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "--tb=no", "-rf",
+         "-p", "bench.mutation_plugin", "-p", "no:cacheprovider", "-p", "no:xdist",
+         "-m", "not slow", *tests],
+        cwd=copy,
+        env=os.environ
+        | asked
+        | {
+            "PYTHONPATH": os.pathsep.join([str(copy), str(copy / "bench" / "children")]),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        },
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+        start_new_session=True,
+    )  # fmt: skip
+    resource.prlimit(process.pid, resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+    try:
+        told, _ = process.communicate(timeout=patience_s)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        return None, ""
+    except BaseException:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
+    return process.returncode, told
+
+
+# ---------------------------------------------------------------- one fault after another
+
+
+def _tried(
+    mutants: list[Mutant], reached: dict[str, Reached], copies: SimpleQueue[Path], jobs: int
+) -> Iterator[Outcome]:
+    def each(mutant: Mutant) -> Outcome:
+        copy = copies.get()
+        try:
+            return _try(mutant, reached[mutant.room], copy)
+        finally:
+            copies.put(copy)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for number, one in enumerate(pool.map(each, mutants), 1):
+            by = one.by or "NOT NOTICED"
+            say(f"{number}/{len(mutants)} {one.seconds:.0f} s {one.mutant}: {by}")
+            yield one
+
+
+def _try(mutant: Mutant, reached: Reached, copy: Path) -> Outcome:
+    tests = reached.tests(mutant.path, mutant.fault.line)
+    begun = monotonic()
+    place = copy / mutant.path
+    sound = place.read_text("utf-8")
+    place.write_text(mutant.fault.put_into(sound), "utf-8")
+    selected = copy / "selected.json"
+    selected.write_text(json.dumps(tests), "utf-8")
+    patience_s = _START_S + _PATIENCE * sum(reached.seconds[one] for one in tests)
+    try:
+        files = sorted({one.partition("::")[0] for one in tests})
+        code, told = _pytest(copy, {SELECT: str(selected)}, files, patience_s)
+    finally:
+        place.write_text(sound, "utf-8")
+    return Outcome(mutant, _noticed_by(code, told), len(tests), monotonic() - begun)
+
+
+def _noticed_by(code: int | None, told: str) -> str:
+    if code is None:
+        return "it hangs"
+    if code == 0:
+        return ""
+    failed = [line for line in told.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    return failed[0].split(" ")[1] if failed else "it cannot be loaded"
+
+
+def _write(path: Path, outcomes: list[Outcome]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table: Any = csv.writer(file)
+        table.writerow(["room", "file", "line", "old", "new", "noticed_by", "tests"])
+        for one in outcomes:
+            fault = one.mutant.fault
+            table.writerow(
+                [
+                    one.mutant.room,
+                    one.mutant.path,
+                    fault.line,
+                    fault.old,
+                    fault.new,
+                    one.by,
+                    one.tests,
+                ]
+            )

@@ -1,0 +1,133 @@
+"""Every state that arming, firing, stopping, acknowledging and going on can lead to, one by one.
+
+Breadth first: each action, undisturbed and with each trouble at each of its moments, is tried in
+each state that was found before. Nothing falls that nobody armed and asked for, no drop is lost
+that the board was told to forget, nothing waits for ever, and from everywhere the plan comes to its
+end.
+"""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import contextmanager
+
+import pytest
+
+from rig.link.messages import Phase
+from rig.recorder.controller import Controller
+from tests.daemon.rig_in_a_box import Box, Trouble
+
+ACTIONS = [
+    (name, None)
+    for name in (
+        "arm", "fire_latest", "fire_first", "accept", "stop", "wait", "hang", "silence", "other",
+        "reset", "pull", "kill", "resume",
+    )
+]  # fmt: skip
+MOMENTS = 8  # more writes than any action has
+TROUBLES = [
+    (action, Trouble(what, point, n))
+    for action in ("arm", "fire_latest", "resume")
+    for n in range(1, MOMENTS + 1)
+    for what, points in {
+        "killed": ("write", "written", "commit", "committed"),
+        "unplugged": ("write",),
+        "deafened": ("written",),
+        "stopped": ("write", "written", "commit", "committed"),
+        "filled": ("commit",),
+    }.items()
+    for point in points
+]
+
+
+@contextmanager
+def followed(path, folder, monkeypatch):
+    """Do one thing after the other in a new rig; `None` when a trouble found no such moment."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    with monkeypatch.context() as patch:
+        box = Box(folder, patch)
+        try:
+            struck = True
+            for action, trouble in path:
+                box.trouble = trouble
+                getattr(box, action)()
+                struck, box.trouble = box.trouble is None, None
+                box.check()
+            yield box if struck else None
+        finally:
+            if box.worker is not None:
+                box.die()
+
+
+def explored(steps, depth, folder, monkeypatch, begin=()):
+    """Go through all states within so many steps; give the path to each."""
+    found, front = {}, [begin]
+    for _ in range(depth + 1):
+        paths, front = front, []
+        in_vain = set()  # where a trouble finds its n-th moment no more
+        for path in paths:
+            before, (action, trouble) = path[:-1], path[-1] if path else ("", None)
+            kind = (before, action, trouble and (trouble.what, trouble.point))
+            if kind in in_vain:
+                continue
+            try:
+                with followed(path, folder, monkeypatch) as box:
+                    if box is None:
+                        in_vain.add(kind)
+                    elif (state := box.state()) not in found:
+                        found[state] = path
+                        front += [(*path, step) for step in steps if box.enabled(step[0])]
+                        box.ends_well()
+            except AssertionError as error:
+                told = " → ".join(f"{name} ({what})" if what else name for name, what in path)
+                raise AssertionError(f"{told}: {error}") from error
+    return found
+
+
+FALLEN = (("arm", None), ("fire_latest", Trouble("killed", "written", 2)))
+
+
+@pytest.mark.parametrize(
+    ("before", "action"),
+    [((), "arm"), ((("arm", None),), "fire_latest"), (FALLEN, "resume")],
+)
+def test_whatever_goes_wrong_at_any_moment_of_a_drop_it_ends_well(
+    before, action, tmp_path, monkeypatch
+):
+    steps = [step for step in TROUBLES if step[0] == action]
+    found = explored(steps, 1, tmp_path / "rig", monkeypatch, before)
+    # So that it cannot become a test of nothing.
+    assert {path[-1][1].what for path in found.values() if path != before}
+
+
+def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(tmp_path, monkeypatch):
+    found = explored(ACTIONS, 3, tmp_path / "rig", monkeypatch)
+    assert any(path[-1:] == (("accept", None),) for path in found.values())
+
+
+def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeypatch):
+    box = Box(tmp_path, monkeypatch)
+    box.arm()
+    assert box.worker.controller.unsaved()
+    box.worker.controller.close()
+    assert box.phase is Phase.IDLE
+    box.kill()
+    box.resume()
+    box.arm()
+    box.trouble = Trouble("killed", "written", 2)  # FIRE, behind the look at what it does
+    box.fire_latest()
+    box.clock.sleep(2.0)
+    assert box.phase is Phase.HOLDING
+    another = Controller("a port")
+    another.connect()
+    assert another.unsaved()
+    another.close()
+    assert box.phase is Phase.HOLDING
+
+
+@pytest.mark.slow
+def test_whatever_goes_wrong_in_any_state_it_ends_well(tmp_path, monkeypatch):
+    found = explored([*ACTIONS, *TROUBLES], 3, tmp_path / "rig", monkeypatch)
+    struck = {step[1].what for path in found.values() for step in path if step[1]}
+    assert struck == {trouble.what for _, trouble in TROUBLES}
