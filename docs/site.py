@@ -1,0 +1,116 @@
+"""Builds the pages of this project as a site: ``./run docs``, or ``python docs/site.py FOLDER``.
+
+Pages stand where they are read in the repository; here they are put side by side for MkDocs, with
+what they link to. A link that leads nowhere ends the build.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from mkdocs.commands.build import build
+from mkdocs.config import load_config
+
+ROOT = Path(__file__).resolve().parents[1]
+NAV: dict[str, tuple[str, ...]] = {
+    "Learn": ("docs/tutorial.md", "docs/glossary.md"),
+    "Do": ("docs/shopping.md", "firmware/README.md", "docs/timers.md", "docs/daemon.md",
+           "docs/python.md", "docs/troubleshooting.md"),
+    "Look up": ("docs/protocol.md", "docs/priors.md", "firmware/PROTOCOL.md", "rig/daemon/API.md",
+                "docs/tui/README.md"),
+    "Understand": ("docs/method.md", "docs/benchmarks.md", "docs/resolved-world.md",
+                   "docs/threats.md", "docs/results/layouts/layouts.md",
+                   "docs/results/diagnoses/diagnoses.md"),
+    "Work on it": ("docs/architecture.md", "CONTRIBUTING.md", "docs/decisions/*.md",
+                   "CHANGELOG.md"),
+}  # fmt: skip
+"""What a reader wants, and the pages for it: tutorial, how-to, reference, explanation."""
+_LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
+
+
+def pages() -> dict[str, list[Path]]:
+    """Return all pages by heading, as paths from the project's root."""
+    return {
+        heading: [path.relative_to(ROOT) for name in names for path in sorted(ROOT.glob(name))]
+        for heading, names in NAV.items()
+    }
+
+
+def stage(folder: Path) -> None:
+    """Copy all pages and what they show into a folder, each where it stands in the project.
+
+    Links to other files of the project are shown as text: a site has no code.
+
+    Raises
+    ------
+    FileNotFoundError
+        A link leads nowhere.
+    """
+    known = {Path("README.md"), *(page for found in pages().values() for page in found)}
+    for page in known:
+        text = (ROOT / page).read_text("utf-8")
+        there = folder / page
+        there.parent.mkdir(parents=True, exist_ok=True)
+        there.write_text(_LINK.sub(lambda link, at=page: _linked(link, at, known, folder), text),
+                         "utf-8")  # fmt: skip
+
+
+def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> str:
+    picture, words, target = link.groups()
+    place, hash_, anchor = target.partition("#")
+    if not place or "://" in place:
+        return link[0]
+    source = (ROOT / page).parent / place
+    if not source.exists():
+        raise FileNotFoundError(f"{page}: {target} leads nowhere")
+    inside = source.resolve().relative_to(ROOT)
+    if inside in known:
+        return link[0]
+    listed = sorted(one for one in known if one.parent == inside)
+    if listed:  # a folder of pages: the first of them, and the menu has the rest
+        return f"[{words}]({place.rstrip('/')}/{listed[0].name}{hash_}{anchor})"
+    if picture or source.suffix in {".svg", ".png", ".csv", ".json", ".yaml"}:
+        (folder / inside).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, folder / inside)
+        return link[0]
+    return words
+
+
+def settings(source: Path, site: Path) -> dict[str, Any]:
+    """Make MkDocs' settings, with every doubtful link a warning."""
+    nav: list[dict[str, Any]] = [{"chainrig": "README.md"}]
+    nav += [{heading: [str(page) for page in found]} for heading, found in pages().items()]
+    doubts = {"not_found": "warn", "anchors": "warn", "unrecognized_links": "warn"}
+    return {
+        "site_name": "chainrig",
+        "docs_dir": str(source),
+        "site_dir": str(site),
+        # Without colours for code, which would be fetched from elsewhere.
+        "theme": {"name": "readthedocs", "highlightjs": False},
+        "nav": nav,
+        "strict": True,
+        "use_directory_urls": False,  # so that it can be read without a server
+        "validation": {"nav": {"not_found": "warn"}, "links": doubts},
+    }
+
+
+def main(site: Path) -> None:
+    """Build the site in a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        stage(Path(folder))
+        config = Path(folder).parent / f"{Path(folder).name}.yml"
+        config.write_text("", "utf-8")
+        try:
+            build(load_config(str(config), **settings(Path(folder), site.absolute())))
+        finally:
+            config.unlink()
+    print(site / "index.html")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "out" / "site")
