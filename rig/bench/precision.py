@@ -158,6 +158,7 @@ def precision(
     *,
     quick: bool = False,
     progress: Callable[[str], None] = lambda _line: None,
+    keep: Callable[[Precision], None] = lambda _so_far: None,
 ) -> Precision:
     """Sweep every method on every scene.
 
@@ -169,12 +170,16 @@ def precision(
         A small subset: the paper's two chains, few settings.
     progress
         Told what is being done.
+    keep
+        Given all that is found so far after each scene: a sweep takes long.
     """
     if chosen is None:
         chosen = [s for s in scenes() if not quick or s.name in {"uniform", "graded"}]
     points: list[Point] = []
     gaps: list[Gap] = []
     left_out: list[LeftOut] = []
+    titles: tuple[tuple[str, str], ...] = ()
+    found = Precision((), (), (), (), ())
     for scene in chosen:
         left_out += [LeftOut(scene.name, name, "all", why) for name, why in absent(scene)]
         trials = _tried(scene, methods(scene, quick=quick), left_out, progress, quick=quick)
@@ -184,8 +189,11 @@ def precision(
         discrete, others = _truths(scene, trials)
         points += [_point(scene, trial, discrete, others) for trial in trials]
         gaps += _gaps(scene, discrete, others)
-    titles = tuple((scene.name, scene.title) for scene in chosen)
-    return Precision(titles, tuple(points), tuple(gaps), tuple(left_out), tuple(cheapest(points)))
+        titles = (*titles, (scene.name, scene.title))
+        best = tuple(cheapest(points))
+        found = Precision(titles, tuple(points), tuple(gaps), tuple(left_out), best)
+        keep(found)
+    return found
 
 
 def cheapest(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> list[Cheapest]:

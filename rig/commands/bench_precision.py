@@ -26,11 +26,9 @@ _PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
 def main(arguments: Namespace) -> int:
     """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
     folder = make_folder(arguments.output)
-    found = precision(quick=arguments.quick, progress=say)
-    whole = as_json(found)
-    _write(folder, found, json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False))
+    found = precision(quick=arguments.quick, progress=say, keep=lambda one: _write(folder, one))
     if arguments.json:
-        print_json(whole)
+        print_json(as_json(found))
     else:
         print(summary(found))
     return 0
@@ -76,13 +74,14 @@ def _winner(one: Cheapest) -> str:
     return f"{one.median_s * 1e6:.1f} µs, {one.method}, {one.setting}"
 
 
-def _write(folder: Path, found: Precision, text: str) -> None:
-    """Write ``precision.csv``, ``precision.json`` and a picture for each scene."""
+def _write(folder: Path, found: Precision) -> None:
+    """Write ``precision.csv``, ``precision.json`` and a picture for each scene so far."""
     from rig.bench.precision import Point  # noqa: PLC0415 - see main
 
     columns = [field.name for field in fields(Point)]
     table = csv_text(columns, (asdict(point) for point in found.points))
     write_atomic(folder / "precision.csv", table)
+    text = json.dumps(as_json(found), indent=2, ensure_ascii=False, allow_nan=False)
     write_atomic(folder / "precision.json", text + "\n")
     for name, title in found.scenes:
         points = [point for point in found.points if point.scene == name]

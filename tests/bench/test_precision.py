@@ -280,7 +280,11 @@ def untimed(found):
 
 
 def test_errors_and_counts_are_the_same_each_time(quick):
-    again = precision.precision(quick=True)
+    kept: list[precision.Precision] = []
+    again = precision.precision(quick=True, keep=kept.append)
+    assert [len(one.scenes) for one in kept] == [1, 2], "what is found is kept scene by scene"
+    assert kept[-1] == again
+    assert kept[0].points == again.points[: len(kept[0].points)]
     assert untimed(again) == untimed(quick[0])
     assert (again.gaps, again.left_out) == (quick[0].gaps, quick[0].left_out)
 
