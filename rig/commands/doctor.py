@@ -50,7 +50,6 @@ def main(arguments: Namespace) -> int:
 
 
 def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
-    yield checks.other_packages(look_at_packages())
     # Without a name no port is opened: that would restart the board behind it.
     named = [url] if url and "://" not in url else []
     free = True
@@ -62,6 +61,7 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
         yield from _board(url)
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
+    yield checks.other_packages(look_at_packages())
     yield checks.disk_room(look_at_disk(Path(session).parent if session else Path()))
     if session and not Path(session).exists():
         yield Finding(f"session {session}", "not there", "check its name; rig run makes a new one")
