@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rig.errors import InputError
 
-_FOLDERS = {"mega": "atmega2560", "uno": "atmega328p"}
+WIRED = {"mega": "atmega2560", "uno": "atmega328p"}
+"""Boards of whose circuits there is a picture, and its folder in `firmware`."""
 
 
 def ready_protocol(name: str) -> Path:
@@ -33,7 +34,7 @@ def wiring_picture(board: str) -> Path:
     InputError
         Where this installation lacks it.
     """
-    return _found(f"firmware/{_FOLDERS[board]}/wiring.svg")
+    return _found(f"firmware/{WIRED[board]}/wiring.svg")
 
 
 def _found(name: str) -> Path:

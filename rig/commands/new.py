@@ -16,7 +16,7 @@ from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.draft import SCENES, STRUCK, Draft, draft_text
 from rig.protocol.measurable import check_recordable
-from rig.ready import wiring_picture
+from rig.ready import WIRED, wiring_picture
 from rig.recorder.interrupts import Interrupts
 from rig.report.mounting import mounting_figure
 from rig.runner import Operator, run_protocol
@@ -135,12 +135,12 @@ def _count(name: str, said: str) -> int:
 
 
 def _draw(protocol: Protocol, board: str, path: Path) -> None:
-    """Draw where gates go and, where the board is ours, what is wired to it."""
+    """Draw where gates go and, for boards of which there is a picture, what is wired to them."""
     assert protocol.gates is not None
     mounting = path.with_name(f"{path.stem}-mounting.svg")
     write_atomic(mounting, mounting_figure(protocol, protocol.gates))
     say(f"mounting: {mounting}")
-    if board in BOARDS:
+    if board in WIRED:
         wiring = path.with_name(f"{path.stem}-wiring.svg")
         write_atomic(wiring, wiring_picture(board).read_text("utf-8"))
         say(f"wiring: {wiring}")
