@@ -37,12 +37,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     _open_streams()
     try:
+        parser = _parser()
         try:
-            arguments = _parser().parse(argv)
+            arguments = parser.parse(argv)
         finally:
             sys.stdout.flush()  # of --help, here, where a closed pipe is understood
         if "module" not in arguments:
-            _parser().print_help(sys.stderr)
+            parser.print_help(sys.stderr)
             return BAD_INPUT
         with _left_at_once():
             command = import_module(f"rig.commands.{arguments.module}")

@@ -31,6 +31,7 @@ PATIENT = 6
 has a slope on either side, and steps go to and fro over the best place, which lies between them."""
 _AGAIN = 0.5  # of the last step, taken back by the next one
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
+_MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
 
 
 @dataclass(frozen=True)
@@ -152,12 +153,15 @@ def least_squares(
         # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
         calm = chi2 <= edges - x.size
-        if calm or (step and abs(chi2 - previous) <= _STEADY * max(chi2, 1.0)):
+        steady = step and abs(chi2 - previous) <= _STEADY * max(chi2, 1.0)
+        if calm or steady:
             factor = 1.0
-            if not calm:
+            # No unknown is left open by less than if all others were known.
+            least = edges - x.size + float(np.sum(1.0 / np.diag(information)))
+            if chi2 >= _MORE**2 * max(least, 1.0):
                 degrees = edges - float(np.trace(np.linalg.solve(information, data)))
                 factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
-            if factor >= 1.05:
+            if factor >= _MORE:
                 inflation *= factor  # the edges scatter more than assumed: weigh them so
             elif moved < done or (damping == 1.0 and moved**2 < done * last):
                 settled = True

@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
-from rig.analysis.swing import drawn, swing_sd
+from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -187,8 +187,7 @@ class DropModel:
             if name in self.unknowns:
                 mine[self.unknowns[name]] &= here
         mine[self.unknowns["datum"]] &= np.array(self.protocol.gates.posts) == role
-        parameters = COMMON + (2 * len(self.records[role].chain.widths) if role == "impact" else 0)
-        path = self.spread(role, np.eye(parameters))
+        path = self._parameters(role)
         moves = mine & path.any(axis=0)
         moving = np.flatnonzero(moves)
         columns = np.concatenate([moving, np.flatnonzero(mine & ~moves)])
@@ -321,33 +320,39 @@ class DropModel:
         ndarray
             Shape ``(…, unknowns)``.
         """
+        local = self._local[role]
+        found = np.zeros((*derivatives.shape[:-1], len(self.unknowns)))
+        found[..., local.columns[: local.moving]] = derivatives @ local.path
+        return found
+
+    def _parameters(self, role: str) -> Array:
+        """Derivatives of a trajectory's parameters by all unknowns."""
         at = self.unknowns
-        found = np.zeros((*derivatives.shape[:-1], len(at)))
-        found[..., at[f"{role} release"]] = derivatives[..., [RELEASE]]
-        found[..., at["gravity"]] = derivatives[..., [GRAVITY]]
+        rods = self.records["impact"].chain.chain.rods if role == "impact" else 0
+        found = np.zeros((COMMON + 2 * rods, len(at)))
+        found[RELEASE, at[f"{role} release"]] = found[GRAVITY, at["gravity"]] = 1.0
         if "drag" in at:
-            found[..., at["drag"]] = derivatives[..., [DRAG]]
-        found[..., at["drop"]] = found[..., at[f"{role} hang"]] = derivatives[..., [START]]
+            found[DRAG, at["drag"]] = 1.0
+        found[START, at["drop"]] = found[START, at[f"{role} hang"]] = 1.0
         if role == "free" and "side" in at:
-            found[..., at["side"]] = derivatives[..., [START]]
+            found[START, at["side"]] = 1.0
         if role == "impact":
-            rods = self.records["impact"].chain.chain.rods
-            by_gain = derivatives[..., COMMON : COMMON + rods]
-            found[..., at["alpha"]] = by_gain.sum(axis=-1, keepdims=True)
-            found[..., at["impulses"]] = by_gain
-            found[..., at["strings"]] = (by_gain @ _alone(rods))[..., None]
-            by_place = derivatives[..., COMMON + rods :]
-            found[..., at["impact rods"]] = by_place
-            found[..., at["contact"]] = -by_place[..., :-1].sum(axis=-1, keepdims=True)
-            found[..., at["top"]] = by_place[..., -1:]
+            gains, places = slice(COMMON, COMMON + rods), slice(COMMON + rods, COMMON + 2 * rods)
+            row = np.arange(rods)
+            found[gains, at["alpha"]] = 1.0
+            found[COMMON + row, at["impulses"].start + row] = 1.0
+            found[gains, at["strings"].start] = _alone(rods)
+            found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
+            found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
+            found[-1, at["top"]] = 1.0
             if "impact swing" in at:
-                found[..., at["impact swing"]] = -(by_place @ self._drawn())[..., None]
+                found[places, at["impact swing"].start] = -self._drawn()
         return found
 
     def _drawn(self) -> Array:
         """`drawn` of each rod of the chain that strikes, as it strikes."""
         chain = self.records["impact"].chain.chain
-        return drawn(chain, self.protocol, -np.array(chain.heights))
+        return drawn(lever(chain), self.protocol, -np.array(chain.heights))
 
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""
@@ -385,8 +390,12 @@ class DropModel:
 
     def independent(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """Return `residuals` with of each what the one before tells of it taken away."""
-        left, seen = self.residuals(role, x, matches), self._matched(role, matches)
-        self._part(seen, left.struck, left.values, left.sigma)
+        return self.parted(role, self.residuals(role, x, matches), matches)
+
+    def parted(self, role: str, left: Residuals, matches: Sequence[Index]) -> Residuals:
+        """Make `independent` of some residuals."""
+        left = left._replace(values=left.values.copy(), sigma=left.sigma.copy())
+        self._part(self._matched(role, matches), left.struck, left.values, left.sigma)
         return left
 
     def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.swing import drawn
+from rig.analysis.swing import drawn, lever
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -160,7 +160,7 @@ class Expected(NamedTuple):
             levels,
             np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
             np.where(rods % 2, -1.0, 1.0),
-            drawn(record.chain.chain, protocol, levels[:, None])[np.arange(rods.size), rods],
+            drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
             np.cumsum(observed) - observed,
             np.cumsum(expected)[:-1],

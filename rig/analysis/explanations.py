@@ -111,7 +111,7 @@ class Explainer:
         self.faults = faults
         self.steady = [one for one in faults if one.shift is not None]
         # A fault of one side leaves the other as it was.
-        self._votes: dict[Hashable, tuple[int, int]] = {}
+        self._votes: dict[Hashable, int] = {}
 
     def asked(self, fit: Fit) -> bool:
         """Whether an adjusted drop asks for some size of a fault."""
@@ -188,9 +188,11 @@ class Explainer:
 
     def _net(self, setting: Premise) -> tuple[float, int]:
         """Share of the expected edges that vote for one fall, and votes less edges without."""
-        votes = expected = 0
-        for record in self._records(setting):
-            key = _key(setting, record)
+        votes = 0
+        records = self._records(setting)
+        expected = sum(one.expected for one in records)
+        for record in records:
+            key = expected, *_key(setting, record)
             if key not in self._votes:
                 drop, gravity = setting.protocol.drop, setting.protocol.gravity.value
                 tried = guesses(
@@ -200,10 +202,11 @@ class Explainer:
                     prior_air(setting.protocol)[0],
                     alphas=(record.alpha - _NEAR, record.alpha + _NEAR),
                     window=around_order(setting.protocol, record),
+                    # What one side lacks, the other cannot make up for.
+                    least=record.expected - (1.0 - _VOTED) * expected,
                 )
-                self._votes[key] = tried[0].votes if tried else 0, record.expected
-            votes += self._votes[key][0]
-            expected += self._votes[key][1]
+                self._votes[key] = tried[0].votes if tried else 0
+            votes += self._votes[key]
         return votes / max(1, expected), 2 * votes - expected
 
     def _afresh(self, fault: Fault, size: float, stated: float) -> Explanation | None:
@@ -270,7 +273,7 @@ def _occam(fault: Fault, u: float) -> float:
     return math.log(max(1.0, span / (math.sqrt(2.0 * math.pi) * u)))
 
 
-def _key(setting: Premise, record: ChainRecord) -> Hashable:
+def _key(setting: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
     """Return what a side's reading depends on."""
     protocol = setting.protocol
     levels = b"".join(train.levels.tobytes() for train in record.trains)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.adjust import DONE, STEPS, Estimate, adjust
+from rig.analysis.adjust import STEPS, Estimate, adjust
 from rig.analysis.align import align
 from rig.analysis.equations import STRAY
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _COARSE = 2.5e-3  # m: how far off a first guess may put a rod
 _FINE = 0.5e-3  # m: how far off an adjusted trajectory may
 _NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
+_CLOSE = 0.05  # and after one so short, readings weighed: that is near enough by its square
 _SAME = 0.1  # of a standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
 _MEDIAN = 0.6745  # of |normal numbers|, in standard deviations
@@ -75,7 +76,7 @@ def settle(
     steps: int = STEPS,
     x: Array | None = None,
 ) -> Fit:
-    """Match and adjust in turn until that moves the chain no more.
+    """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
 
     It begins with impulses that are nearly alike, and bends only to what fits already: one of the
     few edges of the last leg may be a stray.
@@ -96,7 +97,7 @@ def settle(
     if matches is None:
         matches = match(model, x, _COARSE)
     # Not to the end where the matches are about to change.
-    estimate = adjust(stiff, matches, x, done=DONE if begun else _NEAR, steps=steps)
+    estimate = adjust(stiff, matches, x, done=_CLOSE if begun else _NEAR, steps=steps)
     last = model if begun else None
     for round_ in range(rounds):
         x, before = estimate.x, matches
@@ -104,7 +105,7 @@ def settle(
         now = model if round_ else stiff
         if now is last and _alike(matches, before):
             break
-        estimate, last = adjust(now, matches, x, steps=steps), now
+        estimate, last = adjust(now, matches, x, done=_CLOSE, steps=steps), now
         if round_ and estimate.beyond(x) < _SAME:
             break
     return Fit(model, matches, estimate)
@@ -178,7 +179,7 @@ def _kept(
     stray = far > limit
     # Of a rod's two sides that do not go together one is wrong, or both: the one that is further
     # off, and the other if it is far off too.
-    parted = model.independent(role, x, matches)
+    parted = model.parted(role, rows, matches)
     second = np.flatnonzero(np.abs(parted.values) > limit * parted.sigma)
     second = second[parted.sigma[second] < rows.sigma[second]]
     stray[second - (far[second - 1] > far[second])] = True

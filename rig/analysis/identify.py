@@ -299,7 +299,7 @@ class _Side:
         pull: float = 0.0,
     ) -> list[Guess]:
         drop, gravity = self.protocol.drop, self.protocol.gravity.value + pull
-        found = votes(self.record, drop, gravity, kappa, clock, window, alphas)
+        found = votes(self.record, drop, gravity, kappa, clock, window, alphas, self.least)
         return [replace(one, pull=pull) for one in found] if pull else found
 
     def _pulls(self) -> list[float]:
@@ -311,9 +311,15 @@ class _Side:
         below, above = (int(share / step) for share in _PULLS)
         return [gravity * step * n for n in sorted(range(-below, above + 1), key=abs) if n]
 
+    @property
+    def least(self) -> float:
+        """Votes without which nothing becomes a reading, however it is adjusted."""
+        return _LEAST * self.record.expected - _MARGIN
+
     def most_votes(self, window: Span) -> float:
         """Share of the expected edges that vote for the same fall, at most."""
-        tried = self.guesses(window, 0.0, 0.0, near_alpha(self.record))
+        drop, gravity = self.protocol.drop, self.protocol.gravity.value
+        tried = votes(self.record, drop, gravity, window=window, alphas=near_alpha(self.record))
         return min(1.0, max((one.votes for one in tried), default=0) / max(1, self.record.expected))
 
     def judged(self, tried: Iterable[Guess]) -> list[Reading]:
@@ -325,8 +331,8 @@ class _Side:
             enough = [r for r in found if r.fit.estimate.scatter < _CALM]
             if enough and one.votes + _MARGIN < max(reading.fit.matched for reading in enough):
                 break
-            if one.votes + _MARGIN < _LEAST * self.record.expected:
-                break  # too few for any reading, however it is adjusted
+            if one.votes < self.least:
+                break
             model = DropModel(
                 self.protocol,
                 [self.record],

@@ -45,7 +45,9 @@ _RECORD = 4.0  # s: what longer a record is, is only searched where most of its 
 _FEW = 4  # edges of one kind, below which their order tells nothing
 _NEAR = 0.08  # how far α may be from what the model expects, and be found at once
 _KEPT = 8  # moments
-_CELLS = 2_000_000  # votes counted together, which bounds the memory they take
+_CELLS = 100_000  # votes counted together: they stay where a processor has them at hand
+_BLOCK = 8  # falls of neighbouring α of which it is asked first whether any has votes enough
+_MANY = 4 * _BLOCK  # falls beyond which that is worth asking
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +115,7 @@ def guesses(
     clock: float = 0.0,
     window: Span = EVER,
     alphas: Span = ANY_ALPHA,
+    least: float = 0.0,
 ) -> list[Guess]:
     """Find all moments for which many edges of a chain vote, those with the most first.
 
@@ -126,6 +129,8 @@ def guesses(
         Within which the release must be, s.
     alphas
         Impact coefficients to try.
+    least
+        Votes without which a moment need not be found.
     """
     slack = slack_of(record)
     pairs = _pairs(record, clock)
@@ -134,7 +139,7 @@ def guesses(
     found: list[Guess] = []
     for height in _heights(start, slack):
         paths = _paths(record, height, gravity, kappa, slack, alphas)
-        for release, path, votes in _moments(pairs, paths, slack, window):
+        for release, path, votes in _moments(pairs, paths, slack, window, least):
             alpha = float(paths.alphas[path])
             found.append(Guess(release, height, alpha, kappa, clock, votes))
     found.sort(key=lambda one: -one.votes)
@@ -233,7 +238,7 @@ def _passages(
 
 
 def _moments(
-    pairs: _Pairs, paths: _Paths, slack: float, window: Span
+    pairs: _Pairs, paths: _Paths, slack: float, window: Span, least: float
 ) -> Iterator[tuple[float, int, int]]:
     """Yield release, path and number of votes of the moments with most votes that are apart."""
     # A level passed fast tells the moment better; before it moves, a chain tells hardly anything.
@@ -252,12 +257,19 @@ def _moments(
     step = float(half.min()) / 2.0
     bins = int((last - first) / step) + 2
     votes = np.zeros((paths.alphas.size, bins + 1), dtype=np.int32)
-    block = max(1, _CELLS // times.size)
-    for begin in range(0, paths.alphas.size, block):
-        columns = slice(begin, begin + block)
-        middle = times[:, None] - paths.times[expected, columns] - first
-        width = half[expected, columns]
-        votes[columns] = _counted(middle - width, middle + width, step, bins)
+    # In bins; what never comes by votes before the first one.
+    moments = (times - first) / step
+    due = np.where(np.isnan(paths.times), np.inf, paths.times / step)
+    half /= step
+    tried = np.arange(paths.alphas.size)
+    if least > 0.0 and tried.size > _MANY:
+        # Whoever votes for one fall of a block votes for all of it together.
+        begins = tried[::_BLOCK]
+        widest = np.maximum.reduceat(half, begins, axis=1)
+        ends = np.append(begins[1:], tried.size) - 1
+        most = _votes(moments, expected, due[:, begins] + widest, due[:, ends] - widest, bins)
+        tried = tried[np.repeat(most.max(axis=1) >= least, np.diff(begins, append=tried.size))]
+    votes[tried] = _votes(moments, expected, (due + half)[:, tried], (due - half)[:, tried], bins)
     yield from _peaks(votes, paths, slack, first, step)
 
 
@@ -271,17 +283,37 @@ def _densest(times: Array, expected: Index, soonest: Array, latest: Array) -> tu
     return times[kept], expected[kept]
 
 
-def _counted(begin: Array, end: Array, step: float, bins: int) -> Counts:
-    """Count in each bin of each column how many intervals cover it."""
-    columns = begin.shape[1]
-    row = np.broadcast_to(np.arange(columns) * (bins + 1), begin.shape)
-    good = (end > 0.0) & (begin < bins * step)  # NaN is neither
-    lower = np.clip(np.rint(begin[good] / step), 0, bins).astype(np.intp)
-    upper = np.clip(np.rint(end[good] / step), 0, bins).astype(np.intp)
-    size = columns * (bins + 1)
-    found = np.bincount(row[good] + lower, minlength=size).astype(np.int32)
-    found -= np.bincount(row[good] + upper, minlength=size).astype(np.int32)
-    return np.cumsum(found.reshape(columns, -1), axis=1, dtype=np.int32)
+def _votes(moments: Array, expected: Index, late: Array, soon: Array, bins: int) -> Counts:
+    """Count for each fall and each bin how many pairs vote for a release then.
+
+    Parameters
+    ----------
+    moments, expected
+        Of each pair, in bins.
+    late, soon
+        How long after the release an expected edge comes at most and at least, in bins; shape
+        ``(expected, falls)``.
+
+    Returns
+    -------
+    ndarray
+        Shape ``(falls, bins + 1)``.
+    """
+    found = np.zeros((late.shape[1], bins + 1), dtype=np.int32)
+    block = max(1, _CELLS // moments.size)
+    for begin in range(0, len(found), block):
+        some = found[begin : begin + block]
+        row = (bins + 1) * np.arange(len(some))
+        for bounds, sign in ((late, 1), (soon, -1)):
+            bound = moments[:, None] - bounds[expected, begin : begin + block]
+            np.rint(bound, out=bound)
+            # What is beyond all bins begins and ends in the same one, and counts nowhere.
+            np.clip(bound, 0.0, bins, out=bound)
+            place = bound.astype(np.intp)
+            place += row
+            counts = np.bincount(place.ravel(), minlength=some.size).astype(np.int32)
+            some += sign * counts.reshape(some.shape)
+    return np.cumsum(found, axis=1, dtype=np.int32)
 
 
 def _peaks(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -50,7 +52,8 @@ def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
 
 def measurands(model: DropModel, x: Array) -> dict[str, Value]:
     """Return the value of each measurand of the scene and its derivatives by all unknowns."""
-    found = ((name, compute(model, x)) for name, compute in COMPUTED.items())
+    drop = Adjusted(model, x)
+    found = ((name, compute(drop)) for name, compute in COMPUTED.items())
     return {name: value for name, value in found if value is not None}
 
 
@@ -90,88 +93,6 @@ def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str,
     return max(1.0, 1.0 / share) if share > 0.0 else math.inf
 
 
-def _gravity(model: DropModel, x: Array) -> Value | None:
-    """The acceleration of what falls and strikes nothing."""
-    return None if model.protocol.track is not None else _acceleration(model, x)
-
-
-def _track_acceleration(model: DropModel, x: Array) -> Value | None:
-    """The acceleration of what goes down a track."""
-    return None if model.protocol.track is None else _acceleration(model, x)
-
-
-def _acceleration(model: DropModel, x: Array) -> Value | None:
-    if "impact" in model.records:
-        return None
-    gradient = np.zeros(x.size)
-    gradient[model.unknowns["gravity"]] = 1.0
-    return model.protocol.gravity.value + float(x[model.unknowns["gravity"]][0]), gradient
-
-
-def _speed(model: DropModel, x: Array) -> Value | None:
-    """V just before the top rod strikes."""
-    if "impact" not in model.records:
-        return None
-    path = model.trajectory("impact", x)
-    return path.arrival, model.spread("impact", path.d_arrival)
-
-
-def _fall_time(model: DropModel, x: Array) -> Value | None:
-    """How long it takes until the top rod strikes."""
-    if "impact" not in model.records:
-        return None
-    path = model.trajectory("impact", x)
-    duration = model.spread("impact", path.d_time[-1])
-    duration[model.unknowns["impact release"]] = 0.0  # it moves both ends
-    return float(path.time[-1] - path.time[0]), duration
-
-
-def _release_skew(model: DropModel, x: Array) -> Value | None:
-    """The free chain's release less the impact chain's."""
-    if not _both(model):
-        return None
-    gradient = np.zeros(x.size)
-    gradient[model.unknowns["free release"]] = 1.0
-    gradient[model.unknowns["impact release"]] = -1.0
-    begins = [float(model.trajectory(role, x).time[0]) for role in ("free", "impact")]
-    return begins[0] - begins[1], gradient
-
-
-def _separation_raw(model: DropModel, x: Array) -> Value | None:
-    """Δz at the instant of the top rod's strike."""
-    if not _both(model):
-        return None
-    struck = model.trajectory("impact", x)
-    return _apart(model, x, float(struck.time[-1]), model.spread("impact", struck.d_time[-1]))
-
-
-def _separation(model: DropModel, x: Array) -> Value | None:
-    """Δz had both chains been let go together: the free one that much later, or earlier."""
-    skew = _release_skew(model, x)
-    if skew is None:
-        return None
-    struck = model.trajectory("impact", x)
-    hit, d_hit = float(struck.time[-1]), model.spread("impact", struck.d_time[-1])
-    # The free chain is read off where it was as long after its own release: no model of what it
-    # would have done comes in.
-    return _apart(model, x, hit + skew[0], d_hit + skew[1])
-
-
-def _speed_strike(model: DropModel, x: Array) -> Value | None:
-    """V as the top rod really strikes, on the board or on the rods that lie there."""
-    struck = _strike(model, x)
-    return None if struck is None else struck.speed
-
-
-def _separation_strike(model: DropModel, x: Array) -> Value | None:
-    """Δz as the top rod really strikes, had both chains been let go together."""
-    skew, struck = _release_skew(model, x), _strike(model, x)
-    if skew is None or struck is None:
-        return None
-    value, gradient = _apart(model, x, struck.when[0] + skew[0], struck.when[1] + skew[1])
-    return value - struck.above[0], gradient - struck.above[1]
-
-
 class _Strike(NamedTuple):
     """How far above the contact level the top rod strikes, when, and how fast it is."""
 
@@ -180,62 +101,167 @@ class _Strike(NamedTuple):
     speed: Value
 
 
-def _strike(model: DropModel, x: Array) -> _Strike | None:
-    """Go back from the level to where the top rod strikes, in one ballistic leg.
+@dataclass(frozen=True)
+class Adjusted:
+    """A drop with its unknowns, and what several measurands are made of.
 
-    `None` where nothing is struck, or so high that the chain never falls from there to the level.
+    Attributes
+    ----------
+    model, x
+        The drop and its unknowns.
     """
-    if "impact" not in model.records:
+
+    model: DropModel
+    x: Array
+
+    @property
+    def both(self) -> bool:
+        """Whether a free chain falls beside one that strikes."""
+        return {"impact", "free"} <= set(self.model.records)
+
+    @cached_property
+    def speed(self) -> Value:
+        """V as the top rod passes the contact level."""
+        path = self.model.trajectory("impact", self.x)
+        return path.arrival, self.model.spread("impact", path.d_arrival)
+
+    @cached_property
+    def hit(self) -> Value:
+        """When that is."""
+        path = self.model.trajectory("impact", self.x)
+        return float(path.time[-1]), self.model.spread("impact", path.d_time[-1])
+
+    @cached_property
+    def skew(self) -> Value:
+        """The free chain's release less the impact chain's."""
+        gradient = np.zeros(self.x.size)
+        gradient[self.model.unknowns["free release"]] = 1.0
+        gradient[self.model.unknowns["impact release"]] = -1.0
+        begins = [float(self.model.trajectory(role, self.x).time[0]) for role in ("free", "impact")]
+        return begins[0] - begins[1], gradient
+
+    @cached_property
+    def strike(self) -> _Strike | None:
+        """Go back from the level to where the top rod strikes, in one ballistic leg.
+
+        `None` where nothing is struck, or so high that the chain never falls from there to the
+        level.
+        """
+        model, x, at = self.model, self.x, self.model.unknowns
+        if "impact" not in model.records:
+            return None
+        path = model.trajectory("impact", x)
+        contact = model.protocol.contact
+        above = contact.strike.value + float(x[at["contact"]][0] + x[at["strike"]][0])
+        d_above = np.zeros(x.size)
+        d_above[at["contact"]] = d_above[at["strike"]] = 1.0
+        (speed, d_speed), (hit, d_hit) = self.speed, self.hit
+        pull = path.gravity - path.kappa * speed**2
+        d_pull = -2.0 * path.kappa * speed * d_speed
+        d_pull[at["gravity"]] += 1.0
+        if "drag" in at:
+            d_pull[at["drag"]] -= speed**2
+        squared = speed**2 - 2.0 * pull * above
+        if squared <= 0.0:
+            return None
+        end = math.sqrt(squared)
+        d_end = (speed * d_speed - pull * d_above - above * d_pull) / end
+        both, d_both = speed + end, d_speed + d_end
+        when = hit - 2.0 * above / both
+        d_when = d_hit - 2.0 * (d_above - above / both * d_both) / both
+        return _Strike((above, d_above), (when, d_when), (end, d_end))
+
+    def apart(self, when: float, d_when: Array) -> Value:
+        """Height of the free chain's top rod above the contact point at a moment."""
+        model, x, at = self.model, self.x, self.model.unknowns
+        free = model.trajectory("free", x)
+        top = model.records["free"].chain.chain.length + float(x[at["free rods"]][-1])
+        height, speed = free.heights(np.array([when]))
+        gradient = model.spread("free", free.derivatives(np.array([when])))[0]
+        gradient -= float(speed[0]) * d_when
+        turned = 0.0
+        if "free swing" in at:
+            # A chain that turned is lower at its top, the more the further it fell.
+            chain, protocol = model.records["free"].chain.chain, model.protocol
+            rate = float(x[at["free swing"]][0])
+            slope = float(lever(chain)[-1]) / protocol.gravity.value
+            fallen = protocol.drop.value - float(height[0])
+            turned = rate * slope * fallen
+            gradient *= 1.0 + rate * slope
+            gradient[at["free swing"]] = -slope * fallen
+        # The top rod is measured, not the reference point.
+        gradient[at["free rods"].stop - 1] += 1.0
+        return float(height[0]) + top - turned, gradient
+
+
+def _gravity(drop: Adjusted) -> Value | None:
+    """The acceleration of what falls and strikes nothing."""
+    return None if drop.model.protocol.track is not None else _acceleration(drop)
+
+
+def _track_acceleration(drop: Adjusted) -> Value | None:
+    """The acceleration of what goes down a track."""
+    return None if drop.model.protocol.track is None else _acceleration(drop)
+
+
+def _acceleration(drop: Adjusted) -> Value | None:
+    model, x = drop.model, drop.x
+    if "impact" in model.records:
         return None
-    path, at = model.trajectory("impact", x), model.unknowns
-    above = model.protocol.contact.strike.value + float(x[at["contact"]][0] + x[at["strike"]][0])
-    d_above = np.zeros(x.size)
-    d_above[at["contact"]] = d_above[at["strike"]] = 1.0
-    speed, d_speed = path.arrival, model.spread("impact", path.d_arrival)
-    pull = path.gravity - path.kappa * speed**2
-    d_pull = -2.0 * path.kappa * speed * d_speed
-    d_pull[at["gravity"]] += 1.0
-    if "drag" in at:
-        d_pull[at["drag"]] -= speed**2
-    squared = speed**2 - 2.0 * pull * above
-    if squared <= 0.0:
+    gradient = np.zeros(x.size)
+    gradient[model.unknowns["gravity"]] = 1.0
+    return model.protocol.gravity.value + float(x[model.unknowns["gravity"]][0]), gradient
+
+
+def _speed(drop: Adjusted) -> Value | None:
+    """V just before the top rod strikes."""
+    return drop.speed if "impact" in drop.model.records else None
+
+
+def _fall_time(drop: Adjusted) -> Value | None:
+    """How long it takes until the top rod strikes."""
+    if "impact" not in drop.model.records:
         return None
-    end = math.sqrt(squared)
-    d_end = (speed * d_speed - pull * d_above - above * d_pull) / end
-    both, d_both = speed + end, d_speed + d_end
-    when = float(path.time[-1]) - 2.0 * above / both
-    d_when = (
-        model.spread("impact", path.d_time[-1]) - 2.0 * (d_above - above / both * d_both) / both
-    )
-    return _Strike((above, d_above), (when, d_when), (end, d_end))
+    begin = float(drop.model.trajectory("impact", drop.x).time[0])
+    duration = drop.hit[1].copy()
+    duration[drop.model.unknowns["impact release"]] = 0.0  # it moves both ends
+    return drop.hit[0] - begin, duration
 
 
-def _both(model: DropModel) -> bool:
-    return {"impact", "free"} <= set(model.records)
+def _release_skew(drop: Adjusted) -> Value | None:
+    """The free chain's release less the impact chain's."""
+    return drop.skew if drop.both else None
 
 
-def _apart(model: DropModel, x: Array, when: float, d_when: Array) -> Value:
-    """Height of the free chain's top rod above the contact point at a moment."""
-    free, at = model.trajectory("free", x), model.unknowns
-    top = model.records["free"].chain.chain.length + float(x[at["free rods"]][-1])
-    height, speed = free.heights(np.array([when]))
-    gradient = model.spread("free", free.derivatives(np.array([when])))[0]
-    gradient -= float(speed[0]) * d_when
-    turned = 0.0
-    if "free swing" in at:
-        # A chain that turned is lower at its top, the more the further it fell.
-        chain, protocol = model.records["free"].chain.chain, model.protocol
-        rate = float(x[at["free swing"]][0])
-        slope = float(lever(chain)[-1]) / protocol.gravity.value
-        fallen = protocol.drop.value - float(height[0])
-        turned = rate * slope * fallen
-        gradient *= 1.0 + rate * slope
-        gradient[at["free swing"]] = -slope * fallen
-    gradient[at["free rods"].stop - 1] += 1.0  # the top rod is measured, not the reference point
-    return float(height[0]) + top - turned, gradient
+def _separation_raw(drop: Adjusted) -> Value | None:
+    """Δz at the instant of the top rod's strike."""
+    return drop.apart(*drop.hit) if drop.both else None
 
 
-COMPUTED: dict[str, Callable[[DropModel, Array], Value | None]] = {
+def _separation(drop: Adjusted) -> Value | None:
+    """Δz had both chains been let go together: the free one that much later, or earlier."""
+    if not drop.both:
+        return None
+    # The free chain is read off where it was as long after its own release: no model of what it
+    # would have done comes in.
+    return drop.apart(drop.hit[0] + drop.skew[0], drop.hit[1] + drop.skew[1])
+
+
+def _speed_strike(drop: Adjusted) -> Value | None:
+    """V as the top rod really strikes, on the board or on the rods that lie there."""
+    return None if drop.strike is None else drop.strike.speed
+
+
+def _separation_strike(drop: Adjusted) -> Value | None:
+    """Δz as the top rod really strikes, had both chains been let go together."""
+    if not drop.both or drop.strike is None:
+        return None
+    above, when, _ = drop.strike
+    value, gradient = drop.apart(when[0] + drop.skew[0], when[1] + drop.skew[1])
+    return value - above[0], gradient - above[1]
+
+
+COMPUTED: dict[str, Callable[[Adjusted], Value | None]] = {
     "separation_m": _separation,
     "separation_raw_m": _separation_raw,
     "separation_strike_m": _separation_strike,

@@ -7,6 +7,7 @@ after a time t, and a rod at s above the centre of mass is lower than on a strai
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,29 +21,33 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+@lru_cache(maxsize=64)  # a session asks for the same two again and again
 def lever(chain: Chain) -> Array:
     """How far each rod is above the centre of mass, m; shape ``(rods,)``."""
     heights = np.array(chain.heights)
     found: Array = heights - np.average(heights, weights=chain.masses)
+    found.flags.writeable = False
     return found
 
 
-def drawn(chain: Chain, protocol: Protocol, levels: Array) -> Array:
-    """How much lower each rod is than on a straight chain, for a chain that turns at 1 rad/s.
+def drawn(lever: Array, protocol: Protocol, levels: Array) -> Array:
+    """How much lower rods are than on a straight chain, for a chain that turns at 1 rad/s.
 
     By ½t² = (start − level)/g; where the chain was struck before it takes a little less.
 
     Parameters
     ----------
+    lever
+        Of each rod, see `lever`, m.
     levels
-        Of the reference point, m; shape ``(…, 1)`` or ``(…, rods)``.
+        Of the reference point, m; likewise.
 
     Returns
     -------
     ndarray
-        m, shape ``(…, rods)``.
+        m, of that shape.
     """
-    return lever(chain) * np.maximum(protocol.drop.value - levels, 0.0) / protocol.gravity.value
+    return lever * np.maximum(protocol.drop.value - levels, 0.0) / protocol.gravity.value
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:

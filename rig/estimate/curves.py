@@ -10,7 +10,7 @@ import numpy as np
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.fit import Fit
 from rig.analysis.free_flight import squared_after
-from rig.analysis.swing import drawn
+from rig.analysis.swing import drawn, lever
 from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
@@ -153,7 +153,7 @@ def _turned(model: DropModel, x: Array, role: str, level: Array) -> Array:
     if swing not in model.unknowns:
         return np.zeros_like(level)
     chain = model.records[role].chain.chain
-    found: Array = x[model.unknowns[swing]] * drawn(chain, model.protocol, level[:, None])[:, -1]
+    found: Array = x[model.unknowns[swing]] * drawn(lever(chain)[-1:], model.protocol, level)
     return found
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.analysis import pattern
 from rig.analysis.identify import adjusted
 from rig.analysis.pattern import EVER, guesses, slack_of
 from rig.analysis.verdict import LEAD, SUPPORT
@@ -132,6 +133,31 @@ def pile(scene: Case, count: int, seed: int) -> Case:
         level[channel] = not level[channel]
         edges.append(Edge(tick, channel, level[channel]))
     return scene.with_edges(edges)
+
+
+@pytest.mark.parametrize("piled", [False, True])
+def test_falls_that_cannot_have_votes_enough_are_not_counted(monkeypatch, piled):
+    scene = pile(RECORD, len(RECORD.drop.edges), 2) if piled else RECORD
+    counted = []
+
+    def count(moments, expected, late, *bounds):
+        counted.append(moments.size * late.shape[1])
+        return votes(moments, expected, late, *bounds)
+
+    votes = pattern._votes
+    monkeypatch.setattr(pattern, "_votes", count)
+    drop, gravity = scene.protocol.drop, scene.protocol.gravity.value
+    for record in scene.records:
+        least = 0.6 * record.expected
+        every = guesses(record, drop, gravity)
+        whole, counted = sum(counted), []
+        some = guesses(record, drop, gravity, least=least)
+        assert [one for one in some if one.votes >= least] == [
+            one for one in every if one.votes >= least
+        ]
+        if piled and record.ratios is not None:
+            assert sum(counted) < whole / 2
+        counted = []
 
 
 @pytest.mark.parametrize(("share", "seed"), [(0.5, 0), (1.0, 1)])

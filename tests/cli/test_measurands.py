@@ -23,7 +23,8 @@ SPIN = Measurand(
 def added(monkeypatch):
     """Have a measurand that nobody has heard of: how fast the free chain is at the end."""
 
-    def compute(model, x):
+    def compute(drop):
+        model, x = drop.model, drop.x
         if set(model.records) != {"impact", "free"}:
             return None
         struck, free = model.trajectory("impact", x), model.trajectory("free", x)
