@@ -11,6 +11,7 @@ from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
+from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -118,13 +119,15 @@ def predict_incline(
     """
     from rig.model.predict import predict  # noqa: PLC0415 - only where something is struck
 
+    protocol = at_contact(protocol, incline_deg, struck)
     assert protocol.surface is not None
-    chain, kappas = protocol.chains[struck].chain, air_of(protocol, struck)
+    chain, drop = as_struck(protocol, incline_deg, struck)
+    kappas = air_of(protocol, struck)
     found = predict(
         chain,
         protocol.surface,
         incline_deg,
-        protocol.drop,
+        drop,
         protocol.gravity,
         initial_speed=protocol.initial_speed,
         kappas=kappas,
@@ -133,7 +136,7 @@ def predict_incline(
     if free is None or found.separation is None or found.time is None:
         return found
     # Top rods of unlike chains start at unlike heights.
-    longer = protocol.chains[free].chain.length - chain.length
+    longer = protocol.chains[free].chain.length - protocol.chains[struck].chain.length
     held = _held_back(protocol, kappas, air_of(protocol, free), found.time)
     return replace(found, separation=found.separation + longer + held)
 

@@ -15,6 +15,7 @@ from rig.model.chain import Chain
 from rig.model.drag import drag_hits
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
+from rig.protocol.contact import contact_level, higher_contacts
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from sim.air import air
@@ -119,6 +120,12 @@ class ChainLab:
             for gate in self.gates
         }
 
+    def _level(self, run: Run) -> float:
+        """How far above the zero of all heights the chain strikes, m."""
+        if run.impact is None:
+            return 0.0
+        return contact_level(self.protocol, run.incline_deg, run.impact).value
+
     def _rng(self, *what: object) -> np.random.Generator:
         """Give each thing that is drawn a stream of its own."""
         digest = hashlib.sha256(repr((self.seed, *what)).encode()).digest()
@@ -164,16 +171,16 @@ class ChainLab:
             return []
         run, attempt = self._run(label)
         hung = self._hung(run, attempt)
-        rng, dials = hung.rng, self.dials
+        rng, dials, level = hung.rng, self.dials, self._level(run)
         paths: dict[Side, tuple[Body, Path]] = {}
         if run.impact is not None:
             body = self.bodies[run.impact]
-            start = self.hang_height + hung.hang[0]
+            start = self.hang_height - level + hung.hang[0]
             paths["impact"] = (
                 body, self._impact_path(body, run.incline_deg, hung.release_s, start, rng),
             )  # fmt: skip
         if run.free is not None:
-            start = self.hang_height + hung.hang[1]
+            start = self.hang_height - level + hung.hang[1]
             gravity = self.protocol.gravity.value
             paths["free"] = (
                 self.bodies[run.free],
@@ -184,7 +191,7 @@ class ChainLab:
             for gate in self.gates
             if gate.side in paths
             for edge in receive(
-                self._shadows(gate, *paths[gate.side], rng), gate.channel, dials, rng
+                self._shadows(gate, level, *paths[gate.side], rng), gate.channel, dials, rng
             )
         ]
         edges.sort(key=lambda edge: edge.time_s)
@@ -219,13 +226,15 @@ class ChainLab:
             friction=None if math.isnan(dials.friction) else dials.friction,
         )
         alphas = impact.alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
-        bottom = float(body.offsets[0])
-        actual = Chain(chain.masses, tuple((body.offsets - bottom).tolist()), chain.inertia)
+        # What touches the board higher hangs as much lower, as far as its strike goes.
+        strikes = body.offsets - np.array(higher_contacts(self.protocol, incline, body.spec))
+        bottom = float(strikes[0])
+        actual = Chain(chain.masses, tuple((strikes - bottom).tolist()), chain.inertia)
         gains = kicks(actual, alphas.tolist(), impact.gamma)
         gravity = self.protocol.gravity.value
         air = self.air[body.spec.name]
         events = drag_hits(actual, gains, air or [0.0] * chain.rods, start + bottom, gravity)
-        return Path(release, start, gravity, events, tuple((-body.offsets).tolist()), air)
+        return Path(release, start, gravity, events, tuple((-strikes).tolist()), air)
 
     def _shift(self, body: Body, gate: Gate) -> np.ndarray:
         """How far each rod's crossing is shifted because the beam is off its middle, m."""
@@ -233,10 +242,10 @@ class ChainLab:
         return slope * (-1.0) ** np.arange(body.widths.size)
 
     def _shadows(
-        self, gate: Gate, body: Body, path: Path, rng: np.random.Generator
+        self, gate: Gate, level: float, body: Body, path: Path, rng: np.random.Generator
     ) -> list[Shadow]:
         """Everything that darkens one beam."""
-        height = self.heights[gate.channel]
+        height = self.heights[gate.channel] - level
         middles = body.offsets + self._shift(body, gate)
         shadows: list[Shadow] = []
         for rod, (middle, width) in enumerate(zip(middles, body.widths, strict=True)):

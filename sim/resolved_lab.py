@@ -10,6 +10,7 @@ import numpy as np
 
 from rig.errors import InputError
 from rig.link.messages import pack_label, unpack_label
+from rig.protocol.protocol import Contact
 from sim import fall_cache
 from sim.ahead import Ahead
 from sim.beam import SeenEdge, Shadow, receive, string_shadows
@@ -96,6 +97,7 @@ class ResolvedLab(ChainLab):
         self._key = fall_cache.key(
             protocol.chains, protocol.surface, protocol.drop, protocol.gravity, self.gates,
             protocol.plan, asdict(dials), world, seed,
+            *([] if protocol.contact == Contact() else [protocol.contact]),
         )  # fmt: skip
         self._ahead = Ahead(self._make)
 
@@ -153,19 +155,25 @@ class ResolvedLab(ChainLab):
     def chains(self, label: int) -> dict[Side, Chain]:
         """Hang the chains of a drop as they really are."""
         run, attempt = self._run(label)
-        hang = self._hung(run, attempt).hang
+        hang, level = self._hung(run, attempt).hang, self._level(run)
         found: dict[Side, Chain] = {}
         if run.impact is not None:
             rods, swing, spin = self._hang("impact", run.impact, run, attempt)
             found["impact"] = self._chain(
-                rods, self.protocol.chains[run.impact], hang[0], swing, spin, run.incline_deg
+                rods,
+                self.protocol.chains[run.impact],
+                hang[0] - level,
+                swing,
+                spin,
+                run.incline_deg,
             )
         if run.free is not None:
             rods, swing, spin = self._hang("free", run.free, run, attempt)
             if self.protocol.surface is None:
                 # Where nothing is struck a fence may hang, which is stiff: strings do not turn it.
                 swing = np.zeros_like(swing)
-            found["free"] = self._chain(rods, self.protocol.chains[run.free], hang[1], swing, spin)
+            spec = self.protocol.chains[run.free]
+            found["free"] = self._chain(rods, spec, hang[1] - level, swing, spin)
         return found
 
     def _nominal(self, spec: RodChain) -> Rods:
@@ -240,7 +248,7 @@ class ResolvedLab(ChainLab):
             nominal = np.array(body.spec.widths)
             found = shadows(
                 falls[gate.side],
-                self.heights[gate.channel],
+                self.heights[gate.channel] - self._level(run),
                 self.beams[gate.channel] + float(aside[int(gate.side == "free")]),
                 np.array(body.spec.diameters) * body.widths / nominal,
                 0.5 * self._nominal(body.spec).length,

@@ -18,6 +18,7 @@ from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.model.rods import rod_impacts
 from rig.predictions import air_shares
+from rig.protocol.contact import higher_contacts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -124,6 +125,9 @@ class ChainRecord:
         `rig.analysis.trajectory.Trajectory`.
     condition
         Under which it strikes, in words; drops of the same one have the contact in common.
+    higher
+        How high above the contact point each rod's middle is as it strikes, m; not given where all
+        strike there.
     """
 
     role: Literal["impact", "free"]
@@ -133,6 +137,13 @@ class ChainRecord:
     alpha: float = 0.0
     air: Array = field(default_factory=lambda: ONE)
     condition: str = ""
+    higher: tuple[float, ...] = ()
+
+    @property
+    def strikes(self) -> Array:
+        """How high the reference point is below the contact point as each rod strikes, m."""
+        places = np.array(self.chain.chain.heights)
+        return places - self.higher if self.higher else places
 
     @property
     def expected(self) -> int:
@@ -141,7 +152,12 @@ class ChainRecord:
 
 
 def edge_train(
-    number: int, gate: Gate, chain: RodChain, edges: EdgeArrays, start: float, struck: bool
+    number: int,
+    gate: Gate,
+    chain: RodChain,
+    edges: EdgeArrays,
+    start: float,
+    higher: tuple[float, ...] | None,
 ) -> EdgeTrain:
     """Collect what one gate saw and what it should see.
 
@@ -153,11 +169,12 @@ def edge_train(
         All edges of the drop.
     start
         Nominal height of the bottom rod's middle before release, m.
-    struck
-        Whether the rods end at the surface: what passes below it is not expected.
+    higher
+        How far above the contact point each rod ends, m: what passes below that is not expected;
+        `None` where nothing is struck.
     """
     mine = np.flatnonzero(edges.channels == gate.channel)
-    rods, blocks, levels = _passages(gate.height, chain, start, struck, edges.darkening)
+    rods, blocks, levels = _passages(gate.height, chain, start, higher, edges.darkening)
     return EdgeTrain(
         number,
         edges.times[mine],
@@ -172,7 +189,11 @@ def edge_train(
 
 @lru_cache(maxsize=256)  # a session asks for the same few again and again
 def _passages(
-    height: float, chain: RodChain, start: float, struck: bool, darkening: bool
+    height: float,
+    chain: RodChain,
+    start: float,
+    higher: tuple[float, ...] | None,
+    darkening: bool,
 ) -> tuple[Index, Flags, Array]:
     """Rods, polarities and levels of what a beam should see, as `Train` has them."""
     places = np.array(chain.chain.heights)
@@ -182,8 +203,8 @@ def _passages(
     rods = np.repeat(np.arange(places.size), 2)
     blocks = np.tile(np.array([True, False]), places.size)
     seen = levels < start
-    if struck:
-        seen &= levels > -places[rods]
+    if higher is not None:
+        seen &= levels > (np.array(higher) - places)[rods]
     if darkening:
         seen &= blocks
     found = rods[seen], blocks[seen], levels[seen]
@@ -205,7 +226,8 @@ def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[C
             # Behind the last leg nothing falls any more, but edges are asked for all the same.
             air = np.append(air, air[-1]) if np.ptp(air) else air[:1]
             where = str(protocol.condition(run))
-            found.append(ChainRecord(role, chain, trains, ratios, alpha, air, where))
+            higher = higher_contacts(protocol, run.incline_deg, chain)
+            found.append(ChainRecord(role, chain, trains, ratios, alpha, air, where, higher))
     return found
 
 
@@ -224,7 +246,10 @@ def edge_trains(
         if name is None or not gates:
             continue
         chain = protocol.chains[name]
-        trains = (edge_train(n, gate, chain, edges, start, role == "impact") for n, gate in gates)
+        higher = None
+        if role == "impact":
+            higher = higher_contacts(protocol, run.incline_deg, chain)
+        trains = (edge_train(n, gate, chain, edges, start, higher) for n, gate in gates)
         yield role, chain, tuple(trains)
 
 

@@ -33,9 +33,12 @@ def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
     Returns
     -------
     role, height
-        On which side, and how high above the contact point or datum, m. No hanging rod blocks it.
+        On which side, and how high above the zero of the protocol's heights, m. No hanging rod
+        blocks it.
     """
     best = ("", 0.0, -1.0)
+    protocol = one.model.protocol
+    zero = 0.0 if protocol.stated is None else protocol.stated.drop.value - protocol.drop.value
     for role, record in one.model.records.items():
         paths = [fit.model.trajectory(role, fit.x) for fit in (one, other)]
         places, drop = np.array(record.chain.chain.heights), one.model.protocol.drop
@@ -54,7 +57,7 @@ def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
             far = _apart(mine, theirs) * paths[0].heights(mine)[1]
             if (mean := float(far.mean())) > best[2]:
                 best = role, height, mean
-    return best[:2]
+    return best[0], best[1] + zero
 
 
 def _apart(times: Array, others: Array) -> Array:

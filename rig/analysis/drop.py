@@ -20,6 +20,7 @@ from rig.analysis.last_passages import last_passages
 from rig.analysis.quantities import measured, quantities
 from rig.analysis.result import Audit, DropResult
 from rig.analysis.verdict import judge
+from rig.protocol.contact import at_contact
 from rig.records import Job
 from rig.threads import one_thread
 
@@ -79,6 +80,7 @@ def fit_drop(
         What was found out before about drops of this session, and is found out here. Results are
         the same with it and without.
     """
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
     received = sum(part.times.size for record in records for part in record.trains)

@@ -23,6 +23,7 @@ from rig.analysis.trajectory import (
 )
 from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, Unknowns
 from rig.predictions import air_of
+from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -232,7 +233,18 @@ class DropModel:
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
         other = copy(self)
-        other.protocol, other.components = protocol, stated(protocol)
+        other.components = stated(protocol)
+        # Its heights stay: they may be counted from a contact point that is this drop's own.
+        mine, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
+        assert protocol.gates is not None
+        assert gates is not None
+        other.protocol = replace(
+            protocol,
+            drop=Quantity(mine.drop.value, protocol.drop.u),
+            gates=replace(protocol.gates, gates=gates.gates),
+            contact=replace(mine.contact, level=replace(mine.contact.level, u=level.u)),
+            stated=mine.stated,
+        )
         other._kappa, other._kappa_u = prior_air(protocol)
         # Widths of rods and their places have priors of their own.
         other.records = {
@@ -294,11 +306,10 @@ class DropModel:
             return free_trajectory(release, start, gravity, kappa, record.air)
         assert record.ratios is not None
         start = max(start, _ABOVE)
-        places = np.array(record.chain.chain.heights) + x[at["impact rods"]]
+        places = record.strikes + x[at["impact rods"]]
         # Results are at the stated level: where the top rod would be if others struck elsewhere.
         places[:-1] -= x[at["contact"]]
         places[-1] += x[at["top"]][0]
-        places -= self.protocol.contact.level.value
         if "impact swing" in at:
             places -= x[at["impact swing"]] * self._drawn()
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
@@ -351,8 +362,8 @@ class DropModel:
 
     def _drawn(self) -> Array:
         """`drawn` of each rod of the chain that strikes, as it strikes."""
-        chain = self.records["impact"].chain.chain
-        return drawn(lever(chain), self.protocol, -np.array(chain.heights))
+        record = self.records["impact"]
+        return drawn(lever(record.chain.chain), self.protocol, -record.strikes)
 
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""

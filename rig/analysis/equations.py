@@ -143,14 +143,14 @@ class Expected(NamedTuple):
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> Expected:
         """Join the gates of a side."""
-        trains, places = record.trains, record.chain.chain.heights
+        trains, strikes = record.trains, record.strikes
         observed = np.array([train.times.size for train in trains])
         expected = [train.rods.size for train in trains]
         rods = np.concatenate([train.rods for train in trains])
         levels = np.concatenate([train.levels for train in trains])
-        alone = rods == len(places) - 1
+        alone = rods == strikes.size - 1
         alone &= levels < (
-            -places[-2] if record.ratios is not None and len(places) > 1 else -np.inf
+            -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
         )
         return cls(
             np.concatenate([train.times for train in trains]),

@@ -250,7 +250,8 @@ def exchanged(one: Gate, other: Gate) -> str:
 
 def name_of(gate: Gate) -> str:
     """Say which gate, so that one can find it."""
-    return f"the gate on channel {gate.channel} ({gate.side} side, {gate.height * 1e3:g} mm)"
+    height = gate.height if gate.stated is None else gate.stated
+    return f"the gate on channel {gate.channel} ({gate.side} side, {height * 1e3:g} mm)"
 
 
 def _protocol(setting: Premise, **changes: object) -> Premise:

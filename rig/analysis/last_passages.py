@@ -75,15 +75,15 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     struck = _passages(fit, "impact")
     places = model.records["impact"].chain.chain.heights
     # Below here its nearest neighbour has struck.
-    alone = (struck.rod == len(places) - 1) & (struck.heights < places[-1] - places[-2])
+    before = places[-1] - model.records["impact"].strikes[-2]
+    alone = (struck.rod == len(places) - 1) & (struck.heights < before)
     if np.count_nonzero(alone) < 2:
         return {}
-    level = model.protocol.contact.level.value
     last = struck.only(alone)
     when = float(last.times[np.argmin(last.heights)])
-    for _ in range(3):  # Newton's steps to the moment at which it is at the level
+    for _ in range(3):  # Newton's steps to the moment at which it is at the contact level
         (height, speed), covariance = _fall(fit, "impact", last, when)
-        when += (height - level) / speed
+        when += height / speed
     found = {"speed_m_s": Measured(speed, _u(covariance, 0.0, 1.0))}
     moment_u = _u(covariance, 1.0, 0.0) / speed
     if "free" in model.records:
@@ -93,7 +93,7 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
             (height, falling), covariance = _fall(fit, "free", near, when)
             u = math.hypot(_u(covariance, 1.0, 0.0), falling * moment_u)
             datum = math.sqrt(2.0) * model.protocol.gates.datum_u if model.protocol.gates else 0.0
-            found["separation_raw_m"] = Measured(height - level, math.hypot(u, datum))
+            found["separation_raw_m"] = Measured(height, math.hypot(u, datum))
     return found
 
 

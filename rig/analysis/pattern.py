@@ -194,8 +194,7 @@ def _paths(
             kappa * record.air,
         )
         return _Paths(np.zeros(1), times, speeds, _end(times))
-    places = np.array(record.chain.chain.heights)
-    height = np.concatenate([[start], -places])
+    height = np.concatenate([[start], -record.strikes])
     kappas = kappa * np.broadcast_to(record.air, height.shape)
     ends = _legs(height, record.ratios, np.array(span), gravity, kappas)
     # So fine that the chain's top is never off by more than half a vote's width.

@@ -41,6 +41,7 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     if not analysis.adjusted:
         return []
     protocol = next(iter(analysis.adjusted.values())).model.protocol
+    protocol = protocol.stated or protocol
     here = _again(protocol, analysis)
     rows = []
     for name, scaled in _priors(protocol):

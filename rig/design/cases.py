@@ -16,6 +16,7 @@ from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.model.rods import rod_impacts
+from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Run
 from rig.records import Drop
@@ -188,6 +189,7 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
         Records with their trains, and α of each rod, shape ``(rods,)``; empty for a free chain.
     """
     found = []
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     start, gravity = protocol.drop.value - lower, protocol.gravity.value
     kappa = prior_air(protocol)[0]
     for record in chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
@@ -196,9 +198,8 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
             assert protocol.surface is not None
             impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
             alphas = np.array([one.alpha for one in impacts])
-            places = np.array(record.chain.chain.heights)
             path = struck_trajectory(
-                RELEASE_S, start, gravity, alphas, record.ratios, places, kappa, record.air
+                RELEASE_S, start, gravity, alphas, record.ratios, record.strikes, kappa, record.air
             )
         trains = tuple(_seen(train, path.times(train.levels)) for train in record.trains)
         found.append((replace(record, trains=trains), alphas))
@@ -207,6 +208,7 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
 
 def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
     """The equations of the drop as the model predicts it."""
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     records = perfect(protocol, run)
     guesses: dict[str, Guess] = {
         record.role: Guess(

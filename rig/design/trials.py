@@ -22,6 +22,7 @@ from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.verdict import pattern_faults
 from rig.design.cases import CLOCK_U, RELEASE_S
 from rig.model.rods import rod_impacts
+from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.records import Drop
 from rig.threads import one_thread
@@ -79,9 +80,10 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     read, failing = 0, dict[str, int]()
     wanted: tuple[str, float] | None = None
     for run in islice(cycle(kinds.values()), drops):
-        start = protocol.drop.value + protocol.drop.u * rng.standard_normal()
-        fallen = [_fallen(protocol, one, run, start, rng) for one in _blank(protocol, run)]
-        found = identify(protocol, [one for one, _ in fallen], CLOCK_U, stated(protocol), _WINDOW)
+        here = at_contact(protocol, run.incline_deg, run.impact)
+        start = here.drop.value + here.drop.u * rng.standard_normal()
+        fallen = [_fallen(here, one, run, start, rng) for one in _blank(here, run)]
+        found = identify(here, [one for one, _ in fallen], CLOCK_U, stated(here), _WINDOW)
         wrong = misread(found, {record.role: truth for record, truth in fallen})
         if not wrong:
             read += 1
@@ -143,7 +145,7 @@ def _path(
     alphas = np.array([one.alpha for one in impacts])
     scatter = stated(protocol).impulses(float(alphas.mean()), above(alphas.size))
     alphas += scatter * rng.standard_normal(alphas.size)
-    places = np.array(record.chain.chain.heights) + rods
+    places = record.strikes + rods
     return struck_trajectory(
         release, start, gravity, alphas, record.ratios, places, kappa, record.air
     )

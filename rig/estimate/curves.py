@@ -15,6 +15,7 @@ from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
+from rig.protocol.contact import as_struck, at_contact
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -192,19 +193,21 @@ def _with_band(
     return curve(x), band
 
 
-def _by_model(protocol: Protocol, run: Run) -> tuple[Chain, list[float]]:
-    """The chain that strikes, and what the model says it gains from each rod."""
-    assert protocol.surface is not None
+def _by_model(protocol: Protocol, run: Run) -> tuple[Chain, float, list[float]]:
+    """The chain that strikes, its drop, and what the model says it gains from each rod."""
     assert run.impact is not None
-    chain = protocol.chains[run.impact].chain
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
+    assert protocol.surface is not None
+    chain, drop = as_struck(protocol, run.incline_deg, run.impact)
     impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
-    return chain, kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    return chain, drop.value, gains
 
 
 def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) -> Array:
     """V² by the model; `top` is the top rod's height above the bottom one."""
-    chain, gains = _by_model(protocol, run)
-    drop, gravity = protocol.drop.value, protocol.gravity.value
+    chain, drop, gains = _by_model(protocol, run)
+    gravity = protocol.gravity.value
     struck = hits(chain, gains, drop, gravity)
     before = np.array([-drop, *chain.heights[:-1]])
     after = np.array([0.0, *(hit.speed_after for hit in struck[:-1])])
@@ -215,6 +218,6 @@ def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) 
 
 
 def _separations_by_model(protocol: Protocol, run: Run, times: Array) -> Array:
-    chain, gains = _by_model(protocol, run)
-    motion = Motion(chain, gains, protocol.drop.value, protocol.gravity.value)
+    chain, drop, gains = _by_model(protocol, run)
+    motion = Motion(chain, gains, drop, protocol.gravity.value)
     return np.array([motion.at(min(time, motion.end_s)).separation_m for time in times.tolist()])

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
+from rig.protocol.contact import touching_heights
 from rig.protocol.measurable import lacking, longest_fall, record_ms, too_long, unmeasurable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import AT_REST, SIDES, Priors
@@ -81,6 +82,7 @@ def _scene(protocol: Protocol) -> list[str]:
     lines.append(f"{pull}: {format_quantity(protocol.gravity, 'm/s^2')}")
     if surface is not None or protocol.gates is not None:
         datum = "contact point" if surface is not None else "datum of the gates"
+        datum = "board" if protocol.contact.from_board else datum
         lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {datum}")
     if protocol.initial_speed != AT_REST:
         lines.append(f"initial speed: {format_quantity(protocol.initial_speed, 'm/s')} downward")
@@ -184,9 +186,24 @@ def _priors(protocol: Protocol) -> list[str]:
         level, strike = (
             format_quantity(one, "mm") for one in (protocol.contact.level, protocol.contact.strike)
         )
-        lines.append(f"rods touch at {level} above the gates' zero")
+        lines += _touching(protocol, level)
         lines.append(f"the top rod strikes {strike} above that, on rods that lie there")
     return lines
+
+
+def _touching(protocol: Protocol, level: str) -> list[str]:
+    """Say where rods touch."""
+    if not protocol.contact.from_board:
+        return [f"rods touch at {level} above the gates' zero"]
+    lines = []
+    for incline in dict.fromkeys(protocol.plan.inclines):
+        for name in protocol.strikers:
+            found = touching_heights(protocol.chains[name], incline)
+            low, high = (_number(round(one, 4), "mm") for one in (min(found), max(found)))
+            rod = "a rod" if not protocol.unlike_chains else f"a rod of {name}"
+            text = high if low == high else f"{low} to {high}"
+            lines.append(f"at {incline:g}° {rod} touches when its middle is {text} above the board")
+    return [*lines, f"what that leaves out: {level}"]
 
 
 def _consequences(protocol: Protocol) -> list[str]:

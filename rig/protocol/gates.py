@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from rig.boards import GATES
 from rig.protocol import fields
+from rig.protocol.contact import touching_heights
 from rig.protocol.fields import Range, Section
 from rig.protocol.protocol import DATUM_U, SIDES, Gate, Gates, RodChain, Side
 from rig.units import Dimension
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from rig.protocol.fields import FieldFaults
     from rig.protocol.yamltree import Node, Place
@@ -104,10 +105,16 @@ def check_clear(
     faults: FieldFaults,
     *,
     surface: bool,
+    inclines: Sequence[float] = (),
 ) -> None:
     """Note gates that a hanging chain blocks, that no rod passes, or that sit too low.
 
     The chains swap sides, so every gate is checked against every chain.
+
+    Parameters
+    ----------
+    inclines
+        Of the board, where heights are measured from it.
     """
     chains = tuple(chains)
     blocked = sorted(
@@ -119,6 +126,10 @@ def check_clear(
         for z, half in ((drop.value + height, width / 2 + max(CLEARANCE_M, drop.u)),)
     )
     lowest = max(width for chain in chains for width in chain.widths) / 2 if surface else 0.0
+    lowest += max(
+        (max(touching_heights(chain, incline)) for chain in chains for incline in inclines),
+        default=0.0,
+    )
     top = min(drop.value + chain.chain.length for chain in chains)
     spans = [(low, high) for low, high, _, _ in blocked]
     alone = chains[0].name if all(chain.chain.rods == 1 for chain in chains) else None

@@ -69,11 +69,20 @@ class RodChain:
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """One photogate: a level beam at a height above the contact point."""
+    """One photogate: a level beam at a height above the contact point.
+
+    Attributes
+    ----------
+    height
+        m.
+    stated
+        The same as the file has it, where it is counted from somewhere else there.
+    """
 
     channel: int
     height: float
     side: Side
+    stated: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,10 +130,14 @@ class Contact:
         heights, m.
     strike
         How far above it the top rod strikes: on the rods that lie there, m.
+    from_board
+        Whether heights are measured from the board: where rods touch it follows from what they
+        are like, and `level` is what that leaves out.
     """
 
     level: Quantity = LEVEL
     strike: Quantity = STRIKE
+    from_board: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,6 +271,9 @@ class Protocol:
         Whether numbers are kept back until the session is unblinded.
     text
         The file as read, kept word for word in the session.
+    stated
+        The protocol that this one is made from, with heights as its file has them, where those of
+        this one are counted from a run's contact point: see `rig.protocol.contact`.
     """
 
     title: str
@@ -278,6 +294,7 @@ class Protocol:
     blind: bool = False
     text: str = ""
     source: str = ""
+    stated: Protocol | None = None
 
     @property
     def one_object(self) -> bool:

@@ -40,6 +40,7 @@ KEYS = (
     "drag", "contact", "gates", "priors", "reference", "release", "plan", "accept", "blind",
     "notes",
 )  # fmt: skip
+DATUMS = ("contact", "board")
 DROP = Range(Dimension.LENGTH, 0.0, 100.0, "m")
 INITIAL_SPEED = Range(Dimension.SPEED, 0.0, 1000.0, "m/s")
 CONTACT = Range(Dimension.LENGTH, -0.1, 0.1, "mm")
@@ -153,11 +154,11 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     start = top.take("initial_speed", fields.quantity(INITIAL_SPEED), AT_REST)
     track = top.take("track", _track(chains, struck=has_surface))
     drag = _drag(top, chains) if "drag" in top else None
-    contact = top.take("contact", _contact(struck=has_surface), Contact())
+    contact = top.take("contact", _contact(chains, struck=has_surface), Contact())
     reference = top.take("reference", fields.exact(REFERENCE), PPS_U)
     release, plan, accept = _settings(top, turns=kept or count > 1)
     blind = top.take("blind", fields.choice("true", "false"), "false")
-    gates = _gates(top, chains, drop) if has_gates else None
+    gates = _gates(top, chains, drop, contact, plan) if has_gates else None
     priors = top.take("priors", _priors, Priors())
     if title is None or chains is None or gravity is None or drop is None:
         return None
@@ -226,7 +227,7 @@ def _drag(top: Section, chains: dict[str, RodChain] | None) -> Drag | None:
     return read_drag(top.values["drag"], chains.values() if chains else (), top.faults)
 
 
-def _contact(*, struck: bool) -> Converter[Contact]:
+def _contact(chains: dict[str, RodChain] | None, *, struck: bool) -> Converter[Contact]:
     """Return the converter to where rods strike."""
 
     def convert(node: Node, key: str, faults: FieldFaults) -> Contact | None:
@@ -237,16 +238,39 @@ def _contact(*, struck: bool) -> Converter[Contact]:
             message = "the scene has no surface, so nothing strikes; leave it out"
             faults.add(node.place, key, message)
             return None
-        section = Section(inner, key, faults, ("level", "strike"))
+        section = Section(inner, key, faults, ("datum", "level", "strike"))
         usual = Contact()
+        datum = section.take("datum", fields.choice(*DATUMS), DATUMS[0])
         level = section.take("level", fields.quantity(CONTACT), usual.level)
         strike = section.take("strike", fields.quantity(CONTACT), usual.strike)
-        return None if level is None or strike is None else Contact(level, strike)
+        if datum == "board" and not _shaped(section, chains):
+            return None
+        if datum is None or level is None or strike is None:
+            return None
+        return Contact(level, strike, datum == "board")
 
     return convert
 
 
-def _gates(top: Section, chains: dict[str, RodChain] | None, drop: Quantity | None) -> Gates | None:
+def _shaped(section: Section, chains: dict[str, RodChain] | None) -> bool:
+    """Whether all chains say what tells where their rods touch a board."""
+    from rig.protocol.contact import lacking_geometry  # noqa: PLC0415 - see above
+
+    lacking = {name: lacking_geometry(rods) for name, rods in (chains or {}).items()}
+    for name, keys in lacking.items():
+        if keys:
+            message = f"how high rods touch a board follows from chains.{name}.{keys[0]}: state it"
+            section.fault("datum", message)
+    return not any(lacking.values())
+
+
+def _gates(
+    top: Section,
+    chains: dict[str, RodChain] | None,
+    drop: Quantity | None,
+    contact: Contact | None,
+    plan: Plan | None,
+) -> Gates | None:
     from rig.protocol.gates import check_clear, read_gates  # noqa: PLC0415 - see above
 
     surface, count = "surface" in top, _count(top.values.get("chains"))
@@ -255,7 +279,8 @@ def _gates(top: Section, chains: dict[str, RodChain] | None, drop: Quantity | No
         return None
     gates, located = found
     if chains is not None and drop is not None and "drop" in top:
-        check_clear(located, chains.values(), drop, top.faults, surface=surface)
+        inclines = plan.inclines if plan and contact and contact.from_board else ()
+        check_clear(located, chains.values(), drop, top.faults, surface=surface, inclines=inclines)
     return gates
 
 

@@ -197,8 +197,13 @@ KEYS: tuple[Key, ...] = (
     Key("surface.pile.restitution", surface.RESTITUTION, "",
         "effective β there, ±; below 0 the pile gives way", "-0.37", required=True),
     Key("contact", _MAP, "", "where rods strike, above the zero of the gates", ""),
+    Key("contact.datum", OneOf(reader.DATUMS), reader.DATUMS[0],
+        "what `drop` and the gates' heights are measured from: where a rod's middle touches, or "
+        "the board below the chain; then the rods' diameter, length and tilt say where they touch "
+        "at each incline", "board"),
     Key("contact.level", reader.CONTACT, format_quantity(_CONTACT.level, "mm"),
-        "middle of an undisturbed rod as it touches, ±", "1.2 mm ± 0.5 mm"),
+        "middle of an undisturbed rod as it touches, ±; from the board, what its shape leaves out",
+        "1.2 mm ± 0.5 mm"),
     Key("contact.strike", reader.CONTACT, format_quantity(_CONTACT.strike, "mm"),
         "how far above that the highest rod strikes, on those that lie there, ±", "8 mm ± 5 mm"),
 

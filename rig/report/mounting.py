@@ -68,6 +68,8 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> str:
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
     """How far the board's face is under the contact point, where a resting rod's middle is, m."""
+    if protocol.contact.from_board:
+        return 0.0  # heights are counted from there
     thick = max((d for c in protocol.chains.values() for d in c.diameters), default=0.0)
     return thick / 2 / math.cos(math.radians(incline_deg))
 

@@ -65,8 +65,9 @@ class Case:
         struck = role == "impact"
         chain = self.protocol.chains[self.run.impact if struck else self.run.free]
         edges = EdgeArrays.of(self.drop, self.scale.hz)
+        higher = (0.0,) * chain.chain.rods if struck else None
         trains = [
-            edge_train(number, gate, chain, edges, self.protocol.drop.value, struck)
+            edge_train(number, gate, chain, edges, self.protocol.drop.value, higher)
             for number, gate in enumerate(self.protocol.gates.gates)
             if gate.side == role
         ]

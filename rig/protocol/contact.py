@@ -1,0 +1,127 @@
+"""Where rods strike: how high a rod's middle is as it touches a board, for any incline.
+
+A cylinder of radius r and length L, tilted by τ along the level lines of a board inclined by θ,
+touches it with one end when its middle is L sin τ/2 + r √(1 − sin²τ cos²θ)/cos θ above the board,
+measured straight down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rig.units import Quantity
+
+if TYPE_CHECKING:
+    from rig.model.chain import Chain
+    from rig.protocol.protocol import Protocol, RodChain
+
+
+def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
+    """How high above a board each rod's middle is as it touches, m; bottom up.
+
+    Parameters
+    ----------
+    chain
+        With nothing lacking, see `lacking_geometry`.
+    incline_deg
+        Of the board, below 90.
+    """
+    sine, cosine = _sine(chain), math.cos(math.radians(incline_deg))
+    end = 0.5 * chain.rod_length * sine if sine else 0.0
+    across = math.sqrt(1.0 - (sine * cosine) ** 2) / cosine
+    return tuple(end + 0.5 * diameter * across for diameter in chain.diameters)
+
+
+def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
+    """Name the keys of a chain that `touching_heights` needs and that are not there."""
+    thick = bool(chain.diameters) and min(chain.diameters) > 0.0
+    long = not _sine(chain) or not math.isnan(chain.rod_length)
+    lacking = {"diameter": thick, "rod_length": long}
+    return tuple(key for key, known in lacking.items() if not known)
+
+
+def _sine(chain: RodChain) -> float:
+    return abs(math.sin(math.radians(chain.tilt_deg)))
+
+
+def higher_contacts(protocol: Protocol, incline_deg: float, chain: RodChain) -> tuple[float, ...]:
+    """How much higher each rod's middle is as it touches than that of the top rod, m; bottom up.
+
+    Nothing where heights are not measured from the board, which says how thick rods are.
+    """
+    if not protocol.contact.from_board:
+        return (0.0,) * chain.chain.rods
+    heights = touching_heights(chain, incline_deg)
+    return tuple(height - heights[-1] for height in heights)
+
+
+def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chain, Quantity]:
+    """Return a chain, and its drop, whose rods all strike at the contact point when these do.
+
+    A rod that touches higher is one that hangs as much lower.
+
+    Parameters
+    ----------
+    protocol
+        With heights counted from the contact point, see `at_contact`.
+    """
+    chain, drop = protocol.chains[struck].chain, protocol.drop
+    higher = higher_contacts(protocol, incline_deg, protocol.chains[struck])
+    if not any(higher):
+        return chain, drop
+    lowest = chain.heights[0] - higher[0]
+    heights = tuple(z - more - lowest for z, more in zip(chain.heights, higher, strict=True))
+    return replace(chain, heights=heights), Quantity(drop.value + lowest, drop.u)
+
+
+def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quantity:
+    """How high above the zero of the heights the top rod's middle is as it touches, m.
+
+    Parameters
+    ----------
+    struck
+        Name of the chain that strikes.
+    """
+    level = protocol.contact.level
+    if not protocol.contact.from_board or protocol.stated is not None:
+        return level
+    return Quantity(
+        touching_heights(protocol.chains[struck], incline_deg)[-1] + level.value, level.u
+    )
+
+
+def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Protocol:
+    """Count all heights of a run from its contact point, as everything that falls there does.
+
+    Parameters
+    ----------
+    struck
+        Name of the chain that strikes; `None` where nothing is struck.
+
+    Returns
+    -------
+    Protocol
+        With the same uncertainties, and the one it is made from; itself where its heights are
+        counted so already.
+    """
+    if struck is None or protocol.stated is not None:
+        return protocol
+    level = contact_level(protocol, incline_deg, struck)
+    if not protocol.contact.from_board and not level.value:
+        return protocol
+    gates = protocol.gates
+    if gates is not None:
+        lower = (
+            replace(gate, height=gate.height - level.value, stated=gate.height)
+            for gate in gates.gates
+        )
+        gates = replace(gates, gates=tuple(lower))
+    return replace(
+        protocol,
+        drop=Quantity(protocol.drop.value - level.value, protocol.drop.u),
+        gates=gates,
+        contact=replace(protocol.contact, level=Quantity(0.0, level.u)),
+        stated=protocol,
+    )

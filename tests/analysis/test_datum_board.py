@@ -1,0 +1,155 @@
+"""Heights measured from the board: where rods touch follows from what they are like."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.result import normalized_error
+from rig.analysis.session import analyze
+from rig.errors import InputError
+from rig.predictions import predicted_run
+from rig.protocol import reader
+from rig.protocol.contact import at_contact, contact_level, touching_heights
+from rig.protocol.describe import describe
+from rig.units import Quantity
+from sim.dials import Dials
+from tests.analysis.drops import GRADED, UNIFORM, case, with_dials
+
+
+def raised(text: str, by_mm: float) -> str:
+    """Gates so much higher, and the chains as much more above the zero."""
+
+    def higher(found: re.Match[str]) -> str:
+        return f"{found[1]}{float(found[2]) + by_mm:.12g} mm"
+
+    return re.sub(r"(height: |drop: )([0-9.]+) mm", higher, text)
+
+
+def from_board(text: str) -> str:
+    gentle = re.sub(r"incline: \[[^]]*\] ?(deg)?", "incline: [0 deg, 10 deg, 40 deg, 50 deg]", text)
+    return f"{gentle}\ncontact: {{datum: board}}\n"
+
+
+BOARD = reader.parse(from_board(raised(UNIFORM.text, 20.0)), "board")
+BOARD_GRADED = reader.parse(
+    from_board(raised(GRADED.text, 36.0)).replace("tilt: 21", "rod_length: 102 mm\n    tilt: 21"),
+    "graded",
+)
+
+
+@pytest.mark.parametrize("incline", [0.0, 35.0, 70.0])
+def test_a_touching_rod_has_one_point_on_the_board_and_none_below(incline):
+    chain = UNIFORM.chains["A"]
+    tilt, theta = np.radians(chain.tilt_deg), np.radians(incline)
+    middle = np.array([0.0, 0.0, touching_heights(chain, incline)[0]])
+    along = np.array([np.cos(tilt), 0.0, np.sin(tilt)])
+    turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    across = np.cross(along, [0.0, 1.0, 0.0])
+    circle = np.outer(np.cos(turn), [0.0, 1.0, 0.0]) + np.outer(np.sin(turn), across)
+    ends = [
+        middle + sign * chain.rod_length / 2.0 * along + chain.diameters[0] / 2.0 * circle
+        for sign in (-1.0, 1.0)
+    ]
+    board = np.array([0.0, np.sin(theta), np.cos(theta)])
+    lowest = min(float((points @ board).min()) for points in ends)
+    assert lowest == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("incline", [10.0, 50.0])
+def test_what_is_measured_is_the_same_from_board_and_from_contact(incline):
+    """The very fall, with heights from either zero."""
+    one = case(BOARD, incline=incline, seed=3)
+    level = contact_level(BOARD, incline, one.run.impact).value
+    other = replace(one, protocol=reader.parse(raised(UNIFORM.text, 20.0 - 1e3 * level), "contact"))
+    found, expected = one.analyze().quantities, other.analyze().quantities
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        assert found[name].value == pytest.approx(value.value, rel=1e-9, abs=1e-12)
+        assert found[name].u == pytest.approx(value.u, rel=1e-6)
+    model = {name: (one.value, one.u) for name, one in predicted_run(BOARD, one.run).items()}
+    for name, value in predicted_run(other.protocol, one.run).items():
+        assert model[name] == pytest.approx((value.value, value.u), rel=1e-9)
+
+
+@pytest.mark.parametrize("protocol", [BOARD, BOARD_GRADED], ids=["uniform", "graded"])
+def test_an_undisturbed_fall_is_what_it_is_and_what_was_predicted(protocol):
+    """Thick rods of a graded chain strike before the thin ones of the top would."""
+    one = case(protocol, with_dials(clock=0.0), incline=40.0)
+    result = one.analyze()
+    assert result.verdict == "accepted"
+    assert result.audit.missed == 0
+    for name, model in predicted_run(protocol, one.run).items():
+        found = result.quantities[name]
+        assert abs(found.value - getattr(one.truth, name)) < 0.1 * found.u
+        assert abs(normalized_error(found, model)) < 0.2
+
+
+def test_drops_at_several_inclines_are_fitted_together():
+    drops = [case(BOARD, Dials(), incline=incline, attempt=attempt)
+             for incline in (10.0, 50.0) for attempt in (1, 2)]  # fmt: skip
+    found = analyze(BOARD, [one.drop for one in drops], lambda _: drops[0].scale)
+    assert found.joint is not None
+    results = [*found.runs, *found.superseded]
+    truths = sorted((one.truth for one in drops), key=lambda one: (one.attempt, one.run))
+    results.sort(key=lambda one: (one.attempt, one.run.number))
+    for result, truth in zip(results, truths, strict=True):
+        for name in ("separation_m", "speed_m_s", "release_skew_s"):
+            measured = result.quantities[name]
+            assert abs(measured.value - getattr(truth, name)) < 3.0 * measured.u
+    wider = found.adjusted[results[0].run.number, 1].model.under(
+        replace(BOARD, drop=Quantity(0.2, 6e-3))
+    )
+    assert wider.protocol.drop.value < 0.19
+    assert wider.protocol.drop.u == 6e-3
+
+
+def test_a_stated_level_moves_no_result():
+    """Gates and drop higher by as much as rods touch: Δz is over where they touch."""
+    higher = f"{raised(UNIFORM.text, 5.0)}\ncontact: {{level: 5 mm ± 1 mm}}\n"
+    one = case(reader.parse(higher, "level"), with_dials(), incline=40.0)
+    other = case(UNIFORM, with_dials(), incline=40.0)
+    for name, value in other.analyze().quantities.items():
+        assert one.analyze().quantities[name].value == pytest.approx(value.value, abs=1e-6)
+    assert one.truth.separation_m == pytest.approx(other.truth.separation_m)
+
+
+def test_gates_are_named_by_the_heights_of_the_file():
+    here = at_contact(BOARD, 50.0, "A")
+    assert here.gates is not None
+    assert BOARD.gates is not None
+    assert [gate.stated for gate in here.gates.gates] == [one.height for one in BOARD.gates.gates]
+    assert at_contact(here, 10.0, "A") is here
+    swapped = {0: 2, 2: 0}
+    one = case(BOARD, Dials(), incline=50.0)
+    edges = [edge._replace(channel=swapped.get(edge.channel, edge.channel))
+             for edge in one.drop.edges]  # fmt: skip
+    said = " ".join(one.with_edges(edges).analyze().reasons)
+    assert "42 mm" in said
+    assert "90 mm" in said
+
+
+def test_check_says_where_rods_touch():
+    said = describe(BOARD)
+    assert "drop: 200.0 ± 2.0 mm above the board" in said
+    assert "at 0° a rod touches when its middle is 16.8 mm above the board" in said
+    assert "at 50° a rod touches when its middle is 20.4 mm above the board" in said
+    assert "touches when its middle is 22.2 mm to 38.4 mm above" in describe(BOARD_GRADED)
+
+
+@pytest.mark.parametrize("key", ["rod_length", "diameter"])
+def test_rods_of_unknown_shape_touch_nobody_knows_where(key):
+    text = re.sub(rf"\n    {key}:.*", "", UNIFORM.text)
+    with pytest.raises(InputError) as caught:
+        reader.parse(from_board(text), "f")
+    problems = [str(one) for one in caught.value.problems]
+    assert any(f"chains.A.{key}" in one or f"A.{key}" in one for one in problems)
+
+
+def test_a_gate_behind_a_resting_rod_is_refused():
+    with pytest.raises(InputError) as caught:
+        reader.parse(from_board(UNIFORM.text), "f")
+    assert "a rod at rest on the surface would block the beam" in str(caught.value)
