@@ -284,7 +284,11 @@ def _parser() -> Parser:
         "--budget", type=_count, metavar="RUN", help="what one run's uncertainty is made of"
     )
     analyze.add_argument(
-        "--trials", type=_count, default=200, metavar="M", help="Monte Carlo trials beside it"
+        "--trials",
+        type=_trials,
+        default=200,
+        metavar="M",
+        help="Monte Carlo trials beside it, or adaptive: as many as u to one digit needs",
     )
     analyze.add_argument(
         "--session-trials", type=_count, metavar="M", help="Monte Carlo of the session's joint fit"
@@ -559,6 +563,10 @@ def _count(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text} is too few: at least 1 is needed")
     return number
+
+
+def _trials(text: str) -> int | None:
+    return None if text == "adaptive" else _count(text)
 
 
 def _seed(text: str) -> int:

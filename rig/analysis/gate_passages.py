@@ -79,10 +79,10 @@ def gate_passages(
     Returns
     -------
     tuple of GatePassage
-        Empty for chains, whose rods pass a gate many times.
+        Empty for chains, whose rods pass a gate many times, and for what strikes.
     """
     model = fit.model
-    if not model.protocol.one_object:
+    if not model.protocol.one_object or "free" not in model.records:
         return ()
     gates = model.protocol.gates
     assert gates is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PROBABILITY = 0.95
+BLOCK = 10_000
+"""Trials of a block of the adaptive procedure, for up to 99 % (JCGM 101, 7.9.4)."""
 _SESSION_STEPS = 3  # from the solution itself: a trial moves it by about one σ
 _END = 2.7
 """Standard error of the end of a 95 % interval from M trials, in units of u/√M: the quantile of a
@@ -57,6 +60,15 @@ class Propagated:
         low, high = np.quantile(values, [tail, 1.0 - tail])
         return cls(float(values.mean()), float(values.std(ddof=1)), float(low), float(high))
 
+    @classmethod
+    def all(cls, drawn: Iterator[Mapping[str, float]], trials: int) -> dict[str, Propagated]:
+        """Sum up so many trials of several quantities by name."""
+        values: dict[str, list[float]] = {}
+        for one in islice(drawn, trials):
+            for name, value in one.items():
+                values.setdefault(name, []).append(value)
+        return {name: cls.of(np.array(each)) for name, each in values.items()}
+
     def json(self) -> dict[str, float]:
         """``{"mean", "u", "low", "high"}``."""
         return {name: getattr(self, name) for name in self.__slots__}
@@ -78,22 +90,78 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     seed
         Of the generator; the same seed gives the same trials.
     """
+    return Propagated.all(_drawn(fit, seed), trials)
+
+
+@one_thread
+def adaptive(
+    fit: Fit, seed: int, digits: int = 1, block: int = BLOCK
+) -> tuple[dict[str, Propagated], int]:
+    """Like `monte_carlo`, with as many trials as the digits need that count (JCGM 101, 7.9.4).
+
+    Parameters
+    ----------
+    digits
+        Of u that count.
+    block
+        Trials that are looked at together; the Supplement's least is `BLOCK`.
+
+    Returns
+    -------
+    found, trials
+        M, a multiple of `block`.
+    """
+    one = _drawn(fit, seed)
+    return until_stable(lambda: [next(one) for _ in range(block)], digits)
+
+
+def until_stable(
+    draw: Callable[[], Sequence[Mapping[str, float]]], digits: int = 1
+) -> tuple[dict[str, Propagated], int]:
+    """Draw blocks of trials until all results are stable to so many digits of u.
+
+    That is: until twice the standard errors of mean, u and both ends of the interval, from block to
+    block, are within the tolerance δ.
+
+    Parameters
+    ----------
+    draw
+        Makes one block.
+    """
+    every: list[Mapping[str, float]] = []
+    blocks: dict[str, list[Array]] = {}
+    while True:
+        new = draw()
+        every += new
+        for name, one in Propagated.all(iter(new), len(new)).items():
+            blocks.setdefault(name, []).append(np.array(list(one.json().values())))
+        found = Propagated.all(iter(every), len(every))
+        if all(_stable(blocks[name], tolerance(one.u, digits)) for name, one in found.items()):
+            return found, len(every)
+
+
+def _stable(blocks: Sequence[Array], within: float) -> bool:
+    if len(blocks) < 2:
+        return False
+    errors = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
+    return bool(2.0 * errors.max() <= within)
+
+
+def _drawn(fit: Fit, seed: int) -> Iterator[dict[str, float]]:
+    """Make one trial after another."""
     rng = np.random.default_rng(seed)
     model, at = fit.model, fit.estimate.x
     sd = model.unknowns.sd
     # A restless drop was weighed by its own scatter, so that is what its edges are shaken by.
     scatter = _scatters(fit, fit.estimate.scatter)
-    found: dict[str, list[float]] = {}
     expected = _Expected(fit, scatter)
-    for _ in range(trials):
+    while True:
         moved = {role: one.draw(rng) for role, one in scatter.items()}
         centre = _stated(sd) * rng.normal(size=sd.size)
         shaken = model.shaken(moved)
         # What is linear need not be found step by step; adjusting from there finds the rest.
         estimate = adjust(shaken, fit.matches, at + expected.shift(moved, centre), centre)
-        for name, (value, _gradient) in measurands(shaken, estimate.x).items():
-            found.setdefault(name, []).append(value)
-    return {name: Propagated.of(np.array(values)) for name, values in found.items()}
+        yield {name: value for name, (value, _) in measurands(shaken, estimate.x).items()}
 
 
 @one_thread
@@ -167,14 +235,18 @@ class Agreement:
         return found | {"agrees": self.agrees, "decided": self.decided}
 
 
+def tolerance(u: float, digits: int = 1) -> float:
+    """δ: half a unit of the last digit of u that counts (JCGM 101, 7.9.2)."""
+    return 0.5 * 10.0 ** (math.floor(math.log10(u)) + 1 - digits)
+
+
 def agreement(value: float, u: float, drawn: Propagated, trials: int, digits: int = 1) -> Agreement:
     """Compare value ± 1.96 u with the interval of the trials, to so many digits of u."""
     half = coverage_factor(math.inf, PROBABILITY) * u
-    digit = 10.0 ** (math.floor(math.log10(u)) + 1 - digits)
     return Agreement(
         abs(value - half - drawn.low),
         abs(value + half - drawn.high),
-        0.5 * digit,
+        tolerance(u, digits),
         2.0 * _END * u / math.sqrt(trials),
     )
 

@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
-from rig.analysis.monte_carlo import agreement, monte_carlo, session_monte_carlo
+from rig.analysis.monte_carlo import adaptive, agreement, monte_carlo, session_monte_carlo
 from rig.analysis.result import Measured
 from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.protocol.plan import runs
-from rig.results import calibration, check_open, kept, protocol_of, results
+from rig.records import Job
+from rig.results import (
+    calibration,
+    check_open,
+    kept,
+    kept_identified,
+    protocol_of,
+    results,
+)
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -37,7 +45,7 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, Any]:
+def budget(session: Reader, number: int, trials: int | None, seed: int) -> dict[str, Any]:
     """Account for the uncertainty of a run's results.
 
     Parameters
@@ -45,7 +53,7 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
     number
         Of the run.
     trials, seed
-        Of the Monte Carlo propagation, JCGM 101.
+        Of the Monte Carlo propagation, JCGM 101; as many as u to one digit needs if not given.
 
     Raises
     ------
@@ -58,13 +66,17 @@ def budget(session: Reader, number: int, trials: int, seed: int) -> dict[str, An
     protocol = protocol_of(session)
     check_open(session, protocol)
     planned = next(run for run in runs(protocol) if run.number == number)
-    alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
+    known = kept_identified(session, {Job(drop.run, drop.attempt): drop})
+    alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop), known=known)
     if fit is None:
         raise InputError(f"run {number} is void: {'; '.join(alone.reasons)}")
     # What was worked out and kept is not worked out again: the other runs are most of the work.
     records = kept(session) or results(session).records()
     record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
-    trial = monte_carlo(fit, trials, seed)
+    if trials is None:
+        trial, trials = adaptive(fit, seed)
+    else:
+        trial = monte_carlo(fit, trials, seed)
     return {
         "run": number,
         "learned": record["learned"],

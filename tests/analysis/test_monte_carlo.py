@@ -8,7 +8,16 @@ import math
 import numpy as np
 import pytest
 
-from rig.analysis.monte_carlo import Propagated, agreement, monte_carlo, session_monte_carlo
+from rig.analysis.monte_carlo import (
+    BLOCK,
+    Propagated,
+    adaptive,
+    agreement,
+    monte_carlo,
+    session_monte_carlo,
+    tolerance,
+    until_stable,
+)
 from rig.analysis.refine import Budgets
 from rig.commands.budget import session_trials, trials_lines
 from rig.errors import InputError
@@ -159,3 +168,58 @@ def test_comparison_loss_of_jcgm_101(at, mean, u):
     drawn = Propagated.of(1e6 * (rng.normal(at, 0.005, M) ** 2 + rng.normal(0.0, 0.005, M) ** 2))
     assert drawn.mean == pytest.approx(mean, abs=0.5 + 4 * u / math.sqrt(M))
     assert drawn.u == pytest.approx(u, abs=0.5 + 0.004 * u)
+
+
+def curved(rng, half, half_u, size):
+    """A rectangle whose half width is known to ± `half_u`: JCGM 101, 6.4.3."""
+    return rng.uniform(half - half_u, half + half_u, size) * rng.uniform(-1.0, 1.0, size)
+
+
+def gauge_block(rng, size):
+    """9.5, table 10, in nm: deviation of a block's length from 50 mm, by a comparator."""
+    standard = 50_000_623.0 + 25.0 * rng.standard_t(18, size)
+    difference = 215.0 + 6.0 * rng.standard_t(24, size)
+    difference += 4.0 * rng.standard_t(5, size) + 7.0 * rng.standard_t(8, size)
+    expansion = rng.uniform(9.5e-6, 13.5e-6, size)
+    warmer = rng.normal(-0.1, 0.2, size) + 0.5 * np.sin(2.0 * np.pi * rng.uniform(size=size))
+    apart = curved(rng, 1.0e-6, 0.1e-6, size), curved(rng, 0.050, 0.025, size)
+    own = standard * (apart[0] * warmer + expansion * apart[1])
+    return standard + difference - own - 50_000_000.0
+
+
+def test_gauge_block_of_jcgm_101():
+    """Table 11: 838 nm, u = 36 nm, 99 % in 745 to 932 nm, where the GUM's own u is 32 nm."""
+    rng = np.random.default_rng(8)
+    seen = []
+
+    def draw():
+        seen.append(gauge_block(rng, 10 * BLOCK))
+        return [{"length": value} for value in seen[-1].tolist()]
+
+    found, trials = until_stable(draw, digits=2)
+    assert trials == 10 * BLOCK * len(seen)
+    length = found["length"]
+    assert length.mean == pytest.approx(838.0, abs=0.5 + tolerance(36.0, 2))
+    assert length.u == pytest.approx(36.0, abs=0.5 + tolerance(36.0, 2))
+    ordered = np.sort(np.concatenate(seen))
+    held = round(0.99 * ordered.size)
+    begin = int(np.argmin(ordered[held:] - ordered[: ordered.size - held]))
+    assert (ordered[begin], ordered[begin + held]) == pytest.approx((745.0, 932.0), abs=2.0)
+    assert not agreement(838.0, 32.0, length, trials, digits=2).agrees
+
+
+@pytest.mark.parametrize(("digits", "least", "most"), [(1, 2, 40), (2, 41, 2000)])
+def test_trials_go_on_until_the_digits_that_count_stand(digits, least, most):
+    """Each digit more takes a hundred times as many."""
+    rng = np.random.default_rng(9)
+    found, trials = until_stable(lambda: [{"y": y} for y in rng.normal(size=100).tolist()], digits)
+    assert least <= trials / 100 <= most
+    assert found["y"].high == pytest.approx(1.96, abs=2.0 * tolerance(1.0, digits))
+
+
+def test_a_drop_has_as_many_trials_as_it_needs():
+    (fit,) = fits(cases((1,), seed=6))
+    found, trials = adaptive(fit, seed=1, digits=0, block=40)
+    assert trials % 40 == 0
+    assert trials >= 80
+    assert found == monte_carlo(fit, trials, seed=1)
