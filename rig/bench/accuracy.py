@@ -41,18 +41,32 @@ class Errors:
     errors: list[float] = field(default_factory=list)
     expanded: list[float] = field(default_factory=list)
     rigs: list[int] = field(default_factory=list)
+    bounds: list[float] = field(default_factory=list)
 
-    def add(self, error: float, expanded: float = math.inf, rig: int = 0) -> None:
-        """Count one measurement on a rig."""
+    def add(
+        self, error: float, expanded: float = math.inf, rig: int = 0, bound: float | None = None
+    ) -> None:
+        """Count one measurement on a rig.
+
+        Parameters
+        ----------
+        bound
+            Standard uncertainty by the information in the edges and all that is known beforehand,
+            where everything scatters as it was found: no estimate can be nearer than this, by
+            Cramér and Rao (van Trees, with priors).
+        """
         self.errors.append(error)
         self.expanded.append(expanded)
         self.rigs.append(rig)
+        if bound is not None:
+            self.bounds.append(bound)
 
     def json(self) -> dict[str, float | int]:
         """Rms, bias, largest error, mean U95, and the share of intervals that hold the truth.
 
         Drops on one rig share errors: ``bias_se`` and ``coverage_se``, from rig to rig, say how
-        well bias and coverage are known. ``bias_over_U`` is the bias in units of the mean U95.
+        well bias and coverage are known. ``bias_over_U`` is the bias in units of the mean U95, and
+        ``times_bound`` the rms in units of that of the bounds.
         """
         n = len(self.errors)
         held = [abs(error) <= u for error, u in zip(self.errors, self.expanded, strict=True)]
@@ -66,6 +80,8 @@ class Errors:
             "bias_over_U": bias / mean_u,
             "coverage": sum(held) / n,
         }
+        if self.bounds:
+            found["times_bound"] = found["rms"] / math.sqrt(fmean(u**2 for u in self.bounds))
         if len(set(self.rigs)) > 1:
             found["bias_se"] = self._between(self.errors)
             # Few misses tell little of how they scatter: so many independent errors there are.
@@ -116,7 +132,7 @@ class AccuracyTally:
         for name, measured in result.quantities.items():
             if truth.get(name) is not None:
                 found = self.quantities.setdefault(name, Errors())
-                found.add(measured.value - truth[name], measured.expanded, rig)
+                found.add(measured.value - truth[name], measured.expanded, rig, measured.u)
         true = {"separation_m": truth.get("separation_raw_m"), "speed_m_s": truth.get("speed_m_s")}
         if "speed_m_s" in result.quantities:
             found_speed = result.quantities["speed_m_s"].value

@@ -68,7 +68,8 @@ class JudgedDrop:
     beyond
         Whether it truly is beyond the protocol's limit of skew, so that it has to be void.
     errors
-        Measured less true by measurand, with the expanded uncertainty; of good drops only.
+        Measured less true by measurand, with the expanded and the standard uncertainty; of good
+        drops only.
     wrong
         Edges given to another rod than they came from.
     """
@@ -79,7 +80,7 @@ class JudgedDrop:
     verdict: str
     reasons: tuple[str, ...]
     beyond: bool
-    errors: Mapping[str, tuple[float, float]]
+    errors: Mapping[str, tuple[float, ...]]
     wrong: int
     truth: Mapping[str, Any]
 
@@ -136,7 +137,7 @@ def judge(case: str, protocol: Protocol, session: Sequence[SimulatedDrop]) -> li
 def _judged(case: str, protocol: Protocol, result: DropResult, fall: SimulatedDrop) -> JudgedDrop:
     truth = fall.truth
     errors = {
-        name: (measured.value - truth[name], measured.expanded)
+        name: (measured.value - truth[name], measured.expanded, measured.u)
         for name, measured in result.quantities.items()
         if result.verdict in GOOD and truth.get(name) is not None
     }
@@ -166,8 +167,8 @@ def summary(drops: Sequence[JudgedDrop]) -> dict[str, Any]:
     void = [one for one in fair if one.verdict not in GOOD]
     errors: dict[str, Errors] = {}
     for one in drops:
-        for name, (error, expanded) in one.errors.items():
-            errors.setdefault(name, Errors()).add(error, expanded)
+        for name, (error, expanded, u) in one.errors.items():
+            errors.setdefault(name, Errors()).add(error, expanded, bound=u)
     reasons = Counter(_NUMBER.sub("…", reason) for one in void for reason in one.reasons)
     return {
         "drops": len(drops),

@@ -74,19 +74,20 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         f"{found['edges_matched']} edges matched, {found['edges_given_to_a_wrong_rod']} to a wrong "
         f"rod, {found['strays_taken_for_a_rod']} strays taken for a rod",
     ]
-    rows = [["error of one run", "rms", "bias", "worst", "mean U95", "bias/U", "in U95"]]
+    rows = [["error of one run", "rms", "bias", "worst", "mean U95", "bias/U", "in U95", "× bound"]]
     for name, errors in found["quantities"].items():
         row = MEASURANDS[name]
         held = f"{errors['coverage']:.1%}"
         if "coverage_se" in errors:
             held += f" ± {errors['coverage_se']:.1%}"
         sizes = _sizes(errors, row, "rms", "bias", "worst", "mean_U95")
-        rows.append([f"{row.label} ({row.fine})", *sizes, f"{errors['bias_over_U']:.2f}", held])
+        bias, bound = f"{errors['bias_over_U']:.2f}", f"{errors['times_bound']:.2f}"
+        rows.append([f"{row.label} ({row.fine})", *sizes, bias, held, bound])
     for baseline, label in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
         for name, errors in found.get(baseline, {}).items():
             row = MEASURANDS[name]
             sizes = _sizes(errors, row, "rms", "bias", "worst")
-            rows.append([f"{label} {row.symbol} ({row.fine})", *sizes, "", "", ""])
+            rows.append([f"{label} {row.symbol} ({row.fine})", *sizes, *[""] * 4])
     lines += text_table(rows, left={0})
     own = found["analysis_ms_per_run"]
     plain = found.get("plain_fit_ms_per_run")

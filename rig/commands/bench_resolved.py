@@ -106,8 +106,8 @@ def _csv(drops: Sequence[JudgedDrop]) -> str:
         {"case": one.case, "incline_deg": one.incline_deg, "run": one.run, "verdict": one.verdict,
          "beyond": int(one.beyond), "wrong": one.wrong}
         | {f"true {name}": one.truth[name] for name in _TOLD}
-        | {f"error {name}": error for name, (error, _) in one.errors.items()}
-        | {f"U95 {name}": expanded for name, (_, expanded) in one.errors.items()}
+        | {f"error {name}": error for name, (error, *_) in one.errors.items()}
+        | {f"U95 {name}": expanded for name, (_, expanded, _) in one.errors.items()}
         for one in drops
     ]  # fmt: skip
     return csv_text(dict.fromkeys(name for row in rows for name in row), rows)
@@ -142,19 +142,20 @@ def _table(records: Sequence[Record], name: Any) -> list[str]:
     shown = [row for row in told() if any(row.name in one["quantities"] for one in records)]
     head = ["", "drops", "void", "wrong"]
     for row in shown:
-        head += [f"{row.label} rms ({row.fine})", "bias", "in U95"]
+        head += [f"{row.label} rms ({row.fine})", "bias", "in U95", "× bound"]
     rows = [head]
     for one in records:
         cells = [name(one), str(one["drops"]), f"{one['void_share']:.0%}", str(one["wrong"])]
         for row in shown:
             errors = one["quantities"].get(row.name)
             cells += (
-                ["–", "–", "–"]
+                ["–"] * 4
                 if errors is None
                 else [
                     f"{errors['rms'] * row.fine_scale:.2f}",
                     f"{errors['bias'] * row.fine_scale:+.2f}",
                     f"{errors['coverage']:.0%}",
+                    f"{errors['times_bound']:.1f}",
                 ]
             )
         rows.append(cells)
