@@ -19,8 +19,8 @@ from mkdocs.config import load_config
 ROOT = Path(__file__).resolve().parents[1]
 NAV: dict[str, tuple[str, ...]] = {
     "Learn": ("docs/tutorial.md", "docs/glossary.md"),
-    "Do": ("docs/shopping.md", "docs/one-object.md", "firmware/README.md", "docs/timers.md",
-           "docs/daemon.md", "docs/python.md", "docs/troubleshooting.md"),
+    "Do": ("docs/shopping.md", "docs/one-object.md", "docs/recipes.md", "firmware/README.md",
+           "docs/timers.md", "docs/daemon.md", "docs/python.md", "docs/troubleshooting.md"),
     "Look up": ("docs/protocol.md", "docs/priors.md", "firmware/PROTOCOL.md", "rig/daemon/API.md",
                 "docs/tui/README.md"),
     "Understand": ("docs/method.md", "docs/benchmarks.md", "docs/resolved-world.md",
