@@ -320,7 +320,11 @@ def test_the_cheapest_keeps_to_the_error():
 
 
 def test_the_command_writes_all_of_it(quick, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(precision, "precision", lambda **_options: quick[0])
+    def swept(**options):
+        options["keep"](quick[0])
+        return quick[0]
+
+    monkeypatch.setattr(precision, "precision", swept)
     assert cli.main(["bench", "precision", "--quick", "-o", str(tmp_path / "new")]) == 0
     printed = capsys.readouterr().out
     assert "cheapest method" in printed
