@@ -58,6 +58,16 @@ def _parser() -> argparse.ArgumentParser:
 
     link = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
 
+    hostile = benches.add_parser("hostile_files", help="altered files through all commands")
+    hostile.add_argument("--sessions", type=_count, default=2000, metavar="N")
+    hostile.add_argument("--protocols", type=_count, default=2000, metavar="N")
+    hostile.add_argument("--tables", type=_count, default=1000, metavar="N", help="of other timers")
+    hostile.add_argument("--seed", type=int, default=0, help="of the first")
+
+    soak = benches.add_parser("soak", help="runs without end, and days on which nothing happens")
+    soak.add_argument("--runs", type=_count, default=10_000, metavar="N")
+    soak.add_argument("--hours", type=float, default=24.0, metavar="H", help="of virtual time")
+
     mutation = benches.add_parser("mutation", help="faults put into the software: who notices?")
     mutation.add_argument("--mutants", type=_count, default=200, metavar="N", help="in all")
     mutation.add_argument("--seed", type=int, default=1, help="which ones")
@@ -74,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     tui.add_argument(
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
-    for one in (clock, faults, link, mutation, stop, tui):
+    for one in (clock, faults, hostile, link, mutation, soak, stop, tui):
         one.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser
 

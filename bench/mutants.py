@@ -31,7 +31,7 @@ VALUES: tuple[Any, ...] = (
 )  # fmt: skip
 """Put into any column; of the last one SQLite says that it is text."""
 _ODD = ["\0", "\x1b", "\u202e", "é", "\ud800", "9" * 400, "-1", "1e999", "nan", "[", "{", ": ", "- ", "\t", "&a *a", "±", "!!python/object:os.system", "'"]  # fmt: skip  # noqa: E501
-_CSV = "run,channel,time_s,state\n1,0,0.1,1\n1,0,0.2,0\n1,1,0.15,1\n1,1,0.25,0\n2,0,0.1,1\n"
+CSV = "run,channel,time_s,state\n1,0,0.1,1\n1,0,0.2,0\n1,1,0.15,1\n1,1,0.25,0\n2,0,0.1,1\n"
 
 
 def make_session(folder: Path, runs: int = 1) -> Path:

@@ -104,27 +104,30 @@ class Reached:
         """List the tests that may notice a fault, the quickest first.
 
         Where none is known to run through the line (it runs when the file is loaded, or in a
-        process that was killed), all that run through the file are, else all of the room.
+        process that was killed), all that run through the file are, else all of the room. Of the
+        core in C no lines are recorded, and its memory outlives a test: all, in their own order.
         """
+        if not path.endswith(".py"):
+            return [*self.seconds]
         by_line = self.lines.get(path, {})
         whole = set().union(*by_line.values())
-        found = set().union(*(by_line.get(at, ()) for at in _statement(path, line)))
+        span = _within_a_function(path, line)
+        found = set().union(*(by_line.get(at, ()) for at in span))
         return sorted(found or whole or self.seconds, key=lambda one: (self.seconds[one], one))
 
 
-def _statement(path: str, line: int) -> range:
-    """Lines of the innermost statement that a line is of."""
-    if not path.endswith(".py"):
-        return range(line, line + 1)
-    spans = [
-        (node.lineno, node.end_lineno or node.lineno)
-        for node in ast.walk(ast.parse((ROOT / path).read_text("utf-8")))
-        if isinstance(node, ast.stmt)
-    ]
-    first, last = min(
-        (span for span in spans if span[0] <= line <= span[1]), key=lambda span: span[1] - span[0]
-    )
-    return range(first, last + 1)
+def _within_a_function(path: str, line: int) -> range:
+    """Lines of the innermost statement of a function that a line is of; none outside of all."""
+    spans, functions = [], []
+    for node in ast.walk(ast.parse((ROOT / path).read_text("utf-8"))):
+        if isinstance(node, ast.stmt):
+            span = range(node.lineno, (node.end_lineno or node.lineno) + 1)
+            spans.append(span)
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                functions.append(span)
+    if not any(line in span for span in functions):
+        return range(0)
+    return min((span for span in spans if line in span), key=len)
 
 
 def main(arguments: Namespace) -> int:
@@ -306,7 +309,7 @@ def _noticed_by(code: int | None, told: str) -> str:
     if code == 0:
         return ""
     failed = [line for line in told.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-    return failed[0].split(" ")[1] if failed else "it cannot be loaded"
+    return failed[0].split(" ")[1] if failed else "it ends the tests"
 
 
 def _write(path: Path, outcomes: list[Outcome]) -> None:

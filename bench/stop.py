@@ -7,13 +7,18 @@ import sqlite3
 import statistics
 import time
 from contextlib import ExitStack, closing, contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Timer
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bench.failing_disk import FailingDisk
 from bench.process_fixture import ProcessFixture
+from rig.commands.output import say
 from rig.daemon import rpc
-from rig.errors import RigError
+from rig.errors import InputError, RigError
 from rig.link.frames import Decoder
 from rig.link.messages import CODES, Abort
 from rig.session.store import Session
@@ -28,11 +33,16 @@ if TYPE_CHECKING:
 _FLOOD = 60  # requests that wait in the daemon, of each of the clients that flood it
 _FLOODERS = 8
 LIMIT_S = 0.05
+_FROZEN_S = 3.0
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Measure and print; 1 when any took longer than it may."""
     found = {name: measured(held, arguments.stops) for name, held in CONDITIONS.items()}
+    try:
+        found["disk frozen"] = _measured_frozen(arguments.stops)
+    except InputError as error:
+        say(f"left out: a frozen disk ({error.message})")
     if arguments.json:
         print(json.dumps(found))
     else:
@@ -44,10 +54,24 @@ def main(arguments: argparse.Namespace) -> int:
     return int(any(max(times) > LIMIT_S for times in found.values()))
 
 
-def measured(held: Callable[[ProcessFixture], Iterator[None]], stops: int) -> list[float]:
-    """Stop an armed rig so often, and find in its log of bytes when ABORT left, s."""
+def measured(
+    held: Callable[[ProcessFixture], Iterator[None]], stops: int, folder: Path | None = None
+) -> list[float]:
+    """Stop an armed rig so often, and find in its log of bytes when ABORT left, s.
+
+    Parameters
+    ----------
+    held
+        What holds the daemon up meanwhile.
+    stops
+        How often.
+    folder
+        For the session; by default on a disk that can be filled.
+    """
     asked = []
-    with ProcessFixture(runs=1, small_disk=True) as processes:
+    with ProcessFixture(runs=1, small_disk=folder is None) as processes:
+        if folder is not None:
+            processes.session = folder / "session"
         processes.start_daemon()
         with closing(processes.client("in control")) as one, closing(processes.client()) as two:
             one.take_control()
@@ -114,6 +138,23 @@ def _stalled(processes: ProcessFixture) -> Iterator[None]:
             while not client.call("renew")["disk_s"]:
                 pass
             yield
+
+
+def _measured_frozen(stops: int) -> list[float]:
+    with TemporaryDirectory(prefix="rig-") as place, FailingDisk(Path(place)) as disk:
+
+        def frozen(processes: ProcessFixture) -> Iterator[None]:
+            """Have no write come back for a time; the daemon is at one soon."""
+            with closing(processes.client("looking on")) as client:
+                disk.freeze()
+                thaw = Timer(_FROZEN_S, disk.thaw)
+                thaw.start()
+                while not client.call("renew")["disk_s"]:
+                    pass
+            yield
+            thaw.join()
+
+        return measured(frozen, stops, disk.folder)
 
 
 def _full(processes: ProcessFixture) -> Iterator[None]:

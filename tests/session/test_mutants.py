@@ -8,7 +8,7 @@ from contextlib import closing
 import pytest
 
 from bench.mutants import (
-    _CSV,
+    CSV,
     FENCE,
     Mutants,
     altered_text,
@@ -75,7 +75,7 @@ def test_two_thousand_protocols_are_read_or_refused(tmp_path):
 @pytest.mark.parametrize("kind", ["edges", "timer"])
 def test_a_thousand_csv_files_are_read_or_refused(kind, tmp_path):
     def each(seed):
-        read_text_as(kind, altered_text(_CSV, seed), tmp_path / "mutant.csv")
+        read_text_as(kind, altered_text(CSV, seed), tmp_path / "mutant.csv")
 
     assert failures(each, range(500)) == []
 

@@ -10,6 +10,7 @@ import shutil
 
 import pytest
 
+from bench.failing_disk import FailingDisk
 from bench.mutants import make_session
 from bench.process_fixture import FENCE
 from rig.errors import DeviceError, InputError, SessionError
@@ -111,6 +112,30 @@ def test_two_names_of_one_file_are_not_both_written(tmp_path):
             Session.open(name)
     with Session.open(session, readonly=True) as found:
         found.check()
+
+
+def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(tmp_path):
+    try:
+        disk = FailingDisk(tmp_path)
+    except InputError as error:
+        pytest.skip(error.message)
+    with disk:
+        protocol, session = disk.folder / "fence.yaml", disk.folder / "session"
+        protocol.write_text(FENCE.replace("RUNS", "3"), "utf-8")
+        made = Controller("sim://")
+        made.open_session(str(protocol), str(session), 3)
+        made.fire(made.arm(1, 1))
+        made.collect(1, 1)
+        made.fire(made.arm(2, 1))
+        disk.fail()
+        with pytest.raises(SessionError, match="the disk failed under"):
+            made.collect(2, 1)
+        with pytest.raises(DeviceError, match="the device still holds the drop of run 2"):
+            made.arm(3, 1)
+        with pytest.raises(SessionError, match="the disk failed under"):
+            made.close()
+        with Session.open(session, readonly=True) as found:
+            assert [one.run for one in found.drops()] == [1]
 
 
 def test_a_disk_that_knows_no_locks_is_said_to(tmp_path, monkeypatch):

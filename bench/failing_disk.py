@@ -1,0 +1,76 @@
+"""A disk that can be frozen and can fail: a small ext4 in a file, where it may be mounted."""
+
+from __future__ import annotations
+
+import subprocess
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from rig.errors import InputError
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+_BYTES = 16 << 20
+
+
+class FailingDisk:
+    """Room for a session; a context at whose end it is gone.
+
+    Parameters
+    ----------
+    place
+        Where the file with the disk and its folder are made.
+
+    Attributes
+    ----------
+    folder
+        On the disk.
+
+    Raises
+    ------
+    InputError
+        It cannot be mounted here: that takes root and a kernel that knows loop devices.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self.folder = place / "mounted"
+        self.folder.mkdir()
+        image = place / "ext4"
+        with image.open("wb") as file:
+            file.truncate(_BYTES)
+        try:
+            _call("mkfs.ext4", "-q", image)
+            _call("mount", "-o", "loop,errors=remount-ro", image, self.folder)
+        except (OSError, subprocess.CalledProcessError) as error:
+            raise InputError(f"no disk can be mounted here: {error}", "as root it can") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: object, _trace: TracebackType | None
+    ) -> None:
+        self.thaw()
+        _call("umount", "--lazy", self.folder)
+
+    def freeze(self) -> None:
+        """Let no write come back until `thaw`."""
+        _call("fsfreeze", "--freeze", self.folder)
+
+    def thaw(self) -> None:
+        """Let writes go on; nothing where it is not frozen."""
+        with suppress(subprocess.CalledProcessError):
+            _call("fsfreeze", "--unfreeze", self.folder)
+
+    def fail(self) -> None:
+        """Have the kernel find an error on it: it can only be read from then on."""
+        source = _call("findmnt", "-no", "SOURCE", self.folder)
+        Path("/sys/fs/ext4", Path(source).name, "trigger_fs_error").write_text("1", "ascii")
+
+
+def _call(*command: object) -> str:
+    return subprocess.run(  # noqa: S603 - fixed words and our own paths
+        [*map(str, command)], capture_output=True, check=True, text=True
+    ).stdout.strip()
