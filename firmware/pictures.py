@@ -1,6 +1,7 @@
 """Draws how each board is wired: `python firmware/pictures.py` writes an SVG beside each `board.h`.
 
-Pins come from `board.h`; what is around them is one design for both boards.
+Pins come from `board.h`; what is around them is one design for all boards, but that a Pico's pins
+stand 3.3 V: the comparators' open outputs are pulled up to that, and MOSFETs open with it.
 """
 
 from __future__ import annotations
@@ -21,12 +22,11 @@ from firmware.pins import Pins, read_pins
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-BOARDS = ("atmega2560", "atmega328p")
+BOARDS = ("rp2040", "atmega2560", "atmega328p")
 _INK, _QUIET, _PIN, _LIGHT = "#1b1f24", "#5b6670", "#0b5cad", "#c0392b"
 _PAPER, _BOARD = "#ffffff", "#f2f6fa"
 _FONT = "DejaVu Sans, Verdana, Arial, sans-serif"
 _TEXT, _SMALL = 11, 9.5
-_LED_ON_BOARD = "D13"
 
 
 def draw(pins: Pins, path: Path) -> None:
@@ -54,7 +54,7 @@ def draw(pins: Pins, path: Path) -> None:
         _sync(pins, 14.6, -5.5)
         if "SENSE" in pins.others:
             _sense(pins, 21.4, -5.5)
-        if pins.others["LED"][0] != _LED_ON_BOARD:
+        if not pins.led_on_board:
             _status(pins, 0, -0.2)
     path.write_bytes(page.get_imagedata("svg"))
 
@@ -118,9 +118,11 @@ def _board(pins: Pins, x: float, y: float) -> None:
         "STOP": "emergency stop",
         "SENSE": "release sense",
         "REFERENCE": "1 Hz reference",
-        "LED": "status LED" if pins.others["LED"][0] != _LED_ON_BOARD else "status LED (on board)",
+        "LED": "status LED (on board)" if pins.led_on_board else "status LED",
     }
     rows += [(pins.others[key][0], word) for key, word in words.items() if key in pins.others]
+    if pins.volts != "+5 V":
+        rows += [("3V3", "out: inverters, pull-ups")]
     rows += [("GND", "all grounds")]
     step = 0.5
     box = elm.Rect(corner1=(0, 0.45), corner2=(5.6, 0.05 - step * len(rows)))
@@ -168,7 +170,7 @@ def _gate(pins: Pins, x: float, y: float) -> None:
     out_x, out_y = chip.out.x + 0.5, chip.out.y
     _wire((chip.out.x, out_y), (out_x + 0.9, out_y))
     elm.Dot().at((out_x, out_y))
-    _supply(out_x, y + 3.6)
+    _supply(out_x, y + 3.6, pins.volts)
     _down(elm.Resistor(), out_x, y + 3.6, y + 2.0, "2.2 kΩ")
     _wire((out_x, y + 2.0), (out_x, out_y))
     back_y = ref_y - 1.1
@@ -180,7 +182,8 @@ def _gate(pins: Pins, x: float, y: float) -> None:
     elm.Dot().at((chip.in2.x - 0.4, ref_y))
 
     inverter = logic.SchmittNot().at((out_x + 0.9, out_y)).anchor("in1").right()
-    _text(inverter.center.x, out_y + 0.8, "⅙ 74HC14", align="center")
+    at_3v3 = "" if pins.volts == "+5 V" else ",\nat 3.3 V"
+    _text(inverter.center.x, out_y + (1.0 if at_3v3 else 0.8), f"⅙ 74HC14{at_3v3}", align="center")
     end = inverter.out.x + 0.3
     _wire((inverter.out.x, out_y), (end, out_y))
     elm.Resistor().at((end, out_y)).to((end + 1.7, out_y)).label("1 kΩ", fontsize=_SMALL)
@@ -188,7 +191,7 @@ def _gate(pins: Pins, x: float, y: float) -> None:
     _note(
         x + 10.6,
         y - 1.35,
-        "100 nF at each chip, between +5 V and ground.",
+        "100 nF at each chip, between its supply and ground.",
         f"The next gates go to {_listed(pins.gates[1:])}.",
         "A pin without a gate needs nothing.",
     )
@@ -213,9 +216,20 @@ def _switch(x: float, y: float, name: str, other: str) -> tuple[float, float, fl
     return fet.drain.x, fet.drain.y, fet.source.y
 
 
+def _first_fet(pins: Pins, at_5_volts: str) -> str:
+    """Name the MOSFET at a pin: those that are sure to open with 3.3 V are others."""
+    return (
+        at_5_volts
+        if pins.volts == "+5 V"
+        else {"IRLZ44N": "AO3400A", "2N7000": "BSS138"}[at_5_volts]
+    )
+
+
 def _release(pins: Pins, x: float, y: float) -> None:
     _title(x, y + 4.9, "Release, magnet that lets go with current")
-    drain_x, drain_y, _ = _switch(x, y + 0.6, pins.others["RELEASE_0"][0], "IRLZ44N")
+    drain_x, drain_y, _ = _switch(
+        x, y + 0.6, pins.others["RELEASE_0"][0], _first_fet(pins, "IRLZ44N")
+    )
     top = y + 3.6
     _supply(drain_x, top, "+12 V")
     _down(elm.Inductor2(loops=3), drain_x, top - 0.2, top - 1.7, "magnet", "top")
@@ -232,7 +246,9 @@ def _release(pins: Pins, x: float, y: float) -> None:
 
 def _holding_release(pins: Pins, x: float, y: float) -> None:
     _title(x, y + 4.9, "Release, magnet that holds with current")
-    first_x, first_y, _ = _switch(x, y + 0.6, pins.others["RELEASE_0"][0], "2N7000")
+    first_x, first_y, _ = _switch(
+        x, y + 0.6, pins.others["RELEASE_0"][0], _first_fet(pins, "2N7000")
+    )
     top = y + 3.6
     joint = y + 1.6
     _supply(first_x, top, "+12 V")
@@ -273,21 +289,21 @@ def _input(x: float, y: float, name: str, ohms: str) -> tuple[float, float]:
 
 
 def _contact(
-    x: float, y: float, name: str, contact: Callable[[], elm.Element2Term], text: str
+    pins: Pins, x: float, y: float, key: str, contact: Callable[[], elm.Element2Term], text: str
 ) -> None:
     """Draw a contact to ground, with its pull-up, at a pin. `contact` makes the symbol."""
-    _supply(x + 1.8, y + 2.4)
+    _supply(x + 1.8, y + 2.4, pins.volts)
     _down(elm.Resistor(), x + 1.8, y + 2.4, y + 0.8, "4.7 kΩ")
     _wire((x + 0.3, y + 0.8), (x + 2.6, y + 0.8))
     elm.Dot().at((x + 1.8, y + 0.8))
     _down(contact(), x + 0.3, y + 0.8, y - 0.9, text, "bottom")
     _ground(x + 0.3, y - 0.9)
-    _input(x + 2.6, y + 0.8, name, "1 kΩ")
+    _input(x + 2.6, y + 0.8, pins.others[key][0], "1 kΩ")
 
 
 def _stop(pins: Pins, x: float, y: float) -> None:
     _title(x - 0.6, y + 3.7, "Emergency stop")
-    _contact(x, y, pins.others["STOP"][0], lambda: elm.Button(nc=True), "opens when\nstruck")
+    _contact(pins, x, y, "STOP", lambda: elm.Button(nc=True), "opens when\nstruck")
     elm.Dot().at((x + 2.6, y + 0.8))
     _down(elm.Capacitor(), x + 2.6, y + 0.8, y - 0.9, "47 nF")
     _ground(x + 2.6, y - 0.9)
@@ -296,7 +312,7 @@ def _stop(pins: Pins, x: float, y: float) -> None:
 
 def _reference(pins: Pins, x: float, y: float) -> None:
     _title(x, y + 3.7, "1 Hz reference")
-    elm.Rect(corner1=(0, 0), corner2=(2.2, 1.8)).at((x, y - 0.1)).color(_QUIET)
+    elm.Rect(corner1=(0, 0), corner2=(2.2, 1.8)).right().at((x, y - 0.1)).color(_QUIET)
     _text(x + 1.1, y + 1.05, "GPS", _TEXT, align="center")
     _text(x + 1.1, y + 0.55, "receiver", _TEXT, align="center")
     _text(x + 2.6, y + 1.1, "PPS", align="center")
@@ -304,7 +320,8 @@ def _reference(pins: Pins, x: float, y: float) -> None:
     _input(x + 3.0, y + 0.8, pins.others["REFERENCE"][0], "1 kΩ")
     _wire((x + 1.1, y - 0.1), (x + 1.1, y - 0.9))
     _ground(x + 1.1, y - 0.9)
-    _note(x, y - 2.0, "Its rising edge counts; 5 V or 3.3 V.")
+    which = "5 V or 3.3 V" if pins.volts == "+5 V" else "3.3 V, never 5 V"
+    _note(x, y - 2.0, f"Its rising edge counts; {which}.")
 
 
 def _sync(pins: Pins, x: float, y: float) -> None:
@@ -323,7 +340,7 @@ def _sync(pins: Pins, x: float, y: float) -> None:
 
 def _sense(pins: Pins, x: float, y: float) -> None:
     _title(x, y + 3.7, "Release sense")
-    _contact(x + 0.6, y, pins.others["SENSE"][0], elm.Switch, "the chain's\nhook closes it")
+    _contact(pins, x + 0.6, y, "SENSE", elm.Switch, "the chain's\nhook closes it")
     _note(x, y - 2.0, "The first change after FIRE is stamped.")
 
 
@@ -336,7 +353,7 @@ def _status(pins: Pins, x: float, y: float) -> None:
 
 
 def main() -> None:
-    """Draw both boards."""
+    """Draw all boards."""
     folder = Path(__file__).parent
     for board in BOARDS:
         draw(read_pins(board), folder / board / "wiring.svg")

@@ -8,8 +8,13 @@ from pathlib import Path
 
 _FIRMWARE = Path(__file__).parent
 _PIN = re.compile(r"^#define (\w+) _BV\((P[A-L][0-7])\)\s*/\* (\w+)", re.MULTILINE)
-_CHANNELS = re.compile(r'board_channels\[\] PROGMEM =\s*"([^"]+)"')
-_TYPE = re.compile(r'board_type\[\] PROGMEM = "([^"]+)"')
+_CHANNELS = re.compile(r'board_channels\[\](?: PROGMEM)? =\s*"([^"]+)"')
+_TYPE = re.compile(r'board_type\[\](?: PROGMEM)? = "([^"]+)"')
+# The Pico's pins have numbers, and the names printed beside them are made of these.
+_EDGE = [*range(2), -1, *range(2, 6), -1, *range(6, 10), -1, *range(10, 14), -1, 14, 15]
+_EDGE += [16, 17, -1, *range(18, 22), -1, 22]
+"""GPIO at each pin of the Pico's edge, from pin 1 on; -1 for ground."""
+_NUMBER = re.compile(r"^#define (RELEASE_[01]|SYNC|STOP|SENSE|REFERENCE|LED) (\d+)", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +26,20 @@ class Pins:
     board
         What the board is called.
     gates
-        Arduino pin of each gate, from channel 0 on.
+        Pin of each gate as it is printed on the board, from channel 0 on.
     others
-        Arduino pin and port of everything else, by its name in `board.h`.
+        Pin and port of everything else, by its name in `board.h`.
+    volts
+        What the pins' high level is, and the most they stand.
+    led_on_board
+        Whether the status LED is on the board already.
     """
 
     board: str
     gates: tuple[str, ...]
     others: dict[str, tuple[str, str]]
+    volts: str
+    led_on_board: bool
 
 
 def read_pins(folder: str) -> Pins:
@@ -49,4 +60,15 @@ def read_pins(folder: str) -> Pins:
     if channels is None or name is None:
         raise ValueError(f"{folder}/board.h names no channels or no board")
     others = {found: (pin, port) for found, port, pin in _PIN.findall(text)}
-    return Pins(name[1], tuple(channels[1].split()), others)
+    numbers = {
+        found: (f"GP{pin}", f"pin {_EDGE.index(int(pin)) + 1}" if int(pin) in _EDGE else "on board")
+        for found, pin in _NUMBER.findall(text)
+    }
+    led, _ = (others | numbers)["LED"]
+    return Pins(
+        name[1],
+        tuple(channels[1].split()),
+        others | numbers,
+        "+3.3 V" if numbers else "+5 V",
+        led in {"D13", "GP25"},
+    )

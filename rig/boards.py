@@ -40,11 +40,16 @@ class Capabilities:
     events: int
     streams: bool
 
+    @property
+    def one(self) -> str:
+        """Its name with an article."""
+        return f"{'an' if self.name[0] in 'AEIOU' else 'a'} {self.name}"
+
 
 MEGA = Capabilities("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
 UNO = Capabilities("Arduino Uno", 12, 2, 0.5, 191, streams=True)
 PICO = Capabilities("Raspberry Pi Pico", 16, 2, 0.5, 16384, streams=False)
-BOARDS = {"mega": MEGA, "uno": UNO}
+BOARDS = {"pico": PICO, "mega": MEGA, "uno": UNO}
 """By the word for them at the command line."""
-FLASHED = {**BOARDS, "nano-old": UNO, "pico": PICO}
+FLASHED = {**BOARDS, "nano-old": UNO}
 """By the word for them where they are flashed: to all else an old Nano is an Uno."""

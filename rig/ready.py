@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.errors import InputError
 
-WIRED = {"mega": "atmega2560", "uno": "atmega328p"}
+WIRED = {"pico": "rp2040", "mega": "atmega2560", "uno": "atmega328p"}
 """Boards of whose circuits there is a picture, and its folder in `firmware`."""
 
 

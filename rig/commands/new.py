@@ -69,7 +69,7 @@ def _answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     scene = _asked(
         arguments, _Question("scene", "What falls?", "object", tuple(SCENES)), explained=SCENES
     )
-    board = _asked(arguments, _Question("board", "Which timer?", "uno", (*BOARDS, _OTHER)))
+    board = _asked(arguments, _Question("board", "Which timer?", "pico", (*BOARDS, _OTHER)))
     struck, body = scene in STRUCK, scene in {"object", "track"}
     few = {"two-chains": "4", "picket-fence": "2"}.get(scene, "4")
     gates = _asked(arguments, _Question("gates", "How many gates?", few))

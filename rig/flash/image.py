@@ -64,14 +64,14 @@ def read_image(path: Path, target: Target) -> Image:
         raise InputError(f"{path}: {error.strerror or error}") from None
     flash = read_blocks(data, path) if target is DRIVE else _records(data, path)
     versions = set(_VERSION.findall(flash))
-    names = {one.board.name for one in (*TARGETS.values(), DRIVE)}
-    boards = [name for name in names if name.encode() + b"\0" in flash]
+    known = {one.board for one in (*TARGETS.values(), DRIVE)}
+    boards = [board for board in known if board.name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
         raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
-    if boards != [target.board.name]:
-        raise InputError(f"{path} is for an {boards[0]}, not for an {target.board.name}")
+    if boards != [target.board]:
+        raise InputError(f"{path} is for {boards[0].one}, not for {target.board.one}")
     if len(flash) > target.flash_limit:
-        raise InputError(f"{path} would overwrite the boot loader of an {target.board.name}")
+        raise InputError(f"{path} would overwrite the boot loader of {target.board.one}")
     return Image(path, versions.pop().decode(), len(flash))
 
 

@@ -132,7 +132,7 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
             ) from error
     if (identity.board, identity.firmware) != (target.board.name, firmware):
         raise DeviceError(
-            f"{port} was flashed with {firmware} for an {target.board.name}, but answers as "
+            f"{port} was flashed with {firmware} for {target.board.one}, but answers as "
             f"{identity.board}, {identity.firmware}",
             "is this the port of the board that was flashed? rig ports",
         )

@@ -264,8 +264,8 @@ def _memory(edges: int) -> str:
     """Say whether so many edges fit those boards that keep them all."""
     kept = [board for board in BOARDS.values() if not board.streams]
     return "; ".join(
-        f"{'fits' if edges <= board.events else 'too many for'} the {board.events} that an "
-        f"{board.name} keeps"
+        f"{'fits' if edges <= board.events else 'too many for'} the {board.events} that "
+        f"{board.one} keeps"
         for board in kept
     )
 

@@ -103,8 +103,8 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
         key = ""
         for step in path:
             key += f"[{step}]" if isinstance(step, int) else f".{step}" if key else step
-        others = [other.name for other in BOARDS.values() if getattr(other, kind) >= least]
-        other = f", or take an {' or '.join(others)}" if others else ""
+        others = [other.one for other in BOARDS.values() if getattr(other, kind) >= least]
+        other = f", or take {' or '.join(others)}" if others else ""
         message = f"found {what}; the board ({board.name}) has {has}: change it{other}"
         found.append(Problem(protocol.source, place.line, place.column, key, message))
 

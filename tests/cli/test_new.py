@@ -83,7 +83,10 @@ def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
     ("options", "said"),
     [
         (["--scene", "two-chains", "--gates", "1"], "two chains need two gates"),
-        (["--scene", "one-chain", "--gates", "14"], "found 12; the board (Arduino Uno) has gates"),
+        (
+            ["--scene", "one-chain", "--gates", "14", "--board", "uno"],
+            "found 12; the board (Arduino Uno) has gates",
+        ),
         (["--gates", "many"], "--gates: found many; a whole number"),
         (["--diameter", "20"], "diameter"),
         (["--drop", "900 mm}"], "drop"),

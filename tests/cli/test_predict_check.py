@@ -162,7 +162,7 @@ def test_check_for_one_board_is_its_refusal(call):
     code, out, err = call("check", graded, "--board", "uno")
     assert (code, out) == (2, "")
     said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change it"
-    assert f"{said}, or take an Arduino Mega 2560" in err
+    assert f"{said}, or take a Raspberry Pi Pico or an Arduino Mega 2560" in err
 
 
 def test_the_readme_says_which_boards_can_do_a_ready_protocol(call):

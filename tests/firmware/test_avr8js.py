@@ -25,7 +25,7 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.link import messages as wire
 from rig_emulator import stand as stands
 from rig_emulator import trials
-from rig_emulator.stand import SYNC_LEAD, Flip, Recording, Stand
+from rig_emulator.stand import Flip, Recording, Stand
 from rig_emulator.wiring import BOARDS
 from tests.firmware.avr8js.avr import Avr8js, install
 from tests.firmware.toolchain import FIRMWARE, make, need
@@ -158,6 +158,6 @@ def test_the_same_outputs(first, second):
         what = [(pin, high) for pin, high, _ in made]
         assert what == [(sync, True), (release, True), (release, False), (sync, False)]
         times = [cycle for _, _, cycle in made]
-        assert times[1] == SYNC_LEAD
+        assert times[1] == UNO.sync_lead
         assert times[2] - times[1] == 16_000  # the compare unit's work
         assert 0 <= times[3] - 80_000 < TURNS

@@ -9,11 +9,13 @@ from rig.errors import InputError
 from rig.link.client import Device
 from rig.link.messages import Phase
 from rig.link.port import open_port
+from rig_emulator import boards_bench
 from rig_emulator.controller import EmulatorError
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
 from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, programs, symbol
+from tests.firmware.toolchain import FIRMWARE
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import arm
@@ -122,3 +124,9 @@ class TestPico(DeviceConformance):
         first, second, *_ = drop.edges
         assert (first[1:], second[1:]) == ((0, True), (0, False))
         assert second.tick - first.tick == 4
+
+
+@pytest.mark.slow
+def test_the_table_of_figures_is_up_to_date():
+    written = (FIRMWARE.parent / "docs" / "results" / "boards.md").read_text()
+    assert boards_bench.table() == written, "./run bench boards -o docs/results"

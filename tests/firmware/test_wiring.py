@@ -8,7 +8,7 @@ import pytest
 
 from firmware.pictures import BOARDS, draw
 from firmware.pins import read_pins
-from rig.flash.boards import TARGETS
+from rig.flash.boards import DRIVE, TARGETS
 from tests.firmware.toolchain import FIRMWARE
 
 README = (FIRMWARE / "README.md").read_text(encoding="utf-8")
@@ -23,6 +23,12 @@ WORDS = {
 }
 # From the pin-out of each board, as its maker prints it: port by Arduino pin.
 MAPS = {
+    "rp2040": {
+        **{f"GP{n}": f"pin {at}" for n, at in enumerate((1, 2, 4, 5, 6, 7, 9, 10, 11, 12))},
+        **{f"GP{10 + n}": f"pin {at}" for n, at in enumerate((14, 15, 16, 17, 19, 20, 21, 22))},
+        **{f"GP{18 + n}": f"pin {at}" for n, at in enumerate((24, 25, 26, 27))},
+        "GP25": "on board",
+    },
     "atmega2560": {
         **{f"D{53 - n}": f"PB{n}" for n in range(4)},
         **{f"D{10 + n}": f"PB{4 + n}" for n in range(4)},
@@ -75,7 +81,7 @@ def test_the_gates_are_as_many_as_the_firmware_says(board):
     text = (FIRMWARE / board / "board.h").read_text()
     said = int(re.search(r"#define BOARD_GATES (\d+)", text)[1])
     assert len(read_pins(board).gates) == said
-    assert read_pins(board).board in {target.board.name for target in TARGETS.values()}
+    assert read_pins(board).board in {target.board.name for target in (*TARGETS.values(), DRIVE)}
 
 
 @EACH
@@ -88,7 +94,7 @@ def test_the_picture_is_up_to_date(board, tmp_path):
 @EACH
 def test_the_picture_names_every_pin(board):
     text = (FIRMWARE / board / "wiring.svg").read_text(encoding="utf-8")
-    named = set(re.findall(r">\s*([AD]\d+)\s*<", text))
+    named = set(re.findall(r">\s*((?:[AD]|GP)\d+)\s*<", text))
     pins = read_pins(board)
     assert named == {*pins.gates, *(pin for pin, _ in pins.others.values())}
 

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
 from rig_emulator.avr import Avr
 from rig_emulator.name import NAME_AT, name_record
+from rig_emulator.pico_chip import PicoChip
+from rig_emulator.wiring import PICO
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -22,8 +24,6 @@ if TYPE_CHECKING:
 _BOOT_CYCLES = 500_000
 _ANSWER_CYCLES = 800_000
 _TRIES = 5
-SYNC_LEAD = 2
-"""Cycles by which the sync output rises before the releases."""
 _LABEL = wire.pack_label(1, 1)
 
 
@@ -68,12 +68,15 @@ class Recording:
         The firmware's rule for late stamps.
     outputs
         What the output pins did; cycles count from FIRE too.
+    tick_cycles
+        Cycles in a tick.
     """
 
     events: list[wire.Event]
     certificate: wire.DropCertificate
     late_ticks: int
     outputs: list[Change]
+    tick_cycles: int = 1
 
     def stamps(self, flips: Iterable[Flip]) -> list[Stamp]:
         """Set events beside what happened.
@@ -107,7 +110,7 @@ class Recording:
                     if not queue or queue[0].blocked != bool(state >> gate & 1):
                         raise DeviceError(f"an edge of gate {gate} that nothing made")
                     flip = queue.pop(0)
-                    stamps.append(Stamp(flip, tick - flip.cycle, doubtful))
+                    stamps.append(Stamp(flip, tick * self.tick_cycles - flip.cycle, doubtful))
             before, last = state, tick
         lost = sum(len(queue) for queue in waiting.values())
         if lost:
@@ -137,6 +140,9 @@ class Stand:
         The controller.
     identity
         What it said it is.
+    fire_sent, fired, certified
+        Cycles at which the latest FIRE began to be sent, it acted, and its drop's certificate was
+        there.
     """
 
     def __init__(
@@ -148,34 +154,50 @@ class Stand:
         waits: int = 0,
     ) -> None:
         self.wiring = wiring
-        self.avr = Avr(program, wiring.mcu, baudrate=baudrate)
+        self.avr = self._controller(program, baudrate, named)
         self._decoder = Decoder()
         self._seq = 0
         self._ahead = 0  # of the board's ticks before its cycles
+        self.fire_sent = self.fired = self.certified = self._latest = 0
         for pin in (*wiring.gates, wiring.stop):
             self.avr.edge(0, pin, False)
-        self.avr.eeprom_write(NAME_AT, name_record(named) if named else bytes(16))
-        self.hear(_BOOT_CYCLES + waits)
+        self.hear(self._scaled(_BOOT_CYCLES) + waits)
         identity = self.ask(wire.Identify())
         if not isinstance(identity, wire.Identity):
             raise DeviceError(f"the board answers IDENTIFY with {identity}")
         self.identity = identity
+
+    def _controller(self, program: Path, baudrate: int, named: bytes) -> Any:
+        """Give it a controller with its program, its name and its line; tests know which one."""
+        if self.wiring is PICO:
+            chip = PicoChip(program, named)
+            chip.open()
+            return chip
+        avr = Avr(program, self.wiring.mcu, baudrate=baudrate)
+        avr.eeprom_write(NAME_AT, name_record(named) if named else bytes(16))
+        return avr
+
+    def _scaled(self, avr_cycles: int) -> int:
+        return avr_cycles * self.wiring.clock_hz // 16_000_000
 
     def hear(self, cycles: int) -> list[wire.Message]:
         """Let it work and take what it says."""
         end = self.avr.cycle + cycles
         while self.avr.run(end):
             pass
-        data = bytes(sent.value for sent in self.avr.take_sent())
+        sent = self.avr.take_sent()
+        if sent:
+            self._latest = sent[-1].cycle
+        data = bytes(one.value for one in sent)
         return [wire.unpack(frame.type, frame.payload) for frame in self._decoder.feed(data)]
 
     def ask(self, request: wire.HostMessage, cycles: int = _ANSWER_CYCLES) -> wire.Message:
-        """Send a request, again if need be, and take the first answer."""
+        """Send a request, again if need be, and take the first answer; wait as at 16 MHz."""
         self._seq = self._seq % 255 + 1
         code, payload = wire.pack(request)
         for _ in range(_TRIES):
             self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
-            if heard := self.hear(cycles):
+            if heard := self.hear(self._scaled(cycles)):
                 return heard[0]
         raise DeviceError(f"the board does not answer {request}")
 
@@ -213,10 +235,10 @@ class Stand:
         for flip in flips if isinstance(flips, list) else flips(fire):
             self.avr.edge(fire + flip.cycle, self.wiring.gates[flip.gate], flip.blocked)
         self.avr.receive(noise)
-        heard = self.hear(record_ms * 16_000)
+        heard = self.hear(self._scaled(record_ms * 16_000))
         while not isinstance(heard[-1], wire.DropCertificate):
-            heard += self.hear(160_000)
-        certificate = heard[-1]
+            heard += self.hear(self._scaled(160_000))
+        certificate, self.certified = heard[-1], self._latest
         self._ahead = certificate.fire_tick - fire
         raw = [event for m in heard if isinstance(m, wire.EventsFrame) for event in m.events]
         events = [
@@ -227,7 +249,9 @@ class Stand:
             self.avr.edge(0, pin, False)
         self.ask(wire.Acknowledge(_LABEL, certificate.crc32), 100_000)
         outputs = [c._replace(cycle=c.cycle - fire) for c in changes + self.avr.take_changes()]
-        return Recording(events, certificate, self.identity.late_ticks, outputs)
+        return Recording(
+            events, certificate, self.identity.late_ticks, outputs, self.wiring.tick_cycles
+        )
 
     def arm_and_fire(self, record_ms: int, pulse_us: int) -> tuple[int, list[Change]]:
         """Begin a drop of all gates and all releases.
@@ -248,8 +272,10 @@ class Stand:
         self._seq = self._seq % 255 + 1
         code, payload = wire.pack(wire.Fire(armed.token))
         changes: list[Change] = []
+        self.fire_sent = self.avr.cycle
         while not (begun := [c.cycle for c in changes if c.pin == self.wiring.sync]):
             self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
-            self.avr.run(self.avr.cycle + 100_000)
+            self.avr.run(self.avr.cycle + self._scaled(100_000))
             changes += self.avr.take_changes()
-        return begun[0] + SYNC_LEAD, changes
+        self.fired = begun[0] + self.wiring.sync_lead
+        return self.fired, changes

@@ -30,6 +30,10 @@ class Wiring:
         Input that tells that the chain has left, if there is one.
     clock_hz
         Of the controller.
+    tick_cycles
+        Its cycles in a tick of its stamps.
+    sync_lead
+        Cycles by which the sync output rises before the releases.
     """
 
     mcu: str
@@ -41,6 +45,8 @@ class Wiring:
     reference: str
     sense: str | None
     clock_hz: int = 16_000_000
+    tick_cycles: int = 1
+    sync_lead: int = 2
 
 
 def _pins(port: str, first: int, last: int) -> tuple[str, ...]:
@@ -81,6 +87,8 @@ PICO = Wiring(
     reference="GP21",
     sense="GP20",
     clock_hz=120_000_000,
+    tick_cycles=6,
+    sync_lead=0,
 )
 
 
