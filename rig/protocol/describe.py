@@ -81,9 +81,7 @@ def _scene(protocol: Protocol) -> list[str]:
     pull = "gravity" if protocol.track is None else "acceleration without friction"
     lines.append(f"{pull}: {format_quantity(protocol.gravity, 'm/s^2')}")
     if surface is not None or protocol.gates is not None:
-        datum = "contact point" if surface is not None else "datum of the gates"
-        datum = "board" if protocol.contact.from_board else datum
-        lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {datum}")
+        lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {protocol.zero}")
     if protocol.initial_speed != AT_REST:
         lines.append(f"initial speed: {format_quantity(protocol.initial_speed, 'm/s')} downward")
     if protocol.drag is not None:

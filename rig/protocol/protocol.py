@@ -302,6 +302,13 @@ class Protocol:
         return all(rods.chain.rods == 1 for rods in self.chains.values())
 
     @property
+    def zero(self) -> str:
+        """What drop and gates' heights are counted from, in words."""
+        if self.surface is None:
+            return "datum of the gates"
+        return "board" if self.contact.from_board and self.stated is None else "contact point"
+
+    @property
     def two_chains(self) -> bool:
         """Whether a free chain falls beside the impact chain."""
         return self.surface is not None and len(self.chains) > 1

@@ -58,7 +58,7 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> str:
         near = max(_NEAR_M, 1.5 * low)
         _side_view(close, protocol, gates, near)
         _name_inclines(close, protocol, 0.45 * near)
-        close.set_title("close to the contact point" if inclines else "lowest gates", loc="left")
+        close.set_title(f"close to the {protocol.zero}" if inclines else "lowest gates", loc="left")
         for panel in (below, empty):
             panel.axis("off")
         words = below.text(0, 1, text, va="top", family="DejaVu Sans Mono", fontsize=7.0, color=INK)
@@ -67,7 +67,7 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> str:
 
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
-    """How far the board's face is under the contact point, where a resting rod's middle is, m."""
+    """How far the board's face is under the zero of the heights, m."""
     if protocol.contact.from_board:
         return 0.0  # heights are counted from there
     thick = max((d for c in protocol.chains.values() for d in c.diameters), default=0.0)
@@ -134,7 +134,7 @@ def _side_view(axes: Axes, protocol: Protocol, gates: Gates, top: float) -> None
     axes.set_xlim(-1.6e3 * post, 1.6e3 * post)
     axes.set_ylim(-20, 1e3 * top)
     axes.set_xlabel("mm, uphill to the right" if _inclines(protocol) else "mm")
-    axes.set_ylabel("mm above the contact point" if _inclines(protocol) else "mm")
+    axes.set_ylabel(f"mm above the {protocol.zero}" if _inclines(protocol) else "mm")
     axes.grid(visible=False)
 
 

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from rig.cli import main
-from rig.protocol.reader import read
+from rig.protocol.reader import parse, read
 from rig.report.mounting import beam_ends, mounting_figure
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -37,6 +37,16 @@ def test_a_beam_ends_where_the_face_is_that_a_rod_lies_on():
     assert -uphill * math.sin(slope) + 22e-3 * math.cos(slope) == pytest.approx(-radius, abs=1e-12)
     assert along * math.cos(slope) == pytest.approx(uphill)
     assert beam_ends(protocol, 22e-3, 80)[0] < uphill
+
+
+def test_from_the_board_heights_are_those_above_its_face():
+    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8").replace("22 mm", "40 mm")
+    protocol = parse(f"{text}\ncontact: {{datum: board}}\n")
+    uphill, _ = beam_ends(protocol, 40e-3, 40)
+    assert uphill == pytest.approx(40e-3 / math.tan(math.radians(40)))
+    drawn = mounting_figure(protocol, protocol.gates)
+    assert "mm above the board" in drawn
+    assert "contact point" not in drawn
 
 
 def test_check_draws_it(tmp_path):

@@ -144,9 +144,8 @@ def _card(model: Model, expected: str, *, low: bool) -> Content:
         free = [("free side", plain(run.free, 40))] if run.free is not None else []
         incline = ("incline", f"{run.incline_deg:g}°")
         facts = [("impact side", plain(run.impact, 40)), *free, incline]
-    datum = "contact point" if protocol.surface is not None else "datum of the gates"
     expects = [("model", expected)] if expected else []
-    start = ("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {datum}")
+    start = ("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {protocol.zero}")
     width, between = (0, "   ") if low else (12, "\n")
     hung = Content(between).join(_fact(*fact, width) for fact in facts)
     return Content("\n").join([head, hung, *(_fact(*fact, width) for fact in (start, *expects))])
