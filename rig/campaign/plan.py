@@ -81,6 +81,6 @@ def rest_s(settle_s: float, clock_u: float | None) -> float:
 def what_to_hang(run: Run) -> str:
     """Tell the operator what goes where."""
     if run.impact is None:
-        return f"hang {run.free} for free fall"
+        return f"put {run.free} where it begins, at rest"
     free = f" · free side: {run.free}" if run.free else ""
     return f"incline {run.incline_deg:g}° · impact side: {run.impact}{free}"

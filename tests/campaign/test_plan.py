@@ -10,7 +10,9 @@ from rig.campaign.plan import (
     next_job,
     rest_s,
     unjudged,
+    what_to_hang,
 )
+from rig.protocol.protocol import Run
 from rig.records import Job
 
 
@@ -32,3 +34,10 @@ def test_chains_rest_longer_while_the_clock_is_not_known():
     assert rest_s(0.5, None) == rest_s(0.5, 2 * CLOCK_U) == CLOCK_S
     assert rest_s(0.5, CLOCK_U) == 0.5
     assert rest_s(9.0, None) == 9.0
+
+
+def test_who_stands_at_the_rig_is_told_what_goes_where():
+    """A glider on its track does not hang."""
+    assert what_to_hang(Run(1, 40.0, "A", "B")) == "incline 40° · impact side: A · free side: B"
+    assert what_to_hang(Run(1, 40.0, "A", None)) == "incline 40° · impact side: A"
+    assert what_to_hang(Run(1, 0.0, None, "glider")) == "put glider where it begins, at rest"
