@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import InputError
 from rig.link.client import Device
-from rig.link.messages import Phase
-from rig.link.port import open_port
+from rig.link.messages import Phase, pack_label
+from rig.link.port import open_port, port_clock
 from rig_emulator import boards_bench
 from rig_emulator.controller import EmulatorError
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
@@ -23,6 +25,7 @@ from tests.link.virtual import VirtualBench
 
 HZ = 20_000_000
 CYCLES = 6 * HZ
+FENCE = FIRMWARE.parent / "protocols" / "picket-fence.yaml"
 
 
 class PicoBench(VirtualBench):
@@ -130,3 +133,29 @@ class TestPico(DeviceConformance):
 def test_the_table_of_figures_is_up_to_date():
     written = (FIRMWARE.parent / "docs" / "results" / "boards.md").read_text()
     assert boards_bench.table() == written, "./run bench boards -o docs/results"
+
+
+def test_chains_fall_before_it_by_its_url(tmp_path):
+    """Every stamp within a tick of the truth, its clock as far off as the dial says."""
+    truth = tmp_path / "truth.jsonl"
+    url = f"emu://?board=pico&seed=3&clock=2000ppm&protocol={FENCE}&truth={truth}"
+    port = open_port(url)
+    device = Device(port, port_clock(port))
+    device.connect()
+    # The port is opened anew; the board goes on, and says nothing of a start.
+    port.close()
+    port.open()
+    device = Device(port, port_clock(port))
+    identity = device.connect()
+    label = pack_label(1, 1)
+    order = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000}
+    device.fire(device.arm(label=label, gates=0b11, record_ms=600, **order))
+    drop = device.collect(label)
+    port.close()
+    assert drop.faults == ()
+    assert drop.certificate.restarts == 0
+    (line,) = (json.loads(text) for text in truth.read_text("utf-8").splitlines())
+    assert len(drop.edges) == len(line["edges"]) > 20
+    for edge, (seconds, channel, blocked, _) in zip(drop.edges, line["edges"], strict=True):
+        assert (edge.channel, edge.blocked) == (channel, blocked)
+        assert abs(edge.tick - seconds * identity.tick_hz * 1.002) <= 1
