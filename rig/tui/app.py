@@ -209,6 +209,7 @@ class RigApp(App[None], inherit_bindings=False):
             return
         now = monotonic()
         passed, self._last = now - self._last, now
+        self._stillness.alive(now)
         if self.flow.stage is Stage.COUNTDOWN:
             self.driver.take(Tick(min(passed, _COUNTED_S)))
         if "history" in self.pages:

@@ -174,9 +174,9 @@ def _compare(app: CommandContext) -> None:
 
 def _write(app: CommandContext, command: Callable[[Path], tuple[str, ...]]) -> None:
     """Ask, then have files written of the session that is looked at."""
-    view = app.history.view if app.page == "history" else app.model.view
+    view = (app.history.view if app.page == "history" else None) or app.model.view
     if view is None:
-        app.tell("no session is open: o lists them")
+        app.tell(app.model.loading or "no session is open: o lists them")
         return
     words = command(view.path)
     _confirm(app, "WRITE FILES", f"{words[-1]}: what is there is replaced.", "write them",

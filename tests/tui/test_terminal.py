@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import re
 import shutil
 import signal
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from rig.session.schema import RunState
+from rig.session.store import Session
 from rig.tui.stillness import STILL_S
 from tests.cli.lab import ROOT, assert_whole, short
 from tests.tui.lab import short_folder
@@ -113,6 +116,56 @@ def test_an_abba_session_by_keys_alone(terminal, url):
     os.kill(pid, 0)  # it is there without the screen
     os.kill(pid, signal.SIGTERM)
     assert_whole(session, 4)
+
+
+_TYPED = ("Enter", "Space", "Escape", "Tab", "F9", "Up", "BTab", "C-p", *"acdefkmnqxy129.?")
+"""Keys that may come anywhere; letters that mean nothing stand before each."""
+
+
+@_NEEDS_TMUX
+def test_nothing_is_armed_by_hands_on_a_real_keyboard(terminal):
+    protocol, session = terminal.folder / "abba.yaml", terminal.folder / "abba.session"
+    protocol.write_text(short("[40 deg]", 4), "utf-8")
+    terminal.start(
+        "sh", "-c", 'echo $$ >"$0"; exec "$@"', str(terminal.folder / "pid"),
+        sys.executable, "-m", "rig", "tui", str(protocol), "--port", "sim://?seed=3", "--session",
+        str(session), "--socket", str(terminal.folder / "rig.sock"),
+    )  # fmt: skip
+    terminal.sees("PROTOCOL", "Enter open session", "SIMULATED")
+    terminal.press("Enter")
+    terminal.sees("DEVICE", "Enter to the first run", "clear")
+    terminal.press("Enter")
+    terminal.sees("RUN 1 of 4", "✓ gates steady", "Enter arm")
+    # A key, and Enter right after it, in a program that is held up between the two.
+    time.sleep(1.2 * STILL_S)
+    terminal.press("j")
+    time.sleep(0.4 * STILL_S)
+    pid = int((terminal.folder / "pid").read_text("utf-8"))
+    os.kill(pid, signal.SIGSTOP)
+    terminal.press("Enter")
+    time.sleep(1.2 * STILL_S)
+    os.kill(pid, signal.SIGCONT)
+    terminal.sees("not armed: Enter came too soon after another key")
+    hands = random.Random(20)
+    for _ in range(25):
+        word = [key for _ in range(hands.randrange(1, 9)) for key in (*"jj", hands.choice(_TYPED))]
+        terminal.press(*word, *"jj", *["Enter"] * hands.randrange(3))
+        place = f"0;{hands.randrange(1, 99)};{hands.randrange(1, 30)}"
+        terminal.press("-l", f"\x1b[<{place}M\x1b[<{place}m")  # a click
+
+    def prepared() -> bool:
+        terminal.press("Escape")  # of whatever is open
+        time.sleep(STILL_S)
+        terminal.press("3")
+        time.sleep(STILL_S)
+        return "Enter arm" in terminal.screen()
+
+    until(prepared)
+    with Session.open(session, readonly=True) as found:
+        assert {entry.state for entry in found.states()} <= {RunState.PLANNED}
+    terminal.enters("Enter arm")  # and by the deliberate step it is
+    terminal.sees("run 1, attempt 1", "release skew")
+    os.kill(_daemon_of(terminal.folder), signal.SIGTERM)
 
 
 def _daemon_of(folder: Path) -> int:
