@@ -36,6 +36,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     stdout, everything else to stderr.
     """
     _open_streams()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may follow; this does not return
+        import argcomplete  # noqa: PLC0415 - nobody else needs it
+
+        argcomplete.autocomplete(_parser())
     try:
         parser = _parser()
         try:
@@ -207,7 +211,10 @@ def _parser() -> Parser:
     )
     check.add_argument("--board", choices=tuple(BOARDS), help="refuse what this kind cannot do")
     check.add_argument(
-        "-o", "--output", metavar="FILE.svg", help="also draw where the gates are mounted"
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="also draw where the gates are mounted (.svg, .png, .pdf)",
     )
 
     design = command("design", "predict what a gate layout will tell, and propose better heights")
@@ -233,7 +240,10 @@ def _parser() -> Parser:
         "--figure", type=int, choices=(3, 4, 6), help="draw this figure of the paper instead"
     )
     predict.add_argument(
-        "-o", "--output", metavar="FILE.svg", help="the figure; its numbers go to FILE.csv"
+        "-o",
+        "--output",
+        metavar="FILE.svg",
+        help="the figure, or .png or .pdf; its numbers go to FILE.csv",
     )
     predict.add_argument(
         "--resolved",
@@ -382,6 +392,9 @@ def _parser() -> Parser:
         action="store_true",
         help="allow release 0 to be driven, once for 50 ms; without it no release ever is",
     )
+
+    completion = command("completion", "print what a shell reads to complete what is typed")
+    completion.add_argument("shell", choices=("bash", "zsh", "fish"), help="which shell")
 
     bench = command("bench", "measure accuracy against hidden truth, and speed as ratios")
     benches = bench.add_subparsers(required=True, metavar="BENCH")
@@ -540,8 +553,8 @@ def _sweep(sweep: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help="its ending chooses the kind: .csv a row a point; .npz arrays; .svg curves or two "
-        "maps, of one or two axes at one incline",
+        help="its ending chooses the kind: .csv a row a point; .npz arrays; .svg, .png or .pdf "
+        "curves or two maps, of one or two axes at one incline",
     )
     who = sweep.add_mutually_exclusive_group()
     who.add_argument(

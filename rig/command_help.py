@@ -16,6 +16,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "A session": ("run", "tui", "daemon", "import"),
     "Results": ("analyze", "report", "estimate", "export", "unblind", "replay", "recover"),
     "Studies of the program itself": ("bench",),
+    "The shell": ("completion",),
 }
 """Every command, in the order in which they are met."""
 
@@ -59,6 +60,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "unblind": ("rig unblind my.session", "rig unblind my.session && rig analyze my.session"),
     "replay": ("rig replay my.session", "rig replay old.session"),
     "recover": ("rig recover my.session", "rig recover my.session -o saved.session"),
+    "completion": ("rig completion bash", "rig completion fish"),
     "bench": ("rig bench stability", "rig bench layouts -o my-folder"),
 }  # fmt: skip
 
@@ -115,5 +117,5 @@ def overview(texts: dict[str, str]) -> str:
     """
     lines = []
     for group, names in GROUPS.items():
-        lines += ["", f"{group}:", *(f"  {name:<10}{texts[name]}" for name in names)]
+        lines += ["", f"{group}:", *(f"  {name:<12}{texts[name]}" for name in names)]
     return "\n".join(lines)

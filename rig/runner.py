@@ -36,7 +36,7 @@ from rig.protocol.measurable import check_recordable
 from rig.protocol.plan import runs
 from rig.recorder.interrupts import Interrupts
 from rig.records import Job
-from rig.report.numbers import plus_minus
+from rig.report.numbers import plus_minus, signed
 from rig.results import keep, results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
@@ -54,6 +54,9 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
 
 
+_VALUE = 17  # characters, as of −3.2076 ± 0.0017
+
+
 @dataclass(frozen=True, slots=True)
 class Operator:
     """Whoever stands at the rig.
@@ -64,10 +67,13 @@ class Operator:
         Shows one line of narration.
     ask
         Shows a request and returns when it is done; `None` when nobody is there (``--yes``).
+    judged
+        Shows what came of a drop of so many that are planned; `None` says it in a line.
     """
 
     say: Callable[[str], None]
     ask: Callable[[str], None] | None = None
+    judged: Callable[[DropResult, int], None] | None = None
 
 
 def run_protocol(
@@ -291,7 +297,10 @@ class Campaign:
                 case Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
-                    self.operator.say(narration(self._result, len(self.plan)))
+                    if self.operator.judged is None:
+                        self.operator.say(narration(self._result, len(self.plan)))
+                    else:
+                        self.operator.judged(self._result, len(self.plan))
         except DeviceRefusedError as refusal:
             self._failed = refusal
             self._take(effect_failed(self.flow.ticket, refusal))
@@ -310,15 +319,15 @@ class Campaign:
 
 
 def narration(result: DropResult, planned: int) -> str:
-    """One line about a drop."""
+    """One line about a drop, its columns where those of other drops are."""
     run, found = result.run, result.quantities
     parts = [f"run {run.number:>{len(str(planned))}}/{planned}"]
     if run.impact is not None:
-        parts.append(f"{run.incline_deg:g}° impact {run.impact}")
+        parts.append(f"{run.incline_deg:>4g}° impact {run.impact}")
     parts += [
-        f"{row.symbol} {plus_minus(found[row.name], row.scale)} {row.unit}"
+        f"{row.symbol} {plus_minus(found[row.name], row.scale):>{_VALUE}} {row.unit}"
         for row in told()
         if row.name in found
     ]
-    parts.append(": ".join(filter(None, [result.verdict, "; ".join(result.reasons)])))
+    parts.append(": ".join(filter(None, [result.verdict, signed("; ".join(result.reasons))])))
     return "  ".join(parts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rig.commands.output import print_results, progress
+from rig.commands.output import print_results, progress, show
 from rig.errors import SessionError
 from rig.report.columns import aligned
 from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
@@ -48,9 +48,9 @@ def main(arguments: Namespace) -> int:
         asked += [prior_part(more["prior_sensitivity"])] if arguments.priors else []
         asked += [*gate_parts(found.analysis.summary), *effects_parts(found.analysis.effects)]
         for part in asked:
-            print("\n".join(["", part.heading, *aligned(part.columns, part.records)]))
+            show(["", part.heading, *aligned(part.columns, part.records)])
         if "monte_carlo" in more:
             from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise
 
-            print("\n".join(["", *trials_lines(more["monte_carlo"])]))
+            show(["", *trials_lines(more["monte_carlo"])])
     return code

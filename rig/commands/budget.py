@@ -12,8 +12,10 @@ from rig.analysis.monte_carlo import adaptive, agreement, monte_carlo, session_m
 from rig.analysis.result import Measured
 from rig.commands.output import print_json
 from rig.errors import InputError
+from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs
 from rig.records import Job
+from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.results import (
     calibration,
     check_open,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from rig.session.reading import Reader
 
 SEED = 1
+_LEAST = 0.001  # in the finer unit: less is none
 
 
 def main(arguments: Namespace) -> int:
@@ -117,26 +120,38 @@ def _lines(measured: Measured) -> dict[str, Any]:
 
 
 def _table(found: Mapping[str, Any]) -> list[str]:
-    """One block a quantity; SI units."""
-    lines = [f"run {found['run']}, SI units"]
+    """One block a quantity, in its own unit and, of what makes it uncertain, the finer one."""
+    lines = [f"run {found['run']}"]
     drawn = found["monte_carlo"]
     for name, one in found["budget"].items():
+        row = MEASURANDS[name]
+        whole = plus_minus(one, row.scale)
+        u = fixed(row.fine_scale * one["u"], decimals_for(row.fine_scale * one["u"]))
         lines += [
             "",
-            f"{name} = {one['value']:.6g}, u = {one['u']:.2g}, ν = {one['degrees']:.0f}, "
-            f"k = {one['k']:.2f}, U95 = {one['U95']:.2g}",
+            f"{row.symbol} = {whole} {row.unit} (U, 95 %), u = {u} {row.fine}, "
+            f"ν = {one['degrees']:.0f}, k = {one['k']:.2f}",
         ]
         lines += [
-            f"  {line['name']:<18}{line['u']:10.2g}{line['share']:8.1%}" for line in one["lines"]
+            f"  {line['name']:<18}{_small(row.fine_scale * line['u']):>10} {row.fine:<5}"
+            f"{100 * line['share']:6.1f} %"
+            for line in one["lines"]
         ]
         alone, trial = found["by_itself"][name], drawn["quantities"][name]
-        lines.append(
-            f"  by itself u = {alone['u']:.2g}; by {drawn['trials']} trials (seed "
-            f"{drawn['seed']}) {trial['u']:.2g}, 95 % in {trial['low']:.6g} … {trial['high']:.6g}: "
+        digits = decimals_for(row.scale * trial["u"])
+        low, high = (fixed(row.scale * trial[end], digits) for end in ("low", "high"))
+        lines += [
+            f"  by itself u = {row.fine_scale * alone['u']:.2g} {row.fine}; by {drawn['trials']} "
+            f"trials (seed {drawn['seed']}) {row.fine_scale * trial['u']:.2g} {row.fine}",
+            f"  95 % of trials in {low} … {high} {row.unit}: "
             + ("both agree" if trial["agrees"] else "they do not agree")
-            + ("" if trial["decided"] else ", but of so few trials that is chance")
-        )
+            + ("" if trial["decided"] else " (of so few, chance)"),
+        ]
     return lines
+
+
+def _small(u: float) -> str:
+    return f"{u:.2g}" if u >= _LEAST else f"< {_LEAST:g}"
 
 
 def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
@@ -184,10 +199,8 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
 
 def trials_lines(found: Mapping[str, Any]) -> Iterator[str]:
     """Say in words how far both ways agree."""
-    yield (
-        f"Monte Carlo of the whole session: {found['trials']} trials, seed {found['seed']}; 95 % "
-        "intervals beside value ± 1.96 u (JCGM 101, clause 8)"
-    )
+    yield f"Monte Carlo of the whole session: {found['trials']} trials, seed {found['seed']};"
+    yield "95 % intervals beside value ± 1.96 u (JCGM 101, clause 8)"
     names = found["runs"][0]["quantities"]
     for name in names:
         ones = [run["quantities"][name] for run in found["runs"]]
@@ -195,4 +208,5 @@ def trials_lines(found: Mapping[str, Any]) -> Iterator[str]:
         chance = sum(not one["decided"] for one in ones)
         ratio = fmean(one["u_ratio"] for one in ones)
         said = f"{agree} of {len(ones)} agree, {chance} undecided"
-        yield f"  {name:<18} u by trials / u by budget {ratio:.3f}, {said}"
+        symbol = MEASURANDS[name].symbol
+        yield f"  {symbol:<12} u by trials / u by budget {ratio:.3f}, {said}"

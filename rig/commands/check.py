@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
 from rig.errors import InputError
-from rig.files import write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -47,9 +46,11 @@ def _reference(*, as_schema: bool) -> int:
 def _draw(protocol: Protocol, path: Path) -> None:
     if protocol.gates is None or not protocol.gates.gates:
         raise InputError(f"{protocol.source}: there are no gates to be mounted", "leave -o out")
-    from rig.report.mounting import mounting_figure  # noqa: PLC0415 - matplotlib, only here
+    from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - matplotlib, only here
+    from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
 
-    write_atomic(path, mounting_figure(protocol, protocol.gates))
+    kind_of(path)
+    write_figure(path, mounting_figure(protocol, protocol.gates))
 
 
 def _trials(protocol: Protocol) -> list[str]:

@@ -138,7 +138,7 @@ def _draw(protocol: Protocol, board: str, path: Path) -> None:
     """Draw where gates go and, for boards of which there is a picture, what is wired to them."""
     assert protocol.gates is not None
     mounting = path.with_name(f"{path.stem}-mounting.svg")
-    write_atomic(mounting, mounting_figure(protocol, protocol.gates))
+    write_atomic(mounting, mounting_figure(protocol, protocol.gates).svg)
     say(f"mounting: {mounting}")
     if board in WIRED:
         wiring = path.with_name(f"{path.stem}-wiring.svg")

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import sys
 from contextlib import suppress
+from shutil import get_terminal_size
+from textwrap import wrap
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +16,7 @@ from rig.files import write_atomic
 from rig.printable import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from rig.results import SessionResults
@@ -26,15 +30,60 @@ def say(line: str) -> None:
         print(printable(line), file=sys.stderr, flush=True)
 
 
+_ODD = re.compile(r"\b(void|rejected|marginal|disagrees)\b")
+"""Words that have a colour on a terminal, and say the same without."""
+_GAP = "   "  # as between cells of a table, whose lines are not broken
+
+
+def show(lines: Iterable[str]) -> None:
+    """Print results; on a terminal with colours, and sentences broken at its width."""
+    if not sys.stdout.isatty():
+        print("\n".join(lines))
+        return
+    width = get_terminal_size().columns
+    for line in lines:
+        for part in _broken(line, width):
+            print(tinted(part))
+
+
+def tinted(text: str) -> str:
+    """Colour what is not as it should be, unless the reader wants none (no-color.org)."""
+    return _ODD.sub("\x1b[33m\\1\x1b[0m", text) if coloured() else text
+
+
+def coloured() -> bool:
+    """Whether a terminal may be given colours."""
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def _broken(line: str, width: int) -> list[str]:
+    """Break a sentence at words, what goes on indented; tables stay as they are."""
+    words = line.lstrip()
+    if len(line) <= width or _GAP in words:
+        return [line]
+    indent = " " * (len(line) - len(words))
+    return wrap(line, width, subsequent_indent=f"{indent}  ", break_on_hyphens=False)
+
+
 def progress(what: str) -> Callable[[int, int], None]:
     """Count up on one line of a terminal; silent elsewhere."""
 
     def show(done: int, of: int) -> None:
-        if sys.stderr.isatty():
-            end = "\n" if done == of else ""
-            print(f"\r{what} {done}/{of}", end=end, file=sys.stderr, flush=True)
+        stage("" if done == of else f"{what} {done}/{of}")
 
     return show
+
+
+def stage(what: str) -> None:
+    """Say what is being worked on, on one line of a terminal that the next one takes; else nothing.
+
+    Parameters
+    ----------
+    what
+        Empty to clear the line.
+    """
+    if sys.stderr.isatty():
+        print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
 
 
 def leave_study(
@@ -101,6 +150,6 @@ def print_results(
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
         from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 
-        print(summary_table(found.analysis.summary))
-        print("\n".join([*void_lines(found.analysis), *remarks(found)]))
+        show(summary_table(found.analysis.summary).splitlines())
+        show([*void_lines(found.analysis), *remarks(found)])
     return VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 from rig.commands.output import print_json, say
@@ -11,14 +12,21 @@ from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import predictions
 from rig.protocol import reader
+from rig.report.columns import degrees
+from rig.report.numbers import fixed, plus_minus
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
+    from rig.measurands import Measurand
     from rig.predictions import PredictedIncline
     from rig.protocol.protocol import Protocol
+
+
+_COVERAGE = NormalDist().inv_cdf(0.975)
+"""Of U for 95 %: what a protocol states is known exactly."""
 
 
 def main(arguments: Namespace) -> int:
@@ -44,66 +52,65 @@ def main(arguments: Namespace) -> int:
 
 def table(protocol: Protocol, found: list[PredictedIncline]) -> str:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
-    if protocol.surface is None:
-        columns = {"speed (m/s)": ("speed_m_s", 1.0, ".4f"), "t (s)": ("fall_time_s", 1.0, ".5f")}
-        return _laid_out(columns, found)
     apart, end = SEPARATION, SPEED
-    columns = {
-        "incline (°)": ("incline_deg", 1.0, "g"),
-        "strikes": ("impact_chain", 1, ""),
-        "α": ("alpha", 1.0, ".4f"),
-        f"{apart.symbol} ({apart.unit})": (apart.name, apart.scale, ".3f"),
-        f"u ({apart.unit})": (apart.key("u"), apart.scale, ".3f"),
-        f"{end.symbol} ({end.unit})": (end.name, end.scale, ".4f"),
-        f"u ({end.unit})": (end.key("u"), end.scale, ".4f"),
-        "t (s)": ("fall_time_s", 1.0, ".5f"),
-        "free fall V (m/s)": ("free_fall_speed_m_s", 1.0, ".4f"),
+    columns: dict[str, Callable[[PredictedIncline], str]] = {
+        "incline (°)": lambda one: degrees(one.incline_deg),
+        "strikes": lambda one: one.impact_chain or "",
+        "α": lambda one: fixed(one.alpha, 4),
+        f"{apart.symbol} ± U ({apart.unit})": lambda one: _written(
+            one.separation_m, one.separation_u_m, apart
+        ),
+        f"{end.symbol} ± U ({end.unit})": lambda one: _written(one.speed_m_s, one.speed_u_m_s, end),
+        "t (s)": lambda one: fixed(one.fall_time_s, 5),
+        "model": lambda one: one.model,
     }
     if not protocol.two_chains:
-        del columns[f"{apart.symbol} ({apart.unit})"], columns[f"u ({apart.unit})"]
-    return _laid_out(columns, found)
-
-
-def _cell(value: float | str | None, scale: float, style: str) -> str:
-    if value is None:
-        return "–"
-    return value if isinstance(value, str) else format(value * scale, style)
-
-
-def _laid_out(columns: Mapping[str, tuple[str, float, str]], found: list[PredictedIncline]) -> str:
-    shown = {
-        heading: what
-        for heading, what in columns.items()
-        if any(getattr(line, what[0]) is not None for line in found)
-    }
-    rows = [[*shown, "model"]]
+        del columns[f"{apart.symbol} ± U ({apart.unit})"]
+    if protocol.surface is None:
+        speed = {f"speed ({end.unit})": lambda one: fixed(one.speed_m_s, 4)}
+        columns = speed | {name: columns[name] for name in ("t (s)", "model")}
+    shown = {name: [tell(one) for one in found] for name, tell in columns.items()}
+    rows = [[name, *(text or "–" for text in texts)] for name, texts in shown.items() if any(texts)]
+    said: dict[str, list[str]] = {}
     for line in found:
-        cells = [_cell(getattr(line, key), scale, style) for key, scale, style in shown.values()]
-        rows.append([*cells, line.model])
-    notes = [f"{line.label}: {note}" for line in found for note in line.notes]
-    return "\n".join([*text_table(rows), *notes])
+        for note in line.notes:
+            said.setdefault(note, []).append(line.label)
+    notes = [f"{', '.join(labels)}: {note}" for note, labels in said.items()]
+    if protocol.surface is not None:
+        free = dict.fromkeys(fixed(one.free_fall_speed_m_s, 4) for one in found)
+        notes.insert(0, f"free fall: {end.symbol} = {' or '.join(free)} {end.unit}")
+    words = {place for place, row in enumerate(rows) if row[0] in {"strikes", "model"}}
+    return "\n".join([*text_table([*zip(*rows, strict=True)], left=words), *notes])
+
+
+def _written(value: float | None, u: float | None, row: Measurand) -> str:
+    """Write a prediction with what its own numbers leave open."""
+    if value is None or u is None:
+        return fixed(None if value is None else value * row.scale, row.decimals + 1)
+    return plus_minus({"value": value, "U95": _COVERAGE * u}, row.scale)
 
 
 def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
-    """Write a figure of the paper as SVG and its numbers as CSV beside it."""
-    from rig.report.paper import paper_figure  # noqa: PLC0415 - it needs matplotlib
+    """Write a figure of the paper, and its numbers as CSV beside it."""
+    from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - it needs matplotlib
+    from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
-    if output is None or Path(output).suffix not in {".svg", ".csv"}:
-        what = (
-            "a figure needs a file to go to"
-            if output is None
-            else (f"{output}: a figure is written as .svg, and its numbers as .csv")
+    if output is None:
+        raise InputError(
+            "a figure needs a file to go to", f"rig predict --figure {number} -o FILE.svg"
         )
-        raise InputError(what, f"rig predict --figure {number} -o FILE.svg")
     path = Path(output)
+    picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
+    kind_of(picture)
     falls = _resolved(number) if resolved else None
-    svg, columns = paper_figure(number, falls)
-    written = {path.with_suffix(".svg"): svg, path.with_suffix(".csv"): _table(columns)}
+    drawing, columns = paper_figure(number, falls)
+    write_figure(picture, drawing)
+    written = {path.with_suffix(".csv"): _table(columns)}
     if falls is not None:
         written[path.with_name(f"{path.stem}-resolved.csv")] = _table(falls)
     for file, text in written.items():
         write_atomic(file, text)
-    say(" and ".join(map(str, written)))
+    say(" and ".join(map(str, [picture, *written])))
 
 
 def _table(columns: Mapping[str, list[float]]) -> str:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.analysis.curves import model_curves
-from rig.commands.output import progress, say
+from rig.commands.output import progress, say, stage
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
 from rig.films import read_films
+from rig.report.chapters import in_order
+from rig.report.contents import timelines_and_data
+from rig.report.deviations import deviations
 from rig.report.estimate import page_parts
 from rig.report.estimate_pictures import estimate_pictures
 from rig.report.html import ReportContext, write_report
@@ -30,6 +34,9 @@ if TYPE_CHECKING:
     from rig.estimate.session import SessionEstimate
     from rig.protocol.protocol import Protocol
     from rig.report.embed import PageFigure
+    from rig.report.parts import Part
+
+_NUMERICS = ("numpy", "scipy")
 
 
 def main(arguments: Namespace) -> int:
@@ -38,6 +45,7 @@ def main(arguments: Namespace) -> int:
         protocol = protocol_of(session)
         found = results(session, progress("analysing run"))
         sections = Sections()
+        stage("drawing figures")
         curves = sections.make("The model's curve", lambda: model_curves(protocol))
         figures = pictures(
             found.analysis,
@@ -49,16 +57,24 @@ def main(arguments: Namespace) -> int:
             films=read_films(session.path) if session.simulated else None,
             sections=sections,
         )
-        effects, summary = found.analysis.effects, found.analysis.summary
-        parts = sections.make("The table of gates", lambda: list(gate_parts(summary))) or []
-        parts += sections.make("The paired differences", lambda: list(effects_parts(effects))) or []
+        effects = found.analysis.effects
+        compared = sections.make("The paired differences", lambda: list(effects_parts(effects)))
+        stage("estimating the impacts")
+        summary = found.analysis.summary
+        gates = sections.make("The table of gates", lambda: list(gate_parts(summary)))
         estimated = sections.make(
             "The estimate of the impacts", lambda: _estimated(protocol, found.analysis)
         )
+        parts: list[Part] = []
         if estimated is not None:
+            stage("drawing the impacts")
             drawn = estimate_pictures(estimated, sections, simulated=session.simulated)
             figures += drawn.values()
-            parts += page_parts(estimated, sections)
+            parts = list(page_parts(estimated, sections))
+        stage("writing the page")
+        timelines, data = timelines_and_data(session, protocol, found)
+        figures = in_order(figures)
+        name = session.path.name
         write_report(
             arguments.output,
             ReportContext(
@@ -70,19 +86,30 @@ def main(arguments: Namespace) -> int:
                 protocol_source=session.protocol_source,
                 protocol_sha256=session.meta["protocol_sha256"],
                 provenance={
-                    "session": session.path.name,
+                    "session": name,
                     "created": session.meta["created"],
                     "origin": session.meta["origin"].partition("?")[0],
                     "recorded with": f"rig {session.meta['rig_version']}",
-                    "analysed with": f"rig {__version__}",
+                    "analysed with": f"rig {__version__}, {', '.join(map(_version, _NUMERICS))}",
                 },
                 identities=[identity for _, identity in session.identities()],
                 clock=found.clock.details,
-                notes=[*remarks(found), *_noted(session)],
+                notes=remarks(found),
+                operator_notes=_noted(session),
+                deviations=deviations(protocol, found.analysis, session.states()),
                 parts=parts,
+                effects=[*(gates or ()), *(compared or ())],
+                timelines=timelines,
+                again=[
+                    f"rig analyze {name} --json",
+                    f"rig report {name} -o report.html",
+                    f"rig replay {name}    # the recorded bytes through the whole stack once more",
+                ],
+                attachments=data,
                 sections=sections,
             ),
         )
+        stage("")
     if arguments.figures is not None:
         _write_figures(Path(arguments.figures), figures)
     for sentence in (*(estimated.failed if estimated else ()), *sections.failed.values()):
@@ -91,12 +118,13 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
+def _version(package: str) -> str:
+    return f"{package} {version(package)}"
+
+
 def _noted(session: Session) -> list[str]:
     """Tell what operators noted to drops."""
-    return [
-        f"Note on run {job.run}, attempt {job.attempt}: {text}"
-        for job, text in notes(session).items()
-    ]
+    return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
 
 
 def _estimated(protocol: Protocol, analysis: Analysis) -> SessionEstimate | None:

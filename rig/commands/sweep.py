@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, TextIO
 
 from rig.commands.output import say
 from rig.errors import InputError
-from rig.files import replacing, write_atomic
+from rig.files import replacing
 from rig.protocol import reader
+from rig.report.canvas import KINDS
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executors import Inline, cores, processes
 from rig.sweep.layout import Layout, lay_out
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 INTERRUPTED = 130
-_KINDS = (".csv", ".npz", ".svg")
+_KINDS = (".csv", ".npz", *(f".{kind}" for kind in KINDS))
 # Processes take longer to start than this process to compute so many pieces.
 _FEW_CHUNKS = 20
 
@@ -37,7 +38,7 @@ def main(arguments: Namespace) -> int:
     _check_place(output)
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
-    if output.suffix == ".svg":
+    if _drawn(output):
         _check_drawable(layout)
     try:
         swept = _computed(layout, arguments.jobs, arguments.cluster)
@@ -63,10 +64,11 @@ def _computed(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
-    if output.suffix == ".svg":
-        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
+    if _drawn(output):
+        from rig.report.canvas import write_figure  # noqa: PLC0415 - it needs matplotlib
+        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - likewise
 
-        write_atomic(output, sweep_figure(facts, layout, swept))
+        write_figure(output, sweep_figure(facts, layout, swept))
         return
     with replacing(output) as stream:
         if output.suffix == ".npz":
@@ -92,6 +94,10 @@ def _executor(jobs: int | None, address: str | None, chunks: int) -> Iterator[tu
         yield pool, workers
 
 
+def _drawn(output: Path) -> bool:
+    return output.suffix.removeprefix(".") in KINDS
+
+
 def _check_place(output: Path) -> None:
     """Find out before a long computation what would go wrong after it."""
     if output.suffix not in _KINDS:
@@ -101,7 +107,7 @@ def _check_place(output: Path) -> None:
         )
     if not output.parent.is_dir():
         raise InputError(f"cannot write {output}: there is no folder {output.parent}")
-    if output.suffix == ".svg":
+    if _drawn(output):
         import_module("matplotlib")
 
 

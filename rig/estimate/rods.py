@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""
+_TOGETHER = (
+    "The gates do not resolve every rod by itself; neighbours are taken together until their sum "
+    f"is known to {100 * RESOLVED:.0f} % (95 %)."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,15 +131,16 @@ def resolution(found: Sequence[Impulses]) -> str:
     """Say whether each rod was resolved."""
     if all(one.resolved == one.rods for one in found):
         return "The gates resolve the impulse of every rod at every incline."
+    counts = {(one.resolved, one.rods) for one in found}
+    if len(counts) == 1:
+        ((resolved, rods),) = counts
+        return f"{_TOGETHER} Resolved alone at every incline: {resolved} of {rods}."
     short = "; ".join(
         f"{one.condition.incline_deg:g}°: {one.resolved} of {one.rods}"
         for one in found
         if one.resolved < one.rods
     )
-    return (
-        "The gates do not resolve every rod by itself; neighbours are taken together until their "
-        f"sum is known to {RESOLVED:.0%} (95 %). Resolved alone at {short}."
-    )
+    return f"{_TOGETHER} Resolved alone at {short}."
 
 
 def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:

@@ -128,10 +128,17 @@ def _inertia_row(inertia: float) -> Sequence[float]:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A figure of the paper's text and what its equations give for it."""
+    """A number of the paper's text, what its equations give for it, and the figure it is on.
+
+    Attributes
+    ----------
+    figure
+        Of the paper; `None` for what no figure shows.
+    """
 
     text: str
     equations: str
+    figure: int | None = None
 
 
 def claims() -> list[Claim]:
@@ -163,23 +170,28 @@ def claims() -> list[Claim]:
         Claim(
             "friction raises α by 2.25 at 80°",
             f"{rough[0]:.3f} (and {rough[1]:.4f} at 40°, where the text says about 20 %)",
+            3,
         ),
         Claim(
             f"free-fall speed {TEXT_FREE_FALL_SPEED:.2f} m/s",
             f"{free_fall_speed(UNIFORM, DROP, GRAVITY):.3f} m/s from {DROP + LENGTH:.3f} m",
+            3,
         ),
         Claim(
             "Eq. 14 within 4 % of the discrete model",
             f"{abs(eq14 / fast - 1.0) * 100:.1f} % at ξ = 1/3",
+            6,
         ),
         Claim(
             "Eq. 15 within 4 %",
             f"{abs(eq15 / separation - 1.0) * 100:.1f} % at ξ = 1/3, {off(low):.0f} % at 0.05, "
             f"{off(high):.0f} % at 0.9, {off(tiny):.0f} % at 0.01",
+            6,
         ),
         Claim(
             "Δz only 20 % larger for very large initial speeds (S17)",
             f"{larger(1e-9):.0f} % as α → 0, {larger(0.1):.0f} % at α = 0.1",
+            6,
         ),
         Claim(
             "lift-off (S20) similar to the fountains' α of {:.2f} to {:.2f}".format(
@@ -191,5 +203,6 @@ def claims() -> list[Claim]:
         Claim(
             f"graded chain: Δz = {MEASURED_GRADED_SEPARATION * 100:.0f} cm, measured",
             f"{final * 100:.1f} cm; {early * 100:.1f} cm two frames before the impact",
+            4,
         ),
     ]

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import io
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from rig.errors import InputError
+from rig.files import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -20,6 +24,15 @@ MODEL = "#0072b2"
 MODEL_BAND = "#cce3f0"
 SECOND = "#d55e00"
 """Blue and vermilion of Okabe and Ito's palette; shapes and words say the same once more."""
+PARTS = (MODEL, "#e69f00", "#009e73", "#cc79a7", "#56b4e9", SECOND, "#f0e442", "#9aa3ad")
+"""Parts of a whole: the same palette, and grey for what is left."""
+
+Kind = Literal["svg", "png", "pdf"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+_DPI = 200  # of PNG files: sharp in a column of a journal
+
+SIZE = 9.0
+"""Points, of all type in a figure."""
 
 _STYLE: Any = {
     "axes.axisbelow": True,
@@ -31,18 +44,24 @@ _STYLE: Any = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "errorbar.capsize": 2.5,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
+    "figure.facecolor": PAPER,  # a ground of its own: viewers may be dark
+    "axes.facecolor": PAPER,
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
-    "font.size": 9.0,
+    "font.size": SIZE,
     "grid.color": RULE,
     "grid.linewidth": 0.6,
-    "legend.fontsize": 8.0,
+    "axes.labelsize": SIZE,
+    "axes.titlesize": SIZE,
+    "legend.fontsize": SIZE,
+    "legend.title_fontsize": SIZE,
+    "xtick.labelsize": SIZE,
+    "ytick.labelsize": SIZE,
     "legend.edgecolor": "none",
     "legend.facecolor": PAPER,
     "legend.fancybox": False,
     "legend.framealpha": 0.9,
     "lines.linewidth": 1.6,
+    "pdf.fonttype": 42,  # text that can be searched, as journals ask for
     "svg.fonttype": "path",
     "svg.hashsalt": "rig",  # without it every run would give other ids
     "text.color": INK,
@@ -64,10 +83,65 @@ class Canvas:
         The text, once the block has ended.
     """
 
-    def __init__(self, figure: Figure, axes: list[Axes]) -> None:
+    def __init__(self, figure: Figure, axes: list[Axes], description: str | None) -> None:
         self.figure = figure
         self.axes = axes
-        self.svg = ""
+        self._description = description
+
+    @property
+    def svg(self) -> str:
+        """The figure as SVG, the same each time."""
+        return self.file("svg").decode("utf-8")
+
+    def file(self, kind: Kind) -> bytes:
+        """Return the figure as a file of a kind; the same drawing gives the same bytes."""
+        import matplotlib as mpl  # noqa: PLC0415 - as in `canvas`
+
+        made = io.BytesIO()
+        with mpl.rc_context(_STYLE):
+            self.figure.savefig(made, format=kind, dpi=_DPI, metadata=self._metadata(kind))
+        return made.getvalue()
+
+    def _metadata(self, kind: Kind) -> dict[str, Any]:
+        if kind == "png":
+            return {"Software": None, "Description": self._description or ""}
+        if kind == "pdf":
+            return {
+                "Creator": None, "Producer": None, "CreationDate": None,
+                "Subject": self._description,
+            }  # fmt: skip
+        unsaid = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        return {**unsaid, "Description": self._description}
+
+
+def kind_of(path: Path) -> Kind:
+    """Tell by a file's ending how a figure is to be written.
+
+    Raises
+    ------
+    InputError
+        It is none of those that there are.
+    """
+    kind = path.suffix.removeprefix(".")
+    if kind not in KINDS:
+        raise InputError(
+            f"{path}: a figure is written as {', '.join(f'.{one}' for one in KINDS)}",
+            f"such as {path.with_suffix('.svg')}",
+        )
+    return kind
+
+
+def write_figure(path: Path, drawing: Canvas) -> None:
+    """Write a figure as its file's ending says, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it says nothing, or the file cannot be written.
+    """
+    content = drawing.file(kind_of(path))
+    with replacing(path) as stream:
+        stream.write(content)
 
 
 @contextmanager
@@ -105,29 +179,16 @@ def canvas(
         panels = figure.subplots(
             len(heights), columns, sharex=sharex, squeeze=False, height_ratios=list(heights)
         )
-        drawing = Canvas(figure, list(panels.flat))
+        drawing = Canvas(figure, list(panels.flat), description)
         yield drawing
         figure.align_ylabels(drawing.axes)
         if simulated:
-            _stamp(figure)
-        text = io.StringIO()
-        metadata: dict[str, Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-        metadata["Description"] = description
-        figure.savefig(text, format="svg", metadata=metadata)
-        drawing.svg = text.getvalue()
-
-
-def _stamp(figure: Figure) -> None:
-    figure.text(
-        0.53,
-        0.5,
-        "SIMULATED DATA",
-        rotation=24,
-        fontsize=38,
-        fontweight="bold",
-        color=INK,
-        alpha=0.09,
-        ha="center",
-        va="center",
-        zorder=10,
-    )
+            # In a strip of its own, where it hides nothing and nothing hides it.
+            figure.suptitle(
+                "SIMULATED DATA",
+                x=0.995,
+                ha="right",
+                fontsize=SIZE,
+                fontweight="bold",
+                color=SECOND,
+            )

@@ -5,19 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from rig.analysis.result import Audit
+from rig.analysis.result import Audit, Measured
 from rig.measurands import acceleration_in, averaged, listed
-from rig.report.numbers import MINUS, fixed, plus_minus, value_of
+from rig.report.numbers import MINUS, fixed, plus_minus
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.result import DropResult
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
 
 T = TypeVar("T")
+
+AGREES, DISAGREES = "agrees", "disagrees"
+"""What stands beside Eₙ."""
 
 AUDIT = tuple(field.name for field in fields(Audit))
 """Counts of edges in the order in which the runs table gives them."""
@@ -52,8 +55,8 @@ def main_error(line: Incline) -> float | None:
     return line.normalized_error(next(iter(line.means)))
 
 
-def summary_columns() -> list[Column[Incline]]:
-    """Columns of the summary; unlike chains have a line each.
+def summary_columns(row: Measurand) -> list[Column[Incline]]:
+    """Columns of the means of a measurand beside the model; unlike chains have a line each.
 
     Eₙ is the normalized error; within ±1 measurement and prediction agree.
     """
@@ -61,20 +64,28 @@ def summary_columns() -> list[Column[Incline]]:
         Column("incline (°)", summary_incline),
         Column("strikes", lambda line: line.impact_chain or "", numeric=False),
         Column("n", lambda line: str(line.n)),
-        *(column for row in averaged() for column in _beside_model(row)),
-        Column("Eₙ", lambda line: fixed(main_error(line), 2)),
+        Column(_heading(row), lambda line: _written(row, line.means)),
+        Column(f"predicted ± U ({row.unit})", lambda line: _predicted(row, line)),
+        Column("Eₙ", lambda line: fixed(line.normalized_error(row.name), 2)),
+        Column("model", lambda line: verdict_on(line.normalized_error(row.name)), numeric=False),
     ]
 
 
-def _beside_model(row: Measurand) -> tuple[Column[Incline], Column[Incline]]:
-    def predicted(line: Incline) -> str:
-        value = value_of(line.predicted.get(row.name))
-        return "" if value is None else fixed(value * row.scale, row.decimals)
+def verdict_on(error: float | None) -> str:
+    """Say what a normalized error means; nothing where nothing was compared."""
+    if error is None:
+        return ""
+    return AGREES if abs(error) <= 1.0 else DISAGREES
 
-    return (
-        Column(_heading(row), lambda line: _written(row, line.means)),
-        Column(f"predicted {row.symbol} ({row.unit})", predicted),
-    )
+
+def _predicted(row: Measurand, line: Incline) -> str:
+    """Write what the model says; one that knows its numbers exactly has no ±."""
+    model = line.predicted.get(row.name)
+    if model is None:
+        return ""
+    if not model.u:
+        return fixed(model.value * row.scale, row.decimals)
+    return plus_minus(Measured(model.value, model.u), row.scale)
 
 
 def _heading(row: Measurand) -> str:
@@ -90,11 +101,11 @@ def run_columns() -> list[Column[DropResult]]:
     return [
         Column("run", lambda one: str(one.run.number)),
         Column("attempt", lambda one: str(one.attempt)),
+        Column("verdict", lambda one: one.verdict, numeric=False),
         Column("incline (°)", run_incline),
         Column("impact chain", lambda one: one.run.impact or "", numeric=False),
         *(_measured(row) for row in listed()),
         Column("edges", lambda one: " / ".join(map(str, one.audit.json().values()))),
-        Column("verdict", lambda one: one.verdict, numeric=False),
     ]
 
 
@@ -120,11 +131,12 @@ def filled(
 def aligned(columns: Sequence[Column[T]], records: Sequence[T]) -> list[str]:
     """Write records as lines of aligned text below their headings; empty columns are left out."""
     columns, rows = filled(columns, records)
-    return text_table([[column.heading for column in columns], *rows], rule=True)
+    words = {place for place, column in enumerate(columns) if not column.numeric}
+    return text_table([[column.heading for column in columns], *rows], left=words, rule=True)
 
 
 def summary_table(summary: Sequence[Incline]) -> str:
-    """Write the summary as aligned text.
+    """Write the summary as aligned text, a block for each measurand, none wider than 80.
 
     Returns
     -------
@@ -133,4 +145,9 @@ def summary_table(summary: Sequence[Incline]) -> str:
     """
     if not summary:
         return "No accepted runs, so no summary."
-    return "\n".join(aligned(summary_columns(), summary))
+    blocks = []
+    for row in averaged():
+        lines = [line for line in summary if row.name in line.means]
+        if lines:
+            blocks.append("\n".join(aligned(summary_columns(row), lines)))
+    return "\n\n".join(blocks)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.estimate.rods import resolution
 from rig.measurands import MEASURANDS
 from rig.report.columns import Column, aligned
-from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
 from rig.report.parts import Part
 
 if TYPE_CHECKING:
@@ -185,11 +185,17 @@ def _posterior(one: Coefficient) -> str:
 
 
 def _stated(one: Coefficient) -> str:
-    return f"{one.stated.value:g}" + (f" (u {one.stated.u:g})" if one.stated.u else "")
+    value = f"{one.stated.value:g}".replace("-", MINUS)
+    return value + (f" (u {one.stated.u:g})" if one.stated.u else "")
 
 
 def _worst(errors: Iterable[float | None]) -> str:
     return fixed(max((abs(one) for one in errors if one is not None), default=None), 2)
+
+
+def _counted(line: _Rods) -> str:
+    """Count rods as people do, from 1."""
+    return "–".join(str(1 + rod) for rod in dict.fromkeys((line.of.first, line.of.last)))
 
 
 def _p(p: float | None) -> str:
@@ -243,7 +249,7 @@ _INCLINES: tuple[Column[_Compared], ...] = (
 _RODS: tuple[Column[_Rods], ...] = (
     Column("incline (°)", lambda line: _incline(line.condition)),
     Column("strikes", lambda line: _strikes(line.condition), numeric=False),
-    Column("rod", lambda line: "–".join(map(str, dict.fromkeys((line.of.first, line.of.last))))),
+    Column("rod", _counted),
     Column("ΔV ± U (m/s)", lambda line: plus_minus(line.of.measured)),
     Column("Eq. 9 (m/s)", lambda line: fixed(line.of.eq9_m_s, 5)),
     Column("Eₙ", lambda line: fixed(line.of.normalized_error, 2)),

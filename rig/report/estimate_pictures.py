@@ -99,6 +99,7 @@ def _alpha(found: SingleAlphas, simulated: bool) -> PageFigure:
         "Impact coefficient against inclination, with residuals",
         "The best single α of every incline and run; below, each run less the fitted coefficients, "
         "in standard uncertainties (band: ±2).",
+        "impacts",
     )
 
 
@@ -108,7 +109,7 @@ def _impulses(found: Sequence[Impulses], simulated: bool) -> PageFigure:
     with canvas((2.6, 1.6), simulated=simulated) as drawing:
         top, low = drawing.axes
         for one, (marker, color) in zip(shown, _STYLES, strict=False):
-            rods = [(gain.first + gain.last) / 2 for gain in one.gains]
+            rods = [1 + (gain.first + gain.last) / 2 for gain in one.gains]
             top.plot(rods, [gain.eq9_m_s for gain in one.gains], "-", color=color, linewidth=1)
             top.errorbar(
                 rods,
@@ -130,17 +131,18 @@ def _impulses(found: Sequence[Impulses], simulated: bool) -> PageFigure:
         low.axhspan(-1, 1, color=MODEL_BAND, alpha=0.6, linewidth=0)
         for one in found:
             low.plot(
-                [(gain.first + gain.last) / 2 for gain in one.gains],
+                [1 + (gain.first + gain.last) / 2 for gain in one.gains],
                 np.array([gain.normalized_error for gain in one.gains], float),
                 "o", color=MODEL, markersize=3, alpha=0.6, markeredgewidth=0,
             )  # fmt: skip
         low.set_ylabel("Eₙ, all inclines")
-        low.set_xlabel("rod, from the bottom")
+        low.set_xlabel("rod, counted from the bottom")
     return PageFigure(
         drawing.svg,
         "Speed gained from each rod's impact",
         "Speed that the chain gains as each rod strikes, as measured and by Eq. 9 with the best α "
         "of the incline; below, their normalized errors.",
+        "impacts",
     )
 
 
@@ -218,6 +220,7 @@ def _posterior(told: Coefficients, simulated: bool) -> PageFigure | None:
         )  # fmt: skip
         line = {one.name: one.least_squares.value for one in told.parameters}
         axes.plot(line["restitution"], line["friction"], "+", color=INK, label="least squares")
+        axes.locator_params(axis="x", nbins=5)
         axes.set_xlabel("restitution β")
         axes.set_ylabel("friction μ")
         axes.legend()
@@ -225,6 +228,7 @@ def _posterior(told: Coefficients, simulated: bool) -> PageFigure | None:
         drawing.svg,
         "Posterior of restitution and friction",
         "Posterior of β and μ: smallest regions that hold 68.3 % and 95 %.",
+        "impacts",
     )
 
 

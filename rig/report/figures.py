@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import groupby
+from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, Measured
 from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
 from rig.report.bars import LABELS, bar
-from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
+from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, RULE, SECOND, canvas
 from rig.report.numbers import fixed, value_of
 from rig.report.panels import (
     legend_above,
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Condition
     from rig.report.bars import Bars
 
+_GAP_DEG = 2.0  # the curve has a point each degree
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2, "markeredgewidth": 0}
 _MEAN: dict[str, Any] = {
     "fmt": "o",
     "color": INK,
-    "markersize": 5.0,
+    "markersize": 3.6,
     "elinewidth": 1.2,
-    "markeredgecolor": PAPER,
-    "markeredgewidth": 0.7,
+    "capsize": 3.5,
     "zorder": 4,
 }
 _SEGMENTS: dict[str, tuple[Any, str]] = {
@@ -71,22 +71,47 @@ def incline_figure(
     """
     curves = curves or {}
     measured = {name for one in analysis.runs for name in one.quantities}
-    panels = [row for row in averaged() if row.name in {*curves, *measured}] or [SEPARATION]
-    with canvas((3.1,) * len(panels), simulated=simulated) as drawing:
-        for axes, row in zip(drawing.axes, panels, strict=True):
+    rows = [row for row in averaged() if row.name in {*curves, *measured}] or [SEPARATION]
+    strips = {row for row in rows if _compared(analysis.summary, row)}
+    heights = [height for row in rows for height in ((2.5, 1.2) if row in strips else (3.1,))]
+    with canvas(tuple(heights), simulated=simulated) as drawing:
+        panels = iter(drawing.axes)
+        for row in rows:
+            axes = next(panels)
             _incline_panel(axes, analysis, curves, row, bars)
             axes.set_ylabel(row.axis)
             if row == SEPARATION:
                 axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
             elif row == SPEED:
                 _free_fall_line(axes, value_of(curves.get("free_fall_speed_m_s")))
-        # The empty corner: both quantities fall towards steep surfaces, but for a chain whose α is
-        # given beside one whose α is not.
-        if drawing.axes[0].get_legend_handles_labels()[0]:
-            several = any(", " in str(name) for name in curves.get("segments") or ())
-            drawing.axes[0].legend(loc="best" if several else "upper right")
+            if row in strips:
+                _residual_strip(next(panels), analysis.summary, row, bars)
+        legend_above(drawing.axes[0])
         _incline_axis(drawing.axes[-1])
     return drawing.svg
+
+
+def _compared(summary: Sequence[Incline], row: Measurand) -> list[Incline]:
+    return [line for line in summary if row.name in line.means and row.name in line.predicted]
+
+
+def _residual_strip(axes: Axes, summary: Sequence[Incline], row: Measurand, bars: Bars) -> None:
+    """Draw what is measured less what is predicted, each with its own bar."""
+    lines = _compared(summary, row)
+    inclines = [line.incline_deg for line in lines]
+    scale = row.fine_scale
+    models = [scale * Measured(0.0, line.predicted[row.name].u).expanded for line in lines]
+    axes.axhline(0, color=MODEL, linewidth=0.9)
+    axes.errorbar(inclines, [0.0] * len(lines), models, fmt="none", ecolor=MODEL_BAND,
+                  elinewidth=7.0, capsize=0, zorder=1)  # fmt: skip
+    left = [scale * (line.means[row.name].value - line.predicted[row.name].value) for line in lines]
+    widths = [scale * (bar(line, row.name, bars) or 0.0) for line in lines]
+    axes.errorbar(inclines, left, widths, **_MEAN)
+    # The scale is the measurement's: a model that knows little would make its bars invisible.
+    most = 2.0 * max(abs(value) + width for value, width in zip(left, widths, strict=True))
+    if 0.0 < most < max(models):
+        axes.set_ylim(-most, most)
+    axes.set_ylabel(f"{row.symbol} − model\n({row.fine})")
 
 
 def runs_figure(
@@ -207,6 +232,9 @@ def _incline_panel(
             low = [value - width for value, width in zip(values, widths, strict=True)]
             high = [value + width for value, width in zip(values, widths, strict=True)]
             axes.fill_between(inclines, low, high, color=MODEL_BAND, alpha=0.6, linewidth=0)
+    for number, gap in enumerate(unanswered(curves) if key in curves else ()):
+        axes.axvspan(*gap, facecolor="none", edgecolor=RULE, hatch="////", linewidth=0,
+                     label="no answer of the model" if number == 0 else None, zorder=0)  # fmt: skip
     dots = list(_single_runs(analysis.runs, key))
     if dots:
         xs, ys = zip(*dots, strict=True)
@@ -220,6 +248,12 @@ def _incline_panel(
             label=f"mean of runs ± {LABELS[bars]}",
             **_MEAN,
         )
+
+
+def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """Inclines between those of the model's curves for which it has no answer, degrees."""
+    found = sorted(set(curves.get("incline_deg", ())))
+    return [(low, high) for low, high in pairwise(found) if high - low > _GAP_DEG]
 
 
 def _segments(curves: Mapping[str, Any]) -> Iterator[tuple[str, list[int]]]:
@@ -259,7 +293,6 @@ def _free_fall_line(axes: Axes, speed: float | None) -> None:
         xytext=(0, 3),
         textcoords="offset points",
         color=MUTED,
-        fontsize=8,
     )
 
 

@@ -60,7 +60,7 @@ def film_figure(film: Film, pictures: int = PICTURES) -> str:
                 axes.set_aspect("equal")
                 axes.set_xticks([])
                 axes.set_yticks([0.0, 0.5] if number == 0 else [])
-            front.set_title(f"{1e3 * film.times_s[moment]:.0f} ms", fontsize=8.5)
+            front.set_title(f"{1e3 * film.times_s[moment]:.0f} ms")
         drawing.axes[0].set_ylabel("height (m)")
         drawing.axes[pictures].set_ylabel("height (m), along the rods")
     return drawing.svg

@@ -17,17 +17,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rig.protocol.protocol import Gates, Protocol, Side
+    from rig.report.canvas import Canvas
 
 _WORDS: dict[Side, str] = {"impact": "strikes", "free": "falls beside it"}
 _COLOURS: dict[Side, str] = {"impact": SECOND, "free": MODEL}
 _WIDTH_IN = 9.0
 _WRAP = 100
-_LINE_IN = 0.155
+_LINE_IN = 0.195
 _NEAR_M = 0.16  # what is drawn larger once more
 _POST_M = 0.12  # from the chains to the posts, as drawn
 
 
-def mounting_figure(protocol: Protocol, gates: Gates) -> str:
+def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
     """Draw how the gates of a protocol are mounted.
 
     Parameters
@@ -39,8 +40,8 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> str:
 
     Returns
     -------
-    str
-        SVG; lengths in mm.
+    Canvas
+        Lengths are in mm.
     """
     inclines = _inclines(protocol)
     text = "\n".join([protocol.title, "", *_zero(protocol, gates), *_slots(protocol, gates)])
@@ -52,18 +53,19 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> str:
         top = max(gate.height for gate in gates.gates)
         low = min(gate.height for gate in gates.gates)
         hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
-        _side_view(whole, protocol, gates, 1.04 * max(top, hanging))
+        near = max(_NEAR_M, 1.5 * low)
+        # What lies below is named in the other view, where there is room.
+        _side_view(whole, protocol, gates, 1.04 * max(top, hanging), named_above=near)
         whole.set_ylabel("")
         whole.set_title("both posts, from the side", loc="left")
-        near = max(_NEAR_M, 1.5 * low)
         _side_view(close, protocol, gates, near)
         _name_inclines(close, protocol, 0.45 * near)
         close.set_title(f"close to the {protocol.zero}" if inclines else "lowest gates", loc="left")
         for panel in (below, empty):
             panel.axis("off")
-        words = below.text(0, 1, text, va="top", family="DejaVu Sans Mono", fontsize=7.0, color=INK)
+        words = below.text(0, 1, text, va="top", family="DejaVu Sans Mono", color=INK)
         words.set_in_layout(False)  # it goes on under the other panel
-    return drawing.svg
+    return drawing
 
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
@@ -101,8 +103,10 @@ def _inclines(protocol: Protocol) -> list[float]:
     return sorted(set(protocol.plan.inclines)) if protocol.surface is not None else []
 
 
-def _side_view(axes: Axes, protocol: Protocol, gates: Gates, top: float) -> None:
-    """Draw what is below a height, to scale; y, uphill, goes to the right."""
+def _side_view(
+    axes: Axes, protocol: Protocol, gates: Gates, top: float, named_above: float = 0.0
+) -> None:
+    """Draw what is below a height, to scale, and name gates; y, uphill, goes to the right."""
     post = _POST_M if top > 2 * _POST_M else top / 2
     for incline in _inclines(protocol):
         fall = math.tan(math.radians(incline))
@@ -123,15 +127,17 @@ def _side_view(axes: Axes, protocol: Protocol, gates: Gates, top: float) -> None
             [-1e3 * post, 1e3 * post], [1e3 * gate.height] * 2, color=_COLOURS[gate.side],
             linewidth=0.9, linestyle="-" if side < 0 else (0, (4, 3)), zorder=2,
         )  # fmt: skip
+        if gate.height < named_above:
+            continue
         axes.annotate(
-            f"{1e3 * gate.height:g}", (1e3 * side * post, 1e3 * gate.height), fontsize=7,
+            f"{1e3 * gate.height:g}", (1e3 * side * post, 1e3 * gate.height),
             xytext=(6 * side, 0), textcoords="offset points", va="center",
             ha="right" if side < 0 else "left", color=_COLOURS[gate.side],
         )  # fmt: skip
     axes.axhline(0, color=INK, linewidth=0.8, linestyle=":")
     axes.plot(0, 0, "x", color=INK, zorder=4)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlim(-1.6e3 * post, 1.6e3 * post)
+    axes.set_xlim(-2.2e3 * post, 2.2e3 * post)
     axes.set_ylim(-20, 1e3 * top)
     axes.set_xlabel("mm, uphill to the right" if _inclines(protocol) else "mm")
     axes.set_ylabel(f"mm above the {protocol.zero}" if _inclines(protocol) else "mm")
@@ -139,12 +145,13 @@ def _side_view(axes: Axes, protocol: Protocol, gates: Gates, top: float) -> None
 
 
 def _name_inclines(axes: Axes, protocol: Protocol, radius: float) -> None:
-    for incline in _inclines(protocol):
+    for place, incline in enumerate(_inclines(protocol)):
         slope = math.radians(incline)
         face = -face_below(protocol, incline)
-        at = (1e3 * radius * math.cos(slope), 1e3 * (face + radius * math.sin(slope)))
+        away = radius * (1.0 if place % 2 else 1.45)  # neighbours' names would meet
+        at = (1e3 * away * math.cos(slope), 1e3 * (face + away * math.sin(slope)))
         box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
-        axes.text(*at, f"{incline:g}°", fontsize=7, color=INK, ha="center", va="center", bbox=box)
+        axes.text(*at, f"{incline:g}°", color=INK, ha="center", va="center", bbox=box)
 
 
 def _mm(points: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 MINUS = "−"
+_NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
 
 
 def value_of(quantity: object) -> float | None:
@@ -37,6 +39,11 @@ def fixed(value: float | None, decimals: int) -> str:
     if not text.strip("-0."):
         text = text.lstrip("-")
     return text.replace("-", MINUS)
+
+
+def signed(text: str) -> str:
+    """Give negative numbers within a sentence a true minus sign."""
+    return _NEGATIVE.sub(MINUS, text)
 
 
 def decimals_for(uncertainty: float | None, default: int = 3) -> int:

@@ -87,18 +87,16 @@ def limit_lines(axes: Axes, limit_ms: float) -> None:
         xytext=(0, 3),
         textcoords="offset points",
         color=SECOND,
-        fontsize=8,
         ha="right",
     )
 
 
 def legend_above(axes: Axes) -> None:
-    """Put the legend above the panel, where no point can hide behind it."""
+    """Put the legend above all panels, where no point can hide behind it."""
     handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(
-            handles, labels, loc="lower left", bbox_to_anchor=(0, 1.08), ncols=4, borderaxespad=0
-        )
+    figure = axes.get_figure()
+    if handles and figure is not None:
+        figure.legend(handles, labels, loc="outside upper left", ncols=2 if len(labels) == 4 else 3)
 
 
 def run_axis(axes: Axes) -> None:
@@ -131,6 +129,5 @@ def mark_inclines(panels: Sequence[Axes], runs: Sequence[DropResult]) -> None:
             textcoords="offset points",
             ha="center",
             va="bottom",
-            fontsize=8,
             color=MUTED,
         )

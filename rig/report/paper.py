@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 from rig.measurands import SEPARATION, SPEED
@@ -14,15 +15,18 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from rig.report.canvas import Canvas
+
     Columns = Mapping[str, list[float]]
     _Kind = tuple[Callable[[], dict[str, list[float]]], Callable[[list[Axes], Columns], None], int]
 
-_LINE_HEIGHT = 0.17  # inches
+_LINE_HEIGHT = 0.19  # inches
+_WRAP = 96
 
 
 def paper_figure(
     number: int, resolved: Columns | None = None
-) -> tuple[str, dict[str, list[float]]]:
+) -> tuple[Canvas, dict[str, list[float]]]:
     """Draw one of the paper's figures.
 
     Parameters
@@ -35,12 +39,13 @@ def paper_figure(
 
     Returns
     -------
-    svg, columns
-        The figure, with what the text says and the equations do not below it; and its numbers.
+    drawing, columns
+        The figure, with what the text says of it and the equations do not below it; and its
+        numbers.
     """
     compute, draw, panels = _KINDS[number]
     columns = compute()
-    caption = _caption()
+    caption = _caption(number)
     foot = _LINE_HEIGHT * (caption.count("\n") + 2)
     with canvas((*((2.9,) * panels), foot), simulated=False) as drawing:
         *axes, below = drawing.axes
@@ -48,15 +53,28 @@ def paper_figure(
         if resolved is not None:
             _RESOLVED[number](axes, resolved)
         below.axis("off")
-        below.text(0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes)
+        below.text(0.0, 0.0, caption, va="bottom", transform=below.transAxes)
         # The caption's panel must not take the labels of the axis all panels share.
         axes[-1].tick_params(labelbottom=True)
-    return drawing.svg, columns
+    return drawing, columns
 
 
-def _caption() -> str:
-    said = "\n".join(f"· {claim.text}; equations: {claim.equations}" for claim in paper.claims())
-    return f"Where the paper's text (first) and its equations part:\n{said}"
+def _caption(number: int) -> str:
+    lines = ["Where the paper's text (first) and its equations part:"]
+    for claim in paper.claims():
+        if claim.figure == number:
+            said = f"· {claim.text}; equations: {claim.equations}"
+            lines += textwrap.wrap(said, _WRAP, subsequent_indent="   ")
+    return "\n".join([*_NOTES.get(number, ()), *lines])
+
+
+_NOTES = {
+    3: [
+        "No line between level and the solid one: up to arctan μ = 11.3° rods would not slide, and "
+        "the",
+        "model has no answer.",
+    ],
+}
 
 
 def _figure_3(axes: list[Axes], columns: Columns) -> None:
@@ -74,12 +92,12 @@ def _figure_3(axes: list[Axes], columns: Columns) -> None:
         panel.set_ylabel(row.axis)
     axes[0].legend(loc="upper right")
     axes[1].axhline(paper.TEXT_FREE_FALL_SPEED, color=SECOND, linestyle=":", linewidth=1.2)
-    axes[1].text(89, paper.TEXT_FREE_FALL_SPEED, "free fall in the text, 5.08 m/s ", color=SECOND,
-                 ha="right", va="top", fontsize=8)  # fmt: skip
+    axes[1].annotate("free fall in the text, 5.08 m/s", (89, paper.TEXT_FREE_FALL_SPEED), (0, -4),
+                     textcoords="offset points", color=SECOND, ha="right", va="top")  # fmt: skip
     axes[1].axhline(_free_fall(), color=MUTED, linestyle=":", linewidth=1.2)
-    axes[1].text(1, _free_fall(), " free fall by the equations", color=MUTED, va="bottom",
-                 fontsize=8)  # fmt: skip
-    axes[1].set_ylim(bottom=4.8)
+    axes[1].annotate("free fall by the equations", (1, _free_fall()), (0, 3),
+                     textcoords="offset points", color=MUTED, va="bottom")  # fmt: skip
+    axes[1].set_ylim(bottom=4.7)
     axes[1].set_xlabel("inclination of the surface (°)")
 
 

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.measurands import SEPARATION, SPEED, acceleration_in
+from rig.report.bars import LABELS
+from rig.report.budget import budget_figure
 from rig.report.embed import PageFigure
-from rig.report.figures import gravity_figure, incline_figure, runs_figure
+from rig.report.figures import gravity_figure, incline_figure, runs_figure, unanswered
 from rig.report.film import film_figure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from rig.analysis.session import Analysis
     from rig.films import Film
     from rig.report.bars import Bars
     from rig.sections import Sections
+
+_GAP = (
+    " Hatched: inclines at which the rods would not slide, so that the model has no answer between "
+    "the level surface and arctan μ."
+)
 
 
 def pictures(
@@ -52,7 +60,7 @@ def pictures(
     """
     measured = {name for one in analysis.runs for name in one.quantities}
     two = SEPARATION.name in measured
-    drawn = []
+    drawn: list[tuple[Callable[[], str], PageFigure]] = []
     if two or SPEED.name in measured:
         both = "Separation and end speed" if two else "End speed"
         apart = "Separation of the top rods and speed" if two else "Speed"
@@ -60,25 +68,40 @@ def pictures(
         drawn.append(
             (
                 lambda: incline_figure(analysis, curves, simulated, bars),
-                f"{both} against inclination",
-                f"{apart} of the {chain}'s end just before it reaches the surface, against "
-                "inclination; lines are the model.",
+                PageFigure(
+                    "",
+                    f"{both} against inclination",
+                    f"{apart} of the {chain}'s end just before it reaches the surface, against "
+                    "inclination; lines are the model, their band its U (95 %). Below each, "
+                    f"measured less predicted: bars are {LABELS[bars]} of the mean, and the wide "
+                    "ones about zero U of the prediction, cut off where they are far longer."
+                    + (_GAP if unanswered(curves or {}) else ""),
+                ),
             )
         )
     if two:
         drawn.append(
             (
                 lambda: runs_figure(analysis, simulated, skew_limit_s),
-                "Runs in order",
-                "Every run in the order of execution. Bars are expanded uncertainties (95 %).",
+                PageFigure(
+                    "",
+                    "Runs in order",
+                    "Every run in the order of execution. Bars are expanded uncertainties (95 %). "
+                    "Marks say which chain struck: where they lie apart, the chains are not "
+                    "alike; a skew that stays when the chains change places is the sides'.",
+                    "drops",
+                ),
             )
         )
     if acceleration_in(measured):
         drawn.append(
             (
                 lambda: gravity_figure(analysis, simulated, site_m_s2),
-                "Acceleration of each run",
-                "Acceleration, run by run. Bars are expanded uncertainties (95 %).",
+                PageFigure(
+                    "",
+                    "Acceleration of each run",
+                    "Acceleration, run by run. Bars are expanded uncertainties (95 %).",
+                ),
             )
         )
     for one in analysis.runs:
@@ -87,15 +110,20 @@ def pictures(
             drawn.append(
                 (
                     partial(film_figure, film),
-                    f"How run {one.run.number} fell",
-                    f"Run {one.run.number} as the simulation let it fall: the striking chain from "
-                    "the front and, below, along its rods. Slack strings are dotted.",
+                    PageFigure(
+                        "",
+                        f"How run {one.run.number} fell",
+                        f"Run {one.run.number} as the simulation let it fall: the striking chain "
+                        "from the front and, below, along its rods. Slack strings are dotted.",
+                        "impacts",
+                    ),
                 )
             )
             break
     found = []
-    for draw, alt, caption in drawn:
-        svg = sections.make(f'The figure "{alt}"', draw)
+    for draw, figure in drawn:
+        svg = sections.make(f'The figure "{figure.alt}"', draw)
         if svg is not None:
-            found.append(PageFigure(svg, alt, caption))
-    return found
+            found.append(replace(figure, svg=svg))
+    budget = sections.make("The figure of the budget", lambda: budget_figure(analysis, simulated))
+    return [*found, budget] if budget is not None else found

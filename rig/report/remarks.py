@@ -10,7 +10,7 @@ from rig.analysis.remedies import remedies
 from rig.analysis.result import Measured
 from rig.measurands import averaged
 from rig.report.columns import run_incline
-from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.report.numbers import decimals_for, fixed, plus_minus, signed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -72,7 +72,7 @@ def void_lines(analysis: Analysis) -> list[str]:
     for one in voids:
         tilt = run_incline(one)
         at = f" at {tilt}°" if tilt else ""
-        reasons = "; ".join(one.reasons)
+        reasons = signed("; ".join(one.reasons))
         lines.append(f"  run {one.run.number}, attempt {one.attempt}{at}: {reasons}")
     what = remedies(reason for one in voids for reason in one.reasons)
     return [*lines, "what to do:", *(f"  {one}" for one in what)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.measurands import SEPARATION, SPEED
-from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, canvas
+from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, SIZE, canvas
 from rig.sweep.compute import PILE
 from rig.sweep.variables import VARIABLES
 
@@ -20,14 +20,15 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
 
     from rig.model.batch import Flags, Floats
+    from rig.report.canvas import Canvas
     from rig.sweep.compute import Swept
     from rig.sweep.layout import Axis, Layout
 
-_LINE_HEIGHT = 0.17  # inches
-_WRAP = 110
+_LINE_HEIGHT = 0.19  # inches
+_WRAP = 96
 
 
-def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
+def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Canvas:
     """Draw a sweep.
 
     Parameters
@@ -39,8 +40,8 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
 
     Returns
     -------
-    str
-        SVG. Where the model has no answer the picture is empty; where the point lies beyond its
+    Canvas
+        Where the model has no answer the picture is empty; where the point lies beyond its
         domain, maps are hatched and curves dashed. Colours span what is found inside the domain.
     """
     caption = _caption(facts)
@@ -67,19 +68,20 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> str:
         for panel in (below, *empty):
             panel.axis("off")
         said = below.text(
-            0.0, 0.0, caption, fontsize=7.5, va="bottom", transform=below.transAxes,
+            0.0, 0.0, caption, va="bottom", transform=below.transAxes,
             parse_math=False,  # a title may have a $
         )  # fmt: skip
         said.set_in_layout(False)  # it may pass under the other map
         # The caption's panel must not take the labels of the axis all panels share.
         for panel in panels if flat else panels[-1:]:
             panel.tick_params(labelbottom=True)
-    return drawing.svg
+    return drawing
 
 
 def _caption(facts: Mapping[str, Any]) -> str:
     """Say in a few lines where the picture comes from."""
-    fixed = ", ".join(f"{name} = {value:g}" for name, value in facts["fixed"].items())
+    labels = {one.column: one.label for one in VARIABLES.values()}
+    fixed = "; ".join(_valued(labels[name], value) for name, value in facts["fixed"].items())
     lines = [
         f"{facts['title']}; chain {facts['chain']['name']}",
         f"fixed: {fixed or 'nothing'}",
@@ -87,6 +89,12 @@ def _caption(facts: Mapping[str, Any]) -> str:
         "hatched or dashed: beyond the model's domain; empty: no answer",
     ]
     return "\n".join(textwrap.fill(line, _WRAP) for line in lines)
+
+
+def _valued(label: str, value: float) -> str:
+    """Write a parameter as its axis would name it: ``drop = 0.18 m``."""
+    name, _, unit = label.partition(" (")
+    return f"{name} = {value:g} {unit.removesuffix(')')}".rstrip().replace(" °", "°")
 
 
 def _curve(panel: Axes, axis: Axis, values: Floats, swept: Swept) -> None:
@@ -129,7 +137,7 @@ def _map(panel: Axes, axes: tuple[Axis, ...], values: Floats, inside: Flags) -> 
         lines = panel.contour(
             across.values, up.values, values.T, levels=levels, colors=INK, linewidths=0.5
         )
-        panel.clabel(lines, fontsize=7.0)
+        panel.clabel(lines, fontsize=SIZE)
     panel.grid(visible=False)
     panel.set_xlabel(VARIABLES[across.name].label)
     panel.set_ylabel(VARIABLES[up.name].label)

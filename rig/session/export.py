@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.text_table import csv_text
-from rig.timers.edges_csv import write_edges
+from rig.timers.edges_csv import edges_text
 
 if TYPE_CHECKING:
     import os
@@ -34,6 +34,9 @@ _MEANINGS = {
     "verdict": "accepted, marginal, void or rejected",
     "reasons": "why, separated by semicolons",
     "n": "number of runs",
+    "quantity": "what is uncertain; its unit stands at the end of its name",
+    "source": "what makes it uncertain",
+    "u": "standard uncertainty by that source; the squares add up",
     "normalized_error": "difference from the prediction over its expanded uncertainty; within ±1 "
     "they agree",
     "channel": "gate",
@@ -61,21 +64,14 @@ def export_csv(
     analysis: Mapping[str, Any],
     tick_hz: Mapping[int, float | Fraction] | None = None,
 ) -> None:
-    """Write ``runs.csv``, ``summary.csv``, ``edges.csv``, ``states.csv``, ``pings.csv``, a README.
-
-    Columns are those the scene has; ``edges.csv`` is in the import format. Of one object there is
-    ``gates.csv`` too. Each file is replaced as a whole.
+    """Write what `csv_files` gives; each file is replaced as a whole.
 
     Parameters
     ----------
     directory
         Made where it does not exist.
-    session
-        Open, for the raw records.
-    analysis
-        What ``rig analyze --json`` prints.
-    tick_hz
-        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
+    session, analysis, tick_hz
+        As there.
 
     Raises
     ------
@@ -83,6 +79,34 @@ def export_csv(
         If a file cannot be written.
     """
     place = make_folder(directory)
+    for name, text in csv_files(session, analysis, tick_hz).items():
+        write_atomic(place / name, text)
+
+
+def csv_files(
+    session: Reader,
+    analysis: Mapping[str, Any],
+    tick_hz: Mapping[int, float | Fraction] | None = None,
+) -> dict[str, str]:
+    """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
+
+    Columns are those the scene has; ``edges.csv`` is in the import format. Of one object there is
+    ``gates.csv`` too.
+
+    Parameters
+    ----------
+    session
+        Open, for the raw records.
+    analysis
+        What ``rig analyze --json`` prints.
+    tick_hz
+        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
+
+    Returns
+    -------
+    dict
+        Texts by file name.
+    """
     latest, superseded = analysis.get("runs", []), analysis.get("superseded", [])
     # Where nothing is struck, nothing is inclined either.
     struck = any(run.get("impact_chain", "") is not None for run in (*latest, *superseded))
@@ -99,6 +123,12 @@ def export_csv(
     tables = {
         "runs.csv": runs,
         "summary.csv": [row(line) for line in analysis.get("summary", [])],
+        "budget.csv": [
+            {"run": run["run"], "attempt": run["attempt"]}
+            | {"quantity": line["quantity"], "source": line["name"], "u": line["u"]}
+            for run in (*latest, *superseded)
+            for line in run.get("budget", [])
+        ],
         "states.csv": [
             {**entry._asdict(), "reasons": "; ".join(entry.reasons)} for entry in session.states()
         ],
@@ -111,10 +141,9 @@ def export_csv(
     ]
     if gates:
         tables["gates.csv"] = gates
-    for name, rows in tables.items():
-        write_atomic(place / name, csv_text(_columns(rows), rows))
-    write_edges(place / "edges.csv", session.latest_drops(), tick_hz)
-    write_atomic(place / "README.txt", _readme(session, tables))
+    made = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
+    made["edges.csv"] = edges_text(session.latest_drops(), tick_hz)
+    return made | {"README.txt": _readme(session, tables)}
 
 
 def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:

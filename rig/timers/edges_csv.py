@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 from rig.boards import GATES
 from rig.errors import InputError
-from rig.files import write_atomic
 from rig.records import Drop, Edge
 from rig.timers.problems import Lines, ProblemList
 
@@ -76,17 +75,11 @@ def read_edges(path: str | os.PathLike[str]) -> list[Drop]:
     return [drop_of(run, edges) for run, edges in sorted(table.runs.items())]
 
 
-def write_edges(
-    path: str | os.PathLike[str],
-    drops: Iterable[Drop],
-    rates: Mapping[int, float | Fraction] | None = None,
-) -> None:
+def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
     """Write drops in the import format; `read_edges` gives the same edges back.
 
     Parameters
     ----------
-    path
-        The file to make or replace.
     drops
         At most one a run: the format does not know of attempts.
     rates
@@ -96,8 +89,6 @@ def write_edges(
     ------
     ValueError
         If two drops are of the same run.
-    InputError
-        If the file cannot be written.
     """
     text = io.StringIO()
     text.write(",".join(HEADER) + "\n")
@@ -111,7 +102,7 @@ def write_edges(
             f"{drop.run},{edge.channel},{_seconds(edge.tick, rate)},{int(edge.blocked)}\n"
             for edge in drop.edges
         )
-    write_atomic(path, text.getvalue())
+    return text.getvalue()
 
 
 class _Table:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from rig.analysis.result import DropResult, Measured
+    from rig.analysis.session import Analysis
     from rig.results.live import SessionView
     from rig.tui.motion import ChainFall, Table
 
@@ -149,11 +150,22 @@ def _expected_end(found: Sequence[ChainFall]) -> float:
 
 def incline_pictures(view: SessionView) -> list[Picture]:
     """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing."""
+    return inclined(view.analysis, view.curves)
+
+
+def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
+    """Draw the same of any analysis.
+
+    Parameters
+    ----------
+    curves
+        The model, as `rig.analysis.curves.model_curves` gives it.
+    """
     found = []
-    runs = [one for one in view.analysis.runs if one.verdict in GOOD]
+    runs = [one for one in analysis.runs if one.verdict in GOOD]
     for row in averaged():
         name, scale = row.name, row.scale
-        curve = view.curves.get(name)
+        curve = curves.get(name)
         if curve is None:
             continue
         dots = [
@@ -161,7 +173,7 @@ def incline_pictures(view: SessionView) -> list[Picture]:
             for one in runs
             if name in one.quantities
         ]
-        means = [line for line in view.analysis.summary if name in line.means]
+        means = [line for line in analysis.summary if name in line.means]
         inclines = [line.incline_deg for line in means]
         bars = [line.means[name].expanded for line in means]
         beside = [line for line in means if name in line.predicted]
@@ -171,7 +183,7 @@ def incline_pictures(view: SessionView) -> list[Picture]:
                 f"{row.label} ({row.unit})",
                 "incline (°)",
                 (
-                    *_model_lines(view.curves, name, scale),
+                    *_model_lines(curves, name, scale),
                     Series("dots", [x for x, _ in dots], [y for _, y in dots],
                            "secondary", "·", "runs"),
                     Series("bars", inclines, [line.means[name].value * scale for line in means],

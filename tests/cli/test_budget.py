@@ -25,6 +25,9 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
         assert 0.6 < trial["u"] / found["by_itself"][name]["u"] < 1.45
     table = rig("analyze", finished.session, "--budget", 1, "--trials", 2)
     assert "beam heights" in table.stdout
+    assert "Δz = " in table.stdout
+    assert "_m" not in table.stdout  # symbols, not names of JSON members
+    assert max(map(len, table.stdout.splitlines())) <= 80
 
 
 def test_kept_results_are_the_budget_s_as_long_as_the_session_does_not_go_on(finished, tmp_path):

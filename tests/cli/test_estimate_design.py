@@ -55,7 +55,7 @@ def test_a_report_has_the_impacts_too(call, finished, tmp_path):
     assert call("report", finished.session, "-o", tmp_path / "r.html").code == 0
     html = (tmp_path / "r.html").read_text("utf-8")
     for heading in ("Best single α", "End correction", "Single impulses"):
-        assert f"<h2>{heading}</h2>" in html
+        assert f"<h3>{heading}</h3>" in html
 
 
 def test_a_design_of_what_is_there(call, tmp_path):

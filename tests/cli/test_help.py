@@ -40,7 +40,7 @@ def test_examples_are_commands(line):
         (["analyze", "x", "--josn"], "usage: rig analyze"),
         (["run", "p", "--port", "sim://", "--session", "s", "--seed", "-1"], "found '-1'"),
         (["predict", "nothere.yaml", "--figure", "3"], "leave nothere.yaml out"),
-        (["predict", "--figure", "3", "-o", "x.png"], "x.png: a figure is written as .svg"),
+        (["predict", "--figure", "3", "-o", "x.doc"], "x.doc: a figure is written as .svg, .png"),
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
     ],
 )

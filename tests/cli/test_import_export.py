@@ -44,7 +44,15 @@ def bring(call, finished, exported, tmp_path):
 
 
 def test_every_table_is_written(exported, analysis, finished):
-    names = {"README.txt", "edges.csv", "pings.csv", "runs.csv", "states.csv", "summary.csv"}
+    names = {
+        "README.txt",
+        "budget.csv",
+        "edges.csv",
+        "pings.csv",
+        "runs.csv",
+        "states.csv",
+        "summary.csv",
+    }
     assert {path.name for path in exported.iterdir()} == names
     for row, run in zip(table(exported / "runs.csv"), analysis["runs"], strict=True):
         assert int(row["run"]) == run["run"]
@@ -61,6 +69,12 @@ def test_every_table_is_written(exported, analysis, finished):
         assert len(table(exported / "pings.csv")) == len(session.pings())
         edges = sum(len(drop.edges) for drop in session.drops())
     assert len(table(exported / "edges.csv")) == edges
+    (line, *_) = table(exported / "budget.csv")
+    assert {**line, "u": float(line["u"])} == {
+        "run": "1", "attempt": "1", "quantity": analysis["runs"][0]["budget"][0]["quantity"],
+        "source": analysis["runs"][0]["budget"][0]["name"],
+        "u": analysis["runs"][0]["budget"][0]["u"],
+    }  # fmt: skip
     assert (exported / "README.txt").read_text("utf-8").startswith("SIMULATED DATA")
 
 

@@ -115,9 +115,10 @@ def test_the_table_says_the_same(call, tmp_path):
     done = call("predict", PROTOCOLS / "inclined-uniform.yaml")
     assert done.code == 0
     heading, *rows = done.out.splitlines()
-    assert "Δz (cm)" in heading
+    assert "Δz ± U (cm)" in heading
+    assert max(map(len, (heading, *rows))) <= 80
     (row,) = [row for row in rows if row.split()[0] == "40"]
-    assert row.split()[1:3] == ["0.1551", "11.547"]
+    assert row.split()[1:3] == ["0.1551", "11.55"]
     path = tmp_path / "p.yaml"
     path.write_text(SINGULAR, "utf-8")
     heading, first, *_ = call("predict", path).out.splitlines()
@@ -191,7 +192,7 @@ def test_check_says_what_predict_notes(call, tmp_path):
     path.write_text(unlike, "utf-8")
     assert "  note: 0° A, 0° B: rods gather on a pile" in call("check", path).out
     path.write_text(short("[0 deg, 20 deg, 40 deg]"), "utf-8")
-    noted = {one.partition(": ")[2] for one in call("predict", path).out.splitlines()[4:]}
+    noted = {one.partition(": ")[2] for one in call("predict", path).out.splitlines()[5:]}
     assert noted == {note.partition("°: ")[2]}
 
 
@@ -205,7 +206,7 @@ def test_a_table_has_no_columns_of_what_is_not_there(call):
     assert fence[0].split() == ["speed", "(m/s)", "t", "(s)", "model"]
     assert len(fence) == 2
     single = call("predict", PROTOCOLS / "single-chain.yaml").out
-    assert "V (m/s)" in single
+    assert "V ± U (m/s)" in single
     assert "Δz" not in single
     assert "(cm)" not in single
 

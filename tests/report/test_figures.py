@@ -1,5 +1,6 @@
 """Figures are well-formed, repeat byte for byte, and survive what is missing."""
 
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -8,11 +9,13 @@ import pytest
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.films import Film
 from rig.protocol.protocol import Run
-from rig.report.canvas import SECOND
+from rig.report.canvas import PAPER, PARTS, SECOND, Canvas
+from rig.report.embed import dark_figure_css
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.film import film_figure
 from rig.report.pictures import pictures
 from rig.sections import Sections
+from rig.units import Quantity
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
@@ -39,6 +42,39 @@ def test_svg_is_well_formed_and_repeats() -> None:
         assert ElementTree.fromstring(svg).tag.endswith("svg")
         assert "<!-- SIMULATED DATA -->" in svg
         assert "dc:date" not in svg
+
+
+def test_every_colour_has_its_counterpart_on_a_dark_page() -> None:
+    drawn = [picture.svg for picture in pictures(TWO, CURVES, True, sections=Sections())]
+    known = re.findall(r"(?:fill|stroke): (#[0-9a-f]{6})\"", dark_figure_css())
+    # Markers are drawn through <use>, where rules that name what is around them do not reach.
+    assert all(line.startswith(("[style", "@", "}")) for line in dark_figure_css().splitlines())
+    for svg in [*all_three(), *drawn]:
+        used = set(re.findall(r"(?:fill|stroke): (#[0-9a-f]{6})", svg))
+        assert used - set(PARTS) <= set(known)
+        assert f"fill: {PAPER}" in svg  # a ground of its own
+
+
+def test_bars_of_residuals_are_seen_beside_a_model_that_knows_little() -> None:
+    vague = [
+        replace(line, predicted={"separation_m": Quantity(line.means["separation_m"].value, 0.05)})
+        for line in TWO.summary
+    ]
+    drawn = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Canvas, "svg", property(lambda self: drawn.append(self) or ""))
+        incline_figure(replace(TWO, summary=tuple(vague)), CURVES)
+    low, high = drawn[0].axes[1].get_ylim()
+    longest = max(line.means["separation_m"].expanded for line in vague) * 1e3
+    assert -low == high
+    assert longest < high < 4 * longest
+
+
+def test_where_the_model_has_no_answer_is_hatched() -> None:
+    gap = {**CURVES, "incline_deg": [0.0, 12.0, *CURVES["incline_deg"][2:]]}
+    assert "no answer of the model" in incline_figure(TWO, gap)
+    (first, *_) = pictures(TWO, gap, sections=Sections())
+    assert "arctan μ" in first.caption
 
 
 def test_the_stamp_is_for_simulated_data_only() -> None:
@@ -82,16 +118,17 @@ def test_without_a_prediction_the_mean_takes_its_place() -> None:
 
 
 def test_pictures_follow_the_scene() -> None:
-    assert len(pictures(TWO, CURVES, sections=Sections())) == 2
+    drawn = pictures(TWO, CURVES, sections=Sections())
+    assert [one.place for one in drawn] == ["results", "drops", "budget"]
     assert [picture.alt for picture in pictures(fake_analysis.gravity(), sections=Sections())] == [
         "Acceleration of each run"
     ]
     first = next(one for one in TWO.runs if one.verdict == "accepted")
     films = {(one.run.number, one.attempt): FILM for one in TWO.runs}
-    fell = pictures(TWO, CURVES, films=films, sections=Sections())[-1]
+    fell = pictures(TWO, CURVES, films=films, sections=Sections())[2]
     assert fell.alt == f"How run {first.run.number} fell"
     assert pictures(fake_analysis.EMPTY, sections=Sections()) == []
-    (picture,) = pictures(fake_analysis.single_chain(), sections=Sections())
+    picture, _ = pictures(fake_analysis.single_chain(), sections=Sections())
     assert "eparation" not in picture.alt + picture.caption
 
 

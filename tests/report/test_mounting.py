@@ -20,7 +20,7 @@ READY = [path for path in sorted(PROTOCOLS.glob("*.yaml")) if "\ngates:" in path
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
 def test_each_ready_protocol_has_its_drawing(path):
     protocol = read(path)
-    svg = mounting_figure(protocol, protocol.gates)
+    svg = mounting_figure(protocol, protocol.gates).svg
     ET.fromstring(svg)
     said = re.findall(r"<!-- (.*?) -->", svg)
     for gate in protocol.gates.gates:
@@ -54,7 +54,7 @@ def test_check_draws_it(tmp_path):
     fence = PROTOCOLS / "picket-fence.yaml"
     assert main(["check", str(fence), "-o", str(drawn)]) == 0
     protocol = read(fence)
-    assert drawn.read_text("utf-8") == mounting_figure(protocol, protocol.gates)
+    assert drawn.read_text("utf-8") == mounting_figure(protocol, protocol.gates).svg
 
 
 def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):

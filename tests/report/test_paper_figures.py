@@ -9,6 +9,7 @@ import pytest
 
 from rig import cli
 from rig.report import paper as figures
+from rig.report.canvas import KINDS
 
 
 @pytest.mark.parametrize("number", [3, 4, 6])
@@ -23,14 +24,34 @@ def test_a_figure_and_its_numbers(number, tmp_path):
 
 
 def test_figures_are_byte_for_byte_the_same():
-    assert figures.paper_figure(4) == figures.paper_figure(4)
+    (drawn, columns), again = figures.paper_figure(4), figures.paper_figure(4)
+    assert columns == again[1]
+    for kind in KINDS:
+        assert drawn.file(kind) == again[0].file(kind)
+
+
+@pytest.mark.parametrize(("number", "own", "other"), [
+    (3, "friction raises", "Eq. 15 within"), (6, "Eq. 15 within", "friction raises"),
+    (4, "graded chain", "Eq. 15 within"),
+])  # fmt: skip
+def test_a_caption_is_of_its_own_figure(number, own, other):
+    svg = figures.paper_figure(number)[0].svg
+    assert own in svg
+    assert other not in svg
+
+
+@pytest.mark.parametrize(("name", "begins"), [("figure.png", b"\x89PNG"), ("figure.pdf", b"%PDF")])
+def test_the_ending_says_the_kind_of_figure(name, begins, tmp_path):
+    assert cli.main(["predict", "--figure", "4", "-o", str(tmp_path / name)]) == 0
+    assert (tmp_path / name).read_bytes().startswith(begins)
+    assert (tmp_path / "figure.csv").exists()
 
 
 @pytest.mark.parametrize("arguments", [
     ["predict", "--figure", "3"],
-    ["predict", "--figure", "3", "-o", "figure.pdf"],
+    ["predict", "--figure", "3", "-o", "figure.doc"],
     ["predict"],
 ])  # fmt: skip
 def test_what_is_missing_is_said(arguments, capsys):
     assert cli.main(arguments) == 2
-    assert "-o FILE.svg" in capsys.readouterr().err
+    assert ".svg" in capsys.readouterr().err

@@ -78,7 +78,7 @@ def test_a_session_without_a_good_run_says_why(tmp_path):
     assert all(" at 40°: " in line for line in runs)
     assert rig("report", session, "-o", tmp_path / "r.html").returncode == 0
     what = told.splitlines()[told.splitlines().index("what to do:") + 1].strip()
-    assert f" → {what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
+    assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
 def joint(value: float, u: float) -> SimpleNamespace:

@@ -124,11 +124,11 @@ def test_a_page_says_what_it_lacks():
     page = report_html(
         ReportContext(title="t", analysis=two, simulated=True, figures=[figure], sections=sections)
     )
-    assert "The uncertainty budget could not be made: ValueError: " in page
+    assert "The figure of the budget could not be made: TypeError: " in page
     assert (
         "Separation and end speed against inclination&quot; could not be made: IndexError" in page
     )
-    assert "<h2>Runs</h2>" in page
+    assert "<h3>Every run</h3>" in page
 
 
 def test_a_missing_package_is_no_failed_section():
@@ -160,7 +160,7 @@ def test_a_report_is_written_without_its_estimate(single, tmp_path, capsys, monk
     assert capsys.readouterr().err.splitlines() == [sentence, f"report: {tmp_path / 'r.html'}"]
     html = (tmp_path / "r.html").read_text("utf-8")
     assert sentence in html
-    assert "<h2>Runs</h2>" in html
+    assert "<h3>Every run</h3>" in html
     assert "End speed against inclination" in html
 
 

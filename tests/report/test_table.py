@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from rig.analysis.result import Measured
+from rig.analysis.summary import Incline
 from rig.report.columns import aligned, run_columns, summary_table
 from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.remarks import clock_lines
@@ -13,18 +14,31 @@ from tests.report import fake_analysis
 
 
 def test_summary_is_aligned() -> None:
-    lines = summary_table(fake_analysis.two_chains().summary).splitlines()
-    assert len(lines) == 9
-    assert [word in lines[0] for word in ("incline (°)", "Δz ± U (cm)", "V ± U (m/s)", "Eₙ")]
-    ends = {line.index("±", 20) for line in lines[2:]}
-    assert len(ends) == 1
+    blocks = summary_table(fake_analysis.two_chains().summary).split("\n\n")
+    for block, measured in zip(blocks, ("Δz ± U (cm)", "V ± U (m/s)"), strict=True):
+        head, rule, *lines = block.splitlines()
+        assert len(lines) == 7
+        assert all(word in head for word in ("incline (°)", measured, "predicted ± U", "Eₙ"))
+        assert len({line.index("±", 12) for line in lines}) == 1
+        assert max(map(len, (head, rule, *lines))) <= 80
 
 
 def test_gravity_summary() -> None:
     heading, _, line = summary_table(fake_analysis.gravity().summary).splitlines()
     assert "Δz" not in heading
     assert "9.8188 ± 0.0027" in line
-    assert line.endswith("−0.47")
+    assert line.endswith("−0.47  agrees")
+
+
+@pytest.mark.parametrize(
+    ("value", "u", "said"), [(5.258, 0.0, "disagrees"), (5.258, 0.004, "agrees")]
+)
+def test_a_prediction_is_held_against_its_own_uncertainty(value, u, said) -> None:
+    mean = {"speed_m_s": Measured(5.26136, 0.0004)}
+    line = Incline(80.0, 12, mean, {}, {"speed_m_s": Quantity(value, u)})
+    told = summary_table([line]).splitlines()[-1]
+    assert told.endswith(said)
+    assert ("5.2580 ± 0.0078" in told) == bool(u)
 
 
 def test_no_summary() -> None:

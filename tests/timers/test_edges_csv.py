@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rig.errors import InputError, Problem
 from rig.records import Drop, Edge
 from rig.timers import edges_csv
-from rig.timers.edges_csv import TICK_HZ, read_edges, write_edges
+from rig.timers.edges_csv import TICK_HZ, edges_text, read_edges
 
 HEADER = "run,channel,time_s,state\n"
 
@@ -154,11 +154,11 @@ def test_unreadable(tmp_path: Path, name: str) -> None:
 def test_fire_stamped_drops_use_the_calibrated_rate(tmp_path: Path) -> None:
     path = tmp_path / "edges.csv"
     drop = Drop(run=4, attempt=2, tick_hz=2_000_000, edges=(Edge(1_000_000, 0, True),), fire_tick=7)
-    write_edges(path, [drop], {4: 1_999_000.5})
+    path.write_text(edges_text([drop], {4: 1_999_000.5}), "utf-8")
     time = Fraction(path.read_text().splitlines()[1].split(",")[2])
     assert abs(time - Fraction(1_000_000) / Fraction(1_999_000.5)) < Fraction(1, 10**12)
     with pytest.raises(ValueError, match="two drops"):
-        write_edges(path, [drop, drop])
+        edges_text([drop, drop])
 
 
 @st.composite
@@ -181,7 +181,7 @@ def imported_drops(draw: st.DrawFn) -> list[Drop]:
 @given(imported_drops())
 def test_round_trip(tmp_path_factory: pytest.TempPathFactory, drops: list[Drop]) -> None:
     path = tmp_path_factory.mktemp("round") / "edges.csv"
-    write_edges(path, drops)
+    path.write_text(edges_text(drops), "utf-8")
     assert read_edges(path) == drops
 
 

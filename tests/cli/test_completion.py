@@ -1,0 +1,62 @@
+"""A shell completes what is typed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rig.command_help import GROUPS
+from tests.waiting import PATIENCE_S
+
+
+def completed(tmp_path: Path, line: str) -> set[str]:
+    """Ask as the shells' functions do."""
+    answer = tmp_path / "answer"
+    asked = {
+        "_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line,
+        "COMP_POINT": str(len(line)), "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
+    }  # fmt: skip
+    subprocess.run(
+        [sys.executable, "-m", "rig"], env=os.environ | asked, check=True, timeout=PATIENCE_S
+    )
+    return {word.strip() for word in answer.read_text("utf-8").splitlines()}
+
+
+def test_commands_options_choices_and_files_are_completed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").touch()
+    every = {name for names in GROUPS.values() for name in names}
+    assert every <= completed(tmp_path, "rig ")
+    assert completed(tmp_path, "rig analyze my.session --bud") == {"--budget"}
+    assert completed(tmp_path, "rig report my.session --bars half") == {"half-SD"}
+    assert completed(tmp_path, "rig check min") == {"mine.yaml"}
+
+
+@pytest.mark.parametrize(
+    ("shell", "word"), [("bash", "complete -o"), ("zsh", "compdef"), ("fish", "complete --command")]
+)
+def test_each_shell_has_its_own_words(call, shell, word):
+    done = call("completion", shell)
+    assert (done.code, done.err) == (0, "")
+    assert word in done.out
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_bash_reads_what_is_printed(tmp_path):
+    script = """
+    eval "$(rig completion bash)"
+    COMP_WORDS=(rig ana) COMP_CWORD=1 COMP_LINE="rig ana" COMP_POINT=7
+    _python_argcomplete rig ana rig
+    echo "${COMPREPLY[@]}"
+    """
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-c", script], env=os.environ | {"PATH": path}, capture_output=True, text=True,
+        check=True, timeout=PATIENCE_S, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.stdout.split() == ["analyze"]
