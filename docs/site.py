@@ -25,7 +25,8 @@ NAV: dict[str, tuple[str, ...]] = {
                 "rig/daemon/API.md", "docs/tui/README.md"),
     "Understand": ("docs/method.md", "docs/benchmarks.md", "docs/resolved-world.md",
                    "docs/threats.md", "docs/results/layouts/layouts.md",
-                   "docs/results/diagnoses/diagnoses.md"),
+                   "docs/results/diagnoses/diagnoses.md",
+                   "docs/results/robustness.md"),
     "Work on it": ("docs/architecture.md", "CONTRIBUTING.md", "docs/decisions/*.md",
                    "CHANGELOG.md"),
 }  # fmt: skip

@@ -180,3 +180,9 @@ def test_any_few_edges_give_a_verdict(scene, edges):
     assert result.verdict == "void"
     assert result.reasons
     assert result.audit.received <= len(edges)
+
+
+def test_of_a_record_that_lasts_minutes_the_fullest_seconds_are_searched():
+    times, expected = np.array([0.0, 100.0, 101.0, 102.0, 200.0]), np.arange(5)
+    kept = pattern._densest(times, expected, np.zeros(5), np.zeros(5))
+    assert [list(one) for one in kept] == [[100.0, 101.0, 102.0], [1, 2, 3]]

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from rig.link.messages import Phase
+from rig.link.messages import TEST_RUN, Phase, pack_label
 from rig.recorder.controller import Controller
 from tests.daemon.rig_in_a_box import Box, Trouble
 
@@ -124,6 +124,27 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeyp
     assert another.unsaved()
     another.close()
     assert box.phase is Phase.HOLDING
+    box.ends_well()
+    recorder = box.worker.controller.recorder
+    monkeypatch.setattr(recorder, "held", lambda: box.fell[-1])  # acknowledged in vain
+    assert not box.worker.controller.unsaved()
+    box.kill()
+
+
+def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(tmp_path, monkeypatch):
+    box = Box(tmp_path, monkeypatch)
+    box.board.lab.drop = lambda _label: []
+    device, label = box.worker.controller.recorder.device, pack_label(TEST_RUN, 1)
+    order = {"gates": 3, "release": 1, "pulse_us": 80_000, "timeout_ms": 1000, "record_ms": 180}
+    device.fire(device.arm(label=label, **order))
+    box.clock.sleep(1.0)
+    assert box.phase is Phase.HOLDING
+    assert not box.worker.controller.unsaved()
+    box.kill()
+    box.resume()
+    assert box.phase is Phase.IDLE
+    assert isinstance(box.arm(), int)
+    box.kill()
 
 
 @pytest.mark.slow

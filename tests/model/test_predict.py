@@ -74,6 +74,31 @@ def test_uncertain_gravity_moves_the_speed_alone():
     assert found.separation_u < 1e-15
 
 
+def test_a_small_uncertain_speed_and_little_air_count():
+    given = {key: Quantity(number, 0.0) for key, number in CENTRE.items()}
+    scene = CHAIN, Surface(given["beta"], given["mu"]), 40.0, given["drop"], given["gravity"]
+
+    def pushed(value, u=0.0):
+        return predict(*scene, initial_speed=Quantity(value, u))
+
+    def held(share, u=0.0):
+        return predict(*scene, kappas=[0.01 * share] * len(CHAIN.masses), drag_u=u)
+
+    for found, value in ((pushed, 0.1), (held, 1.0)):
+        u = 0.5 * value
+        moved = abs(found(value + u).speed - found(value - u).speed) / 2
+        assert moved > 0.0
+        assert found(value, u).speed_u == pytest.approx(moved, rel=1e-9)
+
+
+def test_gravity_that_may_be_nearly_nothing_is_halved_and_no_less():
+    g, u = CENTRE["gravity"], 0.9 * CENTRE["gravity"]
+    found = with_u(gravity=u)
+    high, low = math.sqrt((g + u) / g), math.sqrt(0.5)
+    wanted = found.speed * (high - low) * u / (u + g / 2)
+    assert found.speed_u == pytest.approx(wanted, rel=1e-11)
+
+
 def test_exact_inputs_leave_no_uncertainty():
     found = with_u()
     assert (found.separation_u, found.speed_u) == (0.0, 0.0)
