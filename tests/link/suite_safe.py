@@ -155,6 +155,7 @@ class SilenceSuite(Suite):
 class StopSuite(Suite):
     def test_an_open_stop_forbids_arming(self, stoppable, device):
         stoppable.stop(True)
+        stoppable.clock().sleep(1e-3)  # it acts within that
         assert "emergency stop" in self.refused(Reason.STOPPED, arm, device).message
         self.refused(Reason.STOPPED, arm, device, release=0, pulse_us=0)
         self.refused(Reason.BAD_PARAMETER, arm, device, gates=0)
@@ -162,6 +163,7 @@ class StopSuite(Suite):
         self.refused(Reason.STOPPED, arm, device)
         stoppable.lab.hanging = 0
         stoppable.stop(False)
+        stoppable.clock().sleep(1e-3)
         device.fire(arm(device))
 
     def test_opening_it_disarms(self, stoppable, device):
@@ -250,8 +252,10 @@ class CoolingSuite(Suite):
     def test_an_open_stop_comes_before_cooling(self, stoppable, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
         stoppable.stop(True)
+        stoppable.clock().sleep(1e-3)  # it acts within that
         self.refused(Reason.STOPPED, arm, device)
         stoppable.stop(False)
+        stoppable.clock().sleep(1e-3)
         self.refused(Reason.COOLING, arm, device)
 
 
