@@ -54,7 +54,7 @@ def test_a_protocol_with_drawings_and_four_drops(call, tmp_path, monkeypatch):
     }  # fmt: skip
     assert "Mega" in (tmp_path / "my-ball-wiring.svg").read_text("utf-8")
     assert "SIMULATED DATA" in done.out
-    assert "trial drops" in done.out or "predicted g (m/s²)" in done.out
+    assert "trial drops" in done.out or "g ± U (m/s²)" in done.out
     assert done.err.count("run ") >= 4
     again = call("new", "my-ball.yaml", "--yes")
     assert (again.code, "is there already" in again.err) == (2, True)
