@@ -10,10 +10,12 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
 
+from rig.errors import RigError
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.stillness import STILL_S
@@ -80,6 +82,8 @@ def terminal() -> Iterator[Terminal]:
     folder = short_folder()
     found = Terminal(folder)
     yield found
+    with suppress(RigError):  # it may have ended with the test
+        os.kill(_daemon_of(folder), signal.SIGTERM)
     subprocess.run(["tmux", "-S", str(found.socket), "kill-server"], check=False)
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -165,7 +169,6 @@ def test_nothing_is_armed_by_hands_on_a_real_keyboard(terminal):
         assert {entry.state for entry in found.states()} <= {RunState.PLANNED}
     terminal.enters("Enter arm")  # and by the deliberate step it is
     terminal.sees("run 1, attempt 1", "release skew")
-    os.kill(_daemon_of(terminal.folder), signal.SIGTERM)
 
 
 def _daemon_of(folder: Path) -> int:

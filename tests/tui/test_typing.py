@@ -10,7 +10,9 @@ from dataclasses import replace
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from rich.style import Style
 from textual import events
+from textual.widgets import OptionList
 
 from rig.campaign.machine import Flow, Stage
 from rig.records import Job
@@ -19,6 +21,7 @@ from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from rig.tui.pictures import QUIET, FakeClient
+from rig.tui.screens.palette import Palette
 from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.tui.lab import KEYS, run
@@ -190,6 +193,23 @@ def test_what_is_typed_as_the_terminal_ends_is_nobody_s(session):
         ):
             await app.on_event(event)
         assert len(app.client.told) == known
+
+    run(work())
+
+
+def test_a_click_on_a_line_that_is_gone_takes_nothing(session):
+    async def work():
+        async with _screen(session) as (app, pilot):
+            await pilot.press("ctrl+p")
+            while not isinstance(app.screen, Palette):
+                await pilot.pause(0.01)
+            options = app.screen.query_one(OptionList)
+            gone = Style(meta={"option": options.option_count})
+            options.post_message(
+                events.Click(options, 1, 1, 0, 0, 1, False, False, False, style=gone)
+            )
+            await pilot.pause()
+            assert isinstance(app.screen, Palette)
 
     run(work())
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from textual import on
+from textual import events, on
 from textual.content import Content
 from textual.fuzzy import Matcher
 from textual.widgets import Input, OptionList
@@ -28,6 +28,15 @@ class Choice(NamedTuple):
     hindrance: str = ""
 
 
+class _Choices(OptionList):
+    """A list that changes as one types: what is clicked may be gone by the time it is heard of."""
+
+    async def _on_click(self, event: events.Click) -> None:
+        at = event.style.meta.get("option")
+        if at is not None and at >= self.option_count:
+            event.prevent_default()
+
+
 class Palette(Dialog[str | None]):
     """Choose an action; gives its name."""
 
@@ -43,7 +52,7 @@ class Palette(Dialog[str | None]):
 
     def contents(self) -> ComposeResult:
         yield Input(placeholder="what is to be done?")
-        yield OptionList(markup=False)
+        yield _Choices(markup=False)
         yield Words(id="how")
 
     def on_mount(self) -> None:
