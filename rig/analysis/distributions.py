@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+COVERAGE_95 = 1.959963984540054
+"""`coverage_factor` of the normal distribution, for where scipy is not worth its import."""
 _ONCE_IN = 1e-3
 _MANY = 1e6  # beyond this the distribution is normal to the last digit that anybody is shown
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from statistics import NormalDist
 from typing import TYPE_CHECKING
 
+from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import print_json, say
 from rig.errors import InputError
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import predictions
 from rig.protocol import reader
-from rig.report.columns import degrees
-from rig.report.numbers import fixed, plus_minus
+from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
@@ -23,10 +22,6 @@ if TYPE_CHECKING:
     from rig.measurands import Measurand
     from rig.predictions import PredictedIncline
     from rig.protocol.protocol import Protocol
-
-
-_COVERAGE = NormalDist().inv_cdf(0.975)
-"""Of U for 95 %: what a protocol states is known exactly."""
 
 
 def main(arguments: Namespace) -> int:
@@ -87,7 +82,7 @@ def _written(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
         return fixed(None if value is None else value * row.scale, row.decimals + 1)
-    return plus_minus({"value": value, "U95": _COVERAGE * u}, row.scale)
+    return plus_minus({"value": value, "U95": COVERAGE_95 * u}, row.scale)
 
 
 def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:

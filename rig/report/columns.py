@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rig.analysis.result import Audit, Measured
 from rig.measurands import acceleration_in, averaged, listed
-from rig.report.numbers import MINUS, fixed, plus_minus
+from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
@@ -33,11 +33,6 @@ class Column(Generic[T]):
     heading: str
     cell: Callable[[T], str]
     numeric: bool = True
-
-
-def degrees(incline_deg: float) -> str:
-    """Write an inclination."""
-    return f"{incline_deg:g}".replace("-", MINUS)
 
 
 def summary_incline(line: Incline) -> str:

@@ -46,6 +46,11 @@ def signed(text: str) -> str:
     return _NEGATIVE.sub(MINUS, text)
 
 
+def degrees(incline_deg: float) -> str:
+    """Write an inclination."""
+    return f"{incline_deg:g}".replace("-", MINUS)
+
+
 def decimals_for(uncertainty: float | None, default: int = 3) -> int:
     """Decimals that show two significant digits of an uncertainty (GUM 7.2.6)."""
     if uncertainty is None or uncertainty <= 0:

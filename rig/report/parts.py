@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS, averaged, told
 from rig.report.bars import LABELS, bar
-from rig.report.columns import Column, degrees, summary_incline
-from rig.report.numbers import fixed, plus_minus
+from rig.report.columns import Column, summary_incline
+from rig.report.numbers import degrees, fixed, plus_minus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from rig.analysis.distributions import chi2_tail, coverage_factor
+from rig.analysis.distributions import COVERAGE_95, chi2_tail, coverage_factor
 from tests.examples import examples
 
 
@@ -51,6 +51,7 @@ def test_infinitely_many_degrees_are_the_normal_distribution():
     excess = (normal**2 + 1) / 4e6
     assert coverage_factor(math.inf) / normal - 1 == pytest.approx(excess, rel=1e-5)
     assert coverage_factor(1e9) == coverage_factor(math.inf)
+    assert normal == pytest.approx(COVERAGE_95, rel=1e-15)
 
 
 def test_more_degrees_never_need_a_larger_factor():

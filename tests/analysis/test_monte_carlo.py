@@ -97,7 +97,7 @@ def test_trials_of_a_session_are_said_run_by_run():
             assert one["low"] < one["mean"] < one["high"]
             assert type(one["agrees"]) is bool
             assert one["u_ratio"] > 0.0
-    head, *lines = trials_lines(found)
+    head, _, *lines = trials_lines(found)
     assert "3 trials, seed 1" in head
     assert len(lines) == len(found["runs"][0]["quantities"])
     assert all("of 4 agree" in line for line in lines)

@@ -249,6 +249,8 @@ def test_another_package_of_the_same_name_is_named(tmp_path, monkeypatch):
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
         (info / "RECORD").write_text(f"{module}/__init__.py,,\n")
+        (tmp_path / module).mkdir(exist_ok=True)
+        (tmp_path / module / "__init__.py").touch()  # only what is there counts for some
     monkeypatch.setattr("sys.path", [str(tmp_path)])
     assert look_at_packages() == ("rig",)
     assert "pip uninstall rig chainrig" in other_packages(look_at_packages()).advice

@@ -44,7 +44,7 @@ def test_from_the_board_heights_are_those_above_its_face():
     protocol = parse(f"{text}\ncontact: {{datum: board}}\n")
     uphill, _ = beam_ends(protocol, 40e-3, 40)
     assert uphill == pytest.approx(40e-3 / math.tan(math.radians(40)))
-    drawn = mounting_figure(protocol, protocol.gates)
+    drawn = mounting_figure(protocol, protocol.gates).svg
     assert "mm above the board" in drawn
     assert "contact point" not in drawn
 

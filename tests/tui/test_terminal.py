@@ -162,7 +162,8 @@ def test_nothing_is_armed_by_hands_on_a_real_keyboard(terminal):
         time.sleep(STILL_S)
         terminal.press("3")
         time.sleep(STILL_S)
-        return "Enter arm" in terminal.screen()
+        screen = terminal.screen()
+        return "Enter arm" in screen and "┏" not in screen
 
     until(prepared)
     with Session.open(session, readonly=True) as found:
