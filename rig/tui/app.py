@@ -47,7 +47,8 @@ TICK_S = 0.1
 _COUNTED_S = 0.3
 """Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
 _TOLD_S = 15.0
-_SHARE = 0.17  # of a core, that this may take on a slow machine
+_SHARE = 0.15  # of a core, that this may take for long
+_SAVED_S = 0.3  # of processor time: enough to draw a whole fall at each tick
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
     Stage.DEVICE: "device",
@@ -162,7 +163,7 @@ class RigApp(App[None], inherit_bindings=False):
         self._turned_to = ""
         self._stillness = Stillness(options.still_s)
         self._last = monotonic()
-        self._spent = process_time()
+        self._spent, self._saved_s = process_time(), _SAVED_S
         self._told, self._told_s = "", 0.0
         self._followed = ""
         self._rang_at = start
@@ -201,14 +202,15 @@ class RigApp(App[None], inherit_bindings=False):
         self.run_worker(work, group="beside")
 
     async def _tick(self) -> None:
-        # Ten times a second, and down to five where that takes too much of the machine.
-        before, self._spent = self._spent, process_time()
-        pause = max(TICK_S, (self._spent - before) / _SHARE)
+        # Ten times a second, and down to five where that takes too much of the machine for long.
+        now, spent = monotonic(), process_time()
+        passed, self._last = now - self._last, now
+        took, self._spent = spent - self._spent, spent
+        self._saved_s = min(_SAVED_S, self._saved_s + _SHARE * passed - took)
+        pause = TICK_S if self._saved_s > 0.0 else max(TICK_S, took / _SHARE)
         self.set_timer(min(pause, 2 * TICK_S), self._tick)
         if not self._open():
             return
-        now = monotonic()
-        passed, self._last = now - self._last, now
         self._stillness.alive(now)
         if self.flow.stage is Stage.COUNTDOWN:
             self.driver.take(Tick(min(passed, _COUNTED_S)))
