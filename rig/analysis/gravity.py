@@ -114,6 +114,7 @@ def check_gravity(
     return GravityCheck(mean, protocol.gravity, len(found))
 
 
+@one_thread
 def free_gravity(
     protocol: Protocol, result: DropResult, drop: Drop, scale: TimeScale
 ) -> Measured | None:

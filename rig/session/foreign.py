@@ -134,10 +134,17 @@ def fitting(row: tuple[Any, ...], kinds: str) -> tuple[Any, ...]:
     TypeError
         Another kind.
     """
+    if tuple(map(type, row)) == _types(kinds):  # as nearly all are, and edges are many
+        return row
     for value, kind in zip(row, kinds, strict=True):
         if type(value) is not _KINDS[kind.lower()] and not (value is None and kind.isupper()):
             raise TypeError(f"{value!r:.40} is not {kind}")
     return row
+
+
+@cache
+def _types(kinds: str) -> tuple[type, ...]:
+    return tuple(_KINDS[kind.lower()] for kind in kinds)
 
 
 def texts(told: str) -> tuple[str, ...]:
