@@ -579,7 +579,11 @@ def _count(text: str) -> int:
 
 
 def _trials(text: str) -> int | None:
-    return None if text == "adaptive" else _count(text)
+    if text == "adaptive":
+        return None
+    if not text.lstrip("+-").isdecimal():
+        raise argparse.ArgumentTypeError(f"found '{text}', neither a whole number nor adaptive")
+    return _count(text)
 
 
 def _seed(text: str) -> int:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from rig.analysis.session import Analysis
+    from rig.measurands import Measurand
     from rig.session.reading import Reader
 
 SEED = 1
@@ -126,14 +127,14 @@ def _table(found: Mapping[str, Any]) -> list[str]:
     for name, one in found["budget"].items():
         row = MEASURANDS[name]
         whole = plus_minus(one, row.scale)
-        u = fixed(row.fine_scale * one["u"], decimals_for(row.fine_scale * one["u"]))
         lines += [
             "",
-            f"{row.symbol} = {whole} {row.unit} (U, 95 %), u = {u} {row.fine}, "
+            f"{row.symbol} = {whole} {row.unit} (U, 95 %), "
+            f"u = {_written(row, one['u'])} {row.fine}, "
             f"ν = {one['degrees']:.0f}, k = {one['k']:.2f}",
         ]
         lines += [
-            f"  {line['name']:<18}{_small(row.fine_scale * line['u']):>10} {row.fine:<5}"
+            f"  {line['name']:<18}{_written(row, line['u']):>10} {row.fine:<5}"
             f"{100 * line['share']:6.1f} %"
             for line in one["lines"]
         ]
@@ -141,8 +142,8 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         digits = decimals_for(row.scale * trial["u"])
         low, high = (fixed(row.scale * trial[end], digits) for end in ("low", "high"))
         lines += [
-            f"  by itself u = {row.fine_scale * alone['u']:.2g} {row.fine}; by {drawn['trials']} "
-            f"trials (seed {drawn['seed']}) {row.fine_scale * trial['u']:.2g} {row.fine}",
+            f"  by itself u = {_written(row, alone['u'])} {row.fine}; by {drawn['trials']} "
+            f"trials (seed {drawn['seed']}) {_written(row, trial['u'])} {row.fine}",
             f"  95 % of trials in {low} … {high} {row.unit}: "
             + ("both agree" if trial["agrees"] else "they do not agree")
             + ("" if trial["decided"] else " (of so few, chance)"),
@@ -150,8 +151,10 @@ def _table(found: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _small(u: float) -> str:
-    return f"{u:.2g}" if u >= _LEAST else f"< {_LEAST:g}"
+def _written(row: Measurand, u: float) -> str:
+    """Write a standard uncertainty in a quantity's finer unit."""
+    fine = row.fine_scale * u
+    return fixed(fine, decimals_for(fine)) if fine >= _LEAST else f"< {_LEAST:g}"
 
 
 def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:

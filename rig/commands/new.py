@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.boards import BOARDS
+from rig.boards import BOARDS, GATES
 from rig.commands.output import print_results, say
 from rig.errors import InputError
 from rig.files import write_atomic
@@ -18,6 +18,7 @@ from rig.protocol.draft import SCENES, STRUCK, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED, wiring_picture
 from rig.recorder.interrupts import Interrupts
+from rig.report.canvas import write_figure
 from rig.report.mounting import mounting_figure
 from rig.runner import Operator, run_protocol
 
@@ -71,9 +72,8 @@ def _answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     )
     board = _asked(arguments, _Question("board", "Which timer?", "pico", (*BOARDS, _OTHER)))
     struck, body = scene in STRUCK, scene in {"object", "track"}
-    few = {"two-chains": "4", "picket-fence": "2"}.get(scene, "4")
-    gates = _asked(arguments, _Question("gates", "How many gates?", few))
     fence = scene == "picket-fence"
+    gates = _asked(arguments, _Question("gates", "How many gates?", "2" if fence else "4"))
     rods, length = "1", ""
     if not body:
         what = "bars" if fence else "rods in a chain"
@@ -97,11 +97,9 @@ def _answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     repeats = _asked(arguments, _Question("repeats", "How many drops of a kind?", "12"))
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
     chosen: Scene = next(one for one in SCENES if one == scene)
-    counts = {"gates": gates, "rods": rods, "repeats": repeats}
-    whole = {name: _count(name, said) for name, said in counts.items()}
     return board, Draft(
-        title, chosen, whole["gates"], whole["rods"], length, diameter, drop, inclines,
-        whole["repeats"],
+        title, chosen, _count("gates", gates, GATES), _count("rods", rods), length, diameter, drop,
+        inclines, _count("repeats", repeats),
     )  # fmt: skip
 
 
@@ -128,9 +126,9 @@ def _asked(
         say(f"  accepted: {', '.join(question.accepted)}")
 
 
-def _count(name: str, said: str) -> int:
-    if not said.isdecimal() or not 1 <= int(said) <= 1000:
-        raise InputError(f"--{name}: found {said}; a whole number from 1 to 1000 is wanted")
+def _count(name: str, said: str, most: int = 1000) -> int:
+    if not said.isdecimal() or not 1 <= int(said) <= most:
+        raise InputError(f"--{name}: found {said}; a whole number from 1 to {most} is wanted")
     return int(said)
 
 
@@ -138,7 +136,7 @@ def _draw(protocol: Protocol, board: str, path: Path) -> None:
     """Draw where gates go and, for boards of which there is a picture, what is wired to them."""
     assert protocol.gates is not None
     mounting = path.with_name(f"{path.stem}-mounting.svg")
-    write_atomic(mounting, mounting_figure(protocol, protocol.gates).svg)
+    write_figure(mounting, mounting_figure(protocol, protocol.gates))
     say(f"mounting: {mounting}")
     if board in WIRED:
         wiring = path.with_name(f"{path.stem}-wiring.svg")

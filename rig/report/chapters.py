@@ -21,7 +21,7 @@ from rig.report.columns import (
     summary_incline,
 )
 from rig.report.embed import embedded
-from rig.report.finding import finding
+from rig.report.finding import finding, raised
 from rig.report.method import METHOD, PAPER, SOFTWARE, method_words
 from rig.report.numbers import fixed, plus_minus, signed
 from rig.report.tables import bullets, paragraphs, scrolling, table
@@ -78,7 +78,7 @@ def _short(context: ReportContext) -> str:
     if context.simulated:
         said += paragraphs(["No chain fell: these drops were simulated."], "note")
     notes = [*context.notes, *context.sections.failed.values()]
-    return said + bullets(f"{note[:1].upper()}{note[1:]}" for note in notes)
+    return said + bullets(map(raised, notes))
 
 
 def _figures(context: ReportContext, place: str) -> str:
@@ -117,8 +117,7 @@ def _summary(lines: Sequence[Incline]) -> str:
 
 
 def _titled(row: Measurand) -> str:
-    title = f"{row.title} {row.symbol}"
-    return title[0].upper() + title[1:]
+    return raised(f"{row.title} {row.symbol}")
 
 
 def _budget(context: ReportContext) -> str:

@@ -28,14 +28,19 @@ def finding(analysis: Analysis) -> str:
     str
         Two or three sentences.
     """
-    said = [counted(analysis)]
+    said = [raised(counted(analysis))]
     if analysis.summary:
         shown = [row for row in averaged() if _lines(analysis.summary, row)]
         said.append("; ".join(_range(_lines(analysis.summary, row), row) for row in shown))
-        said.append(_agreement(analysis.summary, shown))
+        said.append(raised(_agreement(analysis.summary, shown)))
     elif analysis.runs:
-        said.append("no mean can be given")
-    return " ".join(f"{one[0].upper()}{one[1:]}." for one in said if one)
+        said.append("No mean can be given")
+    return " ".join(f"{one}." for one in said)
+
+
+def raised(text: str) -> str:
+    """Begin text with a capital; not for what begins with a symbol, since g is not G."""
+    return text[:1].upper() + text[1:]
 
 
 def counted(analysis: Analysis) -> str:

@@ -30,6 +30,12 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
     assert max(map(len, table.stdout.splitlines())) <= 80
 
 
+def test_a_mistyped_number_of_trials_is_told_both_ways():
+    done = rig("analyze", "any.session", "--budget", 1, "--trials", "adaptve")
+    assert done.returncode == 2
+    assert "found 'adaptve', neither a whole number nor adaptive" in done.stderr
+
+
 def test_kept_results_are_the_budget_s_as_long_as_the_session_does_not_go_on(finished, tmp_path):
     """To work them out again is most of the work, and says the same to the last digit."""
     session = finished.copy(tmp_path)

@@ -88,6 +88,7 @@ def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
             "found 12; the board (Arduino Uno) has gates",
         ),
         (["--gates", "many"], "--gates: found many; a whole number"),
+        (["--gates", "99"], "--gates: found 99; a whole number from 1 to 16"),
         (["--diameter", "20"], "diameter"),
         (["--drop", "900 mm}"], "drop"),
         (["--scene", "one-chain", "--rods", "3", "--length", "50 mm", "--gates", "9"], "no place"),

@@ -46,8 +46,20 @@ class Terminal:
         )  # fmt: skip
         return done.stdout
 
-    def start(self, *command: str) -> None:
-        self.tmux("new-session", "-d", "-x", "100", "-y", "30", "-c", str(ROOT), *command)
+    def begins(self, url: str) -> Path:
+        """Open a new session of four runs and come to the first; return its file."""
+        protocol, session = self.folder / "abba.yaml", self.folder / "abba.session"
+        protocol.write_text(short("[40 deg]", 4), "utf-8")
+        self.tmux(
+            "new-session", "-d", "-x", "100", "-y", "30", "-c", str(ROOT),
+            sys.executable, "-m", "rig", "tui", str(protocol), "--port", url, "--session",
+            str(session), "--socket", str(self.folder / "rig.sock"),
+        )  # fmt: skip
+        self.sees("PROTOCOL", "Enter open session", "SIMULATED")
+        self.press("Enter")
+        self.sees("DEVICE", "Enter to the first run", "clear")
+        self.press("Enter")
+        return session
 
     def screen(self) -> str:
         return re.sub(r"\s+", " ", self.tmux("capture-pane", "-p"))
@@ -93,16 +105,7 @@ def terminal() -> Iterator[Terminal]:
 def test_an_abba_session_by_keys_alone(terminal, url):
     if url.startswith("emu"):
         pytest.importorskip("rig_emulator.stand")
-    protocol, session = terminal.folder / "abba.yaml", terminal.folder / "abba.session"
-    protocol.write_text(short("[40 deg]", 4), "utf-8")
-    terminal.start(
-        sys.executable, "-m", "rig", "tui", str(protocol), "--port", url, "--session",
-        str(session), "--socket", str(terminal.folder / "rig.sock"),
-    )  # fmt: skip
-    terminal.sees("PROTOCOL", "Enter open session", "SIMULATED")
-    terminal.press("Enter")
-    terminal.sees("DEVICE", "Enter to the first run", "clear")
-    terminal.press("Enter")
+    session = terminal.begins(url)
     for number, chain in enumerate("ABBA", start=1):
         terminal.sees(f"RUN {number} of 4", f"impact side {chain}", "✓ gates steady", "Enter arm")
         if number == 2:  # typed and pasted: neither words nor the Enter behind them arm
@@ -128,23 +131,13 @@ _TYPED = ("Enter", "Space", "Escape", "Tab", "F9", "Up", "BTab", "C-p", *"acdefk
 
 @_NEEDS_TMUX
 def test_nothing_is_armed_by_hands_on_a_real_keyboard(terminal):
-    protocol, session = terminal.folder / "abba.yaml", terminal.folder / "abba.session"
-    protocol.write_text(short("[40 deg]", 4), "utf-8")
-    terminal.start(
-        "sh", "-c", 'echo $$ >"$0"; exec "$@"', str(terminal.folder / "pid"),
-        sys.executable, "-m", "rig", "tui", str(protocol), "--port", "sim://?seed=3", "--session",
-        str(session), "--socket", str(terminal.folder / "rig.sock"),
-    )  # fmt: skip
-    terminal.sees("PROTOCOL", "Enter open session", "SIMULATED")
-    terminal.press("Enter")
-    terminal.sees("DEVICE", "Enter to the first run", "clear")
-    terminal.press("Enter")
+    session = terminal.begins("sim://?seed=3")
     terminal.sees("RUN 1 of 4", "✓ gates steady", "Enter arm")
     # A key, and Enter right after it, in a program that is held up between the two.
     time.sleep(1.2 * STILL_S)
     terminal.press("j")
     time.sleep(0.4 * STILL_S)
-    pid = int((terminal.folder / "pid").read_text("utf-8"))
+    pid = int(terminal.tmux("display-message", "-p", "#{pane_pid}"))
     os.kill(pid, signal.SIGSTOP)
     terminal.press("Enter")
     time.sleep(1.2 * STILL_S)
