@@ -76,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     mutation.add_argument("--jobs", type=_count, default=1, metavar="N", help="side by side")
     mutation.add_argument("--list", action="store_true", help="only say which they are")
     mutation.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
+    mutation.add_argument("--page", metavar="FILE", help="write what came of it there")
 
     stop = benches.add_parser("stop", help="how long STOP takes to the wire, whatever is going on")
     stop.add_argument("--stops", type=_count, default=50, metavar="N", help="in each condition")

@@ -1,7 +1,8 @@
 """Faults put into the software, one at a time, and whether any test notices.
 
 A fault is tried on a copy of the project, by the tests of its room that run through its line, the
-quickest first, until one fails. Which those are is known from one run of each room's tests.
+quickest first, until one fails. Which those are is known from one run of each room's tests. What
+was noticed in an earlier run is not tried again while file and test are the same.
 """
 
 from __future__ import annotations
@@ -25,10 +26,13 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from bench.mutation_memory import Memory
 from bench.mutation_plugin import RECORD, SELECT
+from bench.mutation_survivors import why
 from bench.mutators import c_faults, python_faults
 from rig.commands.output import say
 from rig.errors import InputError
+from rig.files import write_atomic
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
@@ -145,6 +149,8 @@ def main(arguments: Namespace) -> int:
         outcomes = list(_tried(mutants, reached, copies, arguments.jobs))
     if arguments.output:
         _write(Path(arguments.output) / "mutation.csv", outcomes)
+    if arguments.page:
+        write_atomic(arguments.page, page(outcomes, arguments.seed))
     rows = [["room", "faults", "noticed", "share", "tests each", "s each"]]
     for room in [*rooms, "all"]:
         some = [one for one in outcomes if room in {"all", one.mutant.room}]
@@ -158,6 +164,32 @@ def main(arguments: Namespace) -> int:
     for one in survived:
         say(f"not noticed: {one.mutant}")
     return int(len(survived) > (1.0 - LEAST_KILLED) * len(outcomes))
+
+
+def page(outcomes: list[Outcome], seed: int) -> str:
+    """Write what came of it as a page, and of each fault that nobody noticed why it may stay."""
+    lines = [
+        "# Faults put into the source",
+        "",
+        "Written by `./run bench mutation --page docs/results/mutation.md`: "
+        f"{len(outcomes)} faults drawn by seed {seed}, one at a time, each tried by the tests of "
+        "its room that run through its line.",
+        "",
+        "| room | faults | noticed | |",
+        "|---|---|---|---|",
+    ]
+    for room in [*ROOMS, "all"]:
+        some = [one for one in outcomes if room in {"all", one.mutant.room}]
+        if some:
+            places = ", ".join(f"`{one}`" for one in ROOMS[room].sources) if room != "all" else room
+            count, noticed, share, *_ = _counted(some)
+            lines.append(f"| {places} | {count} | {noticed} | {share} |")
+    lines += ["", "Not noticed:", "", "| fault | why it may stay |", "|---|---|"]
+    for one in outcomes:
+        if not one.by:
+            told = str(one.mutant).replace("|", "&#124;")
+            lines.append(f"| {told} | {why(one.mutant.path, one.mutant.fault)} |")
+    return "\n".join([*lines, ""])
 
 
 def _counted(some: list[Outcome]) -> list[str]:
@@ -272,7 +304,12 @@ def _pytest(
 def _tried(
     mutants: list[Mutant], reached: dict[str, Reached], copies: SimpleQueue[Path], jobs: int
 ) -> Iterator[Outcome]:
+    memory = Memory(ROOT, KEPT / "noticed.json")
+    faulty = {one: one.fault.put_into((ROOT / one.path).read_text("utf-8")) for one in mutants}
+
     def each(mutant: Mutant) -> Outcome:
+        if by := memory.noticed_by(mutant.path, faulty[mutant]):
+            return Outcome(mutant, by, 0, 0.0)
         copy = copies.get()
         try:
             return _try(mutant, reached[mutant.room], copy)
@@ -283,6 +320,8 @@ def _tried(
         for number, one in enumerate(pool.map(each, mutants), 1):
             by = one.by or "NOT NOTICED"
             say(f"{number}/{len(mutants)} {one.seconds:.0f} s {one.mutant}: {by}")
+            if one.by:
+                memory.note(one.mutant.path, faulty[one.mutant], one.by)
             yield one
 
 

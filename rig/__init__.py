@@ -4,13 +4,11 @@ The Python door, for scripts and notebooks: `open` a session, `read_protocol`, `
 behind it is loaded before it is used; `rig.door` has its documentation.
 """
 
-from typing import Any
-
 __version__ = "0.1.0"
 __all__ = ["__version__", "open", "predict", "read_protocol"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Load the door when somebody comes to it."""
     if name not in {"open", "predict", "read_protocol"}:
         raise AttributeError(f"module 'rig' has no attribute {name!r}; it offers {__all__}")

@@ -1,27 +1,35 @@
-"""``python -m rig``, and the ``rig`` command."""
+"""``python -m rig``, and the ``rig`` command. To import it makes Ctrl-C end the process."""
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-
 _INTERRUPTED = 130
+try:
+    import os
+    import signal
+    import sys
+except (KeyboardInterrupt, RuntimeError):  # a class in the making turns what strikes it into this
+    raise SystemExit(_INTERRUPTED) from None
+
+
+def _leave(*_: object) -> None:
+    """End at once: nothing is open yet, and a module half loaded is no place to come back from."""
+    os.write(2, b"rig: interrupted\n")
+    os._exit(_INTERRUPTED)
+
+
+_OURS = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+if _OURS:  # here, since what pip writes to call `start` is at work for a while before it does
+    signal.signal(signal.SIGINT, _leave)
 
 
 def start() -> None:
-    """Run one command and end the process, by 130 and without a word more after Ctrl-C."""
-    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if ours:
-        signal.signal(signal.SIGINT, lambda *_: os._exit(_INTERRUPTED))  # nothing is open yet
+    """Run one command and end the process, by 130 and in a few words after Ctrl-C."""
     from rig.cli import main  # noqa: PLC0415 - takes long enough to be interrupted
 
-    if ours:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         code = main()
     finally:
-        if ours:
+        if _OURS:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done, and said
     sys.exit(code)
 

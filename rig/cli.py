@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-_GOES_ON = "rig: interrupted; the same command goes on from here"
 OPTIONAL = ("distributed", "mpmath")
 """Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
 
@@ -49,10 +48,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "module" not in arguments:
             parser.print_help(sys.stderr)
             return BAD_INPUT
-        with _left_at_once():
-            command = import_module(f"rig.commands.{arguments.module}")
-        code: int = command.main(arguments)
-        sys.stdout.flush()
+        command = import_module(f"rig.commands.{arguments.module}")
+        with _put_in_order():
+            code: int = command.main(arguments)
+            sys.stdout.flush()
     except RigError as error:
         _say(error)
         return error.exit_code
@@ -60,7 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         # A class in the making turns what strikes it into a RuntimeError.
         if not isinstance(error.__cause__ or error, KeyboardInterrupt):
             raise
-        _say(_GOES_ON)
+        # A command that has something to say of what comes next raises it with these words.
+        words = error.args if isinstance(error, KeyboardInterrupt) else ()
+        _say("; ".join(["rig: interrupted", *map(str, words)]))
         # Where it struck while a module made a class from text, Python 3.11 would end by the signal
         # in spite of all; text that runs to its end makes it forget.
         exec("")  # noqa: S102
@@ -85,22 +86,17 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _left_at_once() -> Iterator[None]:
-    """Have Ctrl-C end the process: a module that is half loaded is no place to come back from."""
-    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if not ours or threading.current_thread() is not threading.main_thread():
+def _put_in_order() -> Iterator[None]:
+    """Have Ctrl-C be an exception while a command is at work, however it ends the process else."""
+    before = signal.getsignal(signal.SIGINT)
+    if not callable(before) or threading.current_thread() is not threading.main_thread():
         yield
         return
-
-    def leave(*_: object) -> None:
-        os.write(2, f"{_GOES_ON}\n".encode())
-        os._exit(INTERRUPTED)
-
-    signal.signal(signal.SIGINT, leave)
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, before)
 
 
 def _open_streams() -> None:

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "device.h"
-#include "drop.h"
 #include "events.h"
 #include "host.h"
 #include "name.h"
@@ -13,6 +12,8 @@
 #define LINE 65536
 #define REFERENCES 16
 #define SYNC 0x80 /* in `outputs`, beside the releases */
+
+extern uint8_t __start_kept[], __stop_kept[]; /* by the linker, of all that is BOARD_KEPT */
 
 static uint64_t now, base; /* base: what the 32-bit time is ahead of `now` */
 
@@ -393,6 +394,11 @@ void host_reset(uint8_t cause)
     device_start(cause);
 }
 
+void host_forget(uint8_t byte)
+{
+    memset(__start_kept, byte, (size_t)(__stop_kept - __start_kept));
+}
+
 void host_power(uint32_t tick)
 {
     now = 1; /* 0 stands for never */
@@ -403,7 +409,6 @@ void host_power(uint32_t tick)
     reference_first = reference_end = 0;
     interrupt_free = 0;
     memset(name, 0xFF, sizeof name);
-    memset(events_memory, 0xA5, EVENTS_BYTES);
-    memset(&drop, 0xA5, sizeof drop);
+    host_forget(0xA5);
     host_reset(1);
 }

@@ -25,7 +25,7 @@
 #define BOARD_SHORT (10 * (BOARD_HZ / 1000000u))
 #define BOARD_BYTES_WAIT 0
 #define BOARD_FLASH
-#define BOARD_KEPT
+#define BOARD_KEPT __attribute__((section("kept")))
 
 #define HOST_LATENCY 10 /* from an edge to its stamp */
 #define HOST_BUSY 36    /* from its stamp to the interrupt's end */

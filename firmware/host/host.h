@@ -11,6 +11,9 @@ void host_power(uint32_t tick);
 /* Reset: the kept memory stays. */
 void host_reset(uint8_t cause);
 
+/* The kept memory is lost: each of its bytes is this one. */
+void host_forget(uint8_t byte);
+
 /* Run until a moment, or until FIRE was executed: returns where it stopped. */
 uint64_t host_run(uint64_t until);
 

@@ -8,11 +8,12 @@ import sys
 from argparse import Namespace
 from datetime import UTC, datetime
 from operator import itemgetter
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.commands import report
-from rig.commands.output import VOID, say
+from rig.commands.output import VOID, goes_on, say
 from rig.files import make_folder, write_atomic
 from rig.measurands import averaged
 from rig.ports import truth_file
@@ -42,6 +43,15 @@ def main(arguments: Namespace) -> int:
     inclines = len(parse(text).plan.inclines)
     write_atomic(protocol, text)
     say(f"{inclines * arguments.repeats} drops of two chains, {arguments.repeats} at each incline")
+    again = (
+        f"rig demo -o {quote(str(folder))} --repeats {arguments.repeats} --seed {arguments.seed}"
+    )
+    with goes_on(f"{again} goes on from here"):
+        return _dropped(protocol, session, arguments)
+
+
+def _dropped(protocol: Path, session: Path, arguments: Namespace) -> int:
+    """Let chains fall, or those that have not fallen yet, and show what was found."""
     interrupts = Interrupts()
     with interrupts.caught():
         found = run_protocol(
@@ -49,9 +59,9 @@ def main(arguments: Namespace) -> int:
         )
     print("SIMULATED DATA")
     print("\n".join(beside_truth(found.analysis, session)))
-    page = folder / "report.html"
+    page = session.with_name("report.html")
     code = report.main(
-        Namespace(session=str(session), output=str(page), figures=str(folder), bars="U95")
+        Namespace(session=str(session), output=str(page), figures=str(page.parent), bars="U95")
     )
     if arguments.open or _has_screen():
         import webbrowser  # noqa: PLC0415 - only where somebody looks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.commands.output import say
+from rig.commands.output import goes_on, say
 from rig.errors import InputError
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.steps import flash, flash_drive
@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Flash a board and say what it is now."""
+    with goes_on("if the board has half a firmware now, the same command gives it a whole one"):
+        return _flashed(arguments)
+
+
+def _flashed(arguments: Namespace) -> int:
     board, port = arguments.board, arguments.port
     if board not in TARGETS:
         if arguments.avrdude is not None:

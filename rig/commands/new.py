@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.protocol.draft import Scene
-    from rig.protocol.protocol import Protocol
 
 _OTHER = "other"
 _AIMS = {
@@ -49,8 +48,12 @@ class _Question(NamedTuple):
 def main(arguments: Namespace) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path = Path(arguments.output)
-    if path.exists():
-        raise InputError(f"{path} is there already", "name a new file")
+    mounting, wiring = (
+        path.with_name(f"{path.stem}-{what}.svg") for what in ("mounting", "wiring")
+    )
+    for one in (path, mounting, wiring):
+        if one.exists():
+            raise InputError(f"{one} is there already", "name a new file, or move that one away")
     if path.suffix not in {".yaml", ".yml"}:
         raise InputError(f"{path}: a protocol is a file ending in .yaml")
     board, draft = _answers(arguments, path)
@@ -59,7 +62,12 @@ def main(arguments: Namespace) -> int:
     check_recordable(protocol, BOARDS.get(board))
     write_atomic(path, text)
     say(f"protocol: {path}")
-    _draw(protocol, board, path)
+    assert protocol.gates is not None
+    write_figure(mounting, mounting_figure(protocol, protocol.gates))
+    say(f"mounting: {mounting}")
+    if board in WIRED:
+        write_atomic(wiring, wiring_picture(board).read_text("utf-8"))
+        say(f"wiring: {wiring}")
     print(describe(protocol, notes(protocol)))
     print("\nFour drops in simulation")
     return _tried(draft)
@@ -111,6 +119,7 @@ def _asked(
     if said is not None:
         return str(said)
     if arguments.yes or not sys.stdin.isatty():
+        say(f"{question.words} {question.usual} (--{question.option})")
         return question.usual
     for word, meaning in (explained or {}).items():
         say(f"  {word:14} {meaning}")
@@ -130,18 +139,6 @@ def _count(name: str, said: str, most: int = 1000) -> int:
     if not said.isdecimal() or not 1 <= int(said) <= most:
         raise InputError(f"--{name}: found {said}; a whole number from 1 to {most} is wanted")
     return int(said)
-
-
-def _draw(protocol: Protocol, board: str, path: Path) -> None:
-    """Draw where gates go and, for boards of which there is a picture, what is wired to them."""
-    assert protocol.gates is not None
-    mounting = path.with_name(f"{path.stem}-mounting.svg")
-    write_figure(mounting, mounting_figure(protocol, protocol.gates))
-    say(f"mounting: {mounting}")
-    if board in WIRED:
-        wiring = path.with_name(f"{path.stem}-wiring.svg")
-        write_atomic(wiring, wiring_picture(board).read_text("utf-8"))
-        say(f"wiring: {wiring}")
 
 
 def _tried(draft: Draft) -> int:

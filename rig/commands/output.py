@@ -6,7 +6,7 @@ import json
 import os
 import re
 import sys
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from shutil import get_terminal_size
 from textwrap import wrap
 from types import MappingProxyType
@@ -16,7 +16,7 @@ from rig.files import write_atomic
 from rig.printable import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from rig.results import SessionResults
@@ -28,6 +28,15 @@ def say(line: str) -> None:
     """Tell the user something that is no result."""
     with suppress(OSError):  # a campaign does not end because nobody listens any more
         print(printable(line), file=sys.stderr, flush=True)
+
+
+@contextmanager
+def goes_on(how: str) -> Iterator[None]:
+    """Have Ctrl-C say how to go on with what was begun; see `rig.cli.main`."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(how) from None
 
 
 _ODD = re.compile(r"\b(void|rejected|marginal|disagrees)\b")

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.output import print_results, say
+from rig.commands.output import goes_on, print_results, say
 from rig.protocol import reader
 from rig.recorder.interrupts import Interrupts
 from rig.report.finding import finding
@@ -22,7 +22,7 @@ def main(arguments: Namespace) -> int:
     attended = not arguments.yes and sys.stdin.isatty()
     operator = _operator(arguments.protocol, attended=attended)
     interrupts = Interrupts()
-    with interrupts.caught():
+    with goes_on("the same command goes on from here"), interrupts.caught():
         found = run_protocol(
             arguments.protocol,
             arguments.port,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import sys
 from contextlib import suppress
@@ -33,8 +34,22 @@ def main(arguments: Namespace) -> int:
         return 0
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InputError("rig tui needs a terminal", "without one: rig run PROTOCOL --port URL")
-    RigApp(options, keys).run()
+    asyncio.run(_shown(RigApp(options, keys)))
     return 0
+
+
+async def _shown(app: RigApp) -> None:
+    """Show it until it ends. For Textual a signal is an end like any other, for a shell it is not.
+
+    Raises
+    ------
+    asyncio.CancelledError
+        Of which `asyncio.run` makes a `KeyboardInterrupt`.
+    """
+    await app.run_async()
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
 
 
 def _options(arguments: Namespace) -> Options:

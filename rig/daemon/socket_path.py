@@ -42,8 +42,6 @@ def prepare_folder(folder: Path) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         check_folder(folder)
     except OSError as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(
             f"cannot use {folder}: {error.strerror or error}", "name another place with --socket"
         ) from error

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
+import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from textual.app import App
 
 from bench.mutants import CSV, make_session
 from rig import cli
+from rig.commands import demo, tui
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
 LOADING = f"""
@@ -20,6 +28,16 @@ def load(name):
 rig.cli.import_module = load
 rig.__main__.sys.argv[1:] = ["check", "x"]
 rig.__main__.start()
+"""
+BEFORE = f"""
+import sys
+sys.modules.pop("signal", None)
+class Finder:
+    def find_spec(name, *_):
+        if not name.startswith("rig"):
+            {STRUCK}
+sys.meta_path.insert(0, Finder)
+import rig.__main__
 """
 ENDING = f"""
 import atexit, rig.cli, rig.__main__
@@ -31,7 +49,7 @@ rig.__main__.start()
 """
 
 
-@pytest.mark.parametrize(("program", "code"), [(LOADING, 130), (ENDING, 0)])
+@pytest.mark.parametrize(("program", "code"), [(BEFORE, 130), (LOADING, 130), (ENDING, 0)])
 def test_ctrl_c_where_no_command_is_at_work(program, code):
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=False
@@ -49,19 +67,53 @@ def test_ctrl_c_in_a_class_that_is_being_made(monkeypatch, capsys):
     assert "interrupted" in capsys.readouterr().err
 
 
+def test_a_signal_while_the_terminal_is_at_work():
+    class Headless(App):
+        async def run_async(self):
+            return await super().run_async(headless=True)
+
+        def on_mount(self):
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        asyncio.run(tui._shown(Headless()))
+
+
+def test_a_demo_that_was_interrupted_says_what_goes_on_with_it(call, tmp_path, monkeypatch):
+    asked = []
+
+    def interrupted(protocol, _url, session, _operator, seed, _interrupts):
+        asked.append((protocol, Path(protocol).read_text("utf-8"), session, seed))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(demo, "run_protocol", interrupted)
+    monkeypatch.chdir(tmp_path)
+    said = call("demo", "--repeats", 3, "--seed", 7)
+    words = re.search(r"rig: interrupted; rig (demo .*) goes on from here", said.err)
+    assert said.code == call(*shlex.split(words[1])).code == 130
+    assert asked[0] == asked[1]
+
+
 MOMENTS = 40
 COMMANDS = {
     "analyze": ["SESSION"],
     "check": ["fence.yaml"],
+    "daemon": ["--port", "sim://", "--socket", "door/rig.sock", "--idle-timeout", "1"],
+    "demo": ["-o", "demo"],
+    "design": ["fence.yaml"],
     "doctor": [],
     "estimate": ["SESSION"],
     "export": ["SESSION", "--csv", "tables"],
+    "flash": ["--board", "mega", "--port", "PORT", "--avrdude", "./avrdude"],
     "import": ["edges.csv", "--protocol", "fence.yaml", "--session", "imported"],
+    "new": ["new.yaml", "--yes"],
     "predict": ["fence.yaml"],
     "recover": ["SESSION", "-o", "recovered"],
     "replay": ["SESSION"],
     "report": ["SESSION", "-o", "report.html"],
     "run": ["fence.yaml", "--port", "sim://", "--session", "ran", "--yes"],
+    "selftest": ["--port", "sim://?protocol=fence.yaml"],
+    "sweep": ["fence.yaml", "--vary", "drop=100mm..300mm:50", "-o", "map.csv"],
 }
 
 
@@ -74,7 +126,11 @@ BEGUN = "import rig.__main__; print('begun', flush=True); rig.__main__.start()"
 def test_ctrl_c_at_any_moment_of_a_command(command, tmp_path):
     session = make_session(tmp_path)
     (tmp_path / "edges.csv").write_text(CSV)
-    given = [str(session) if one == "SESSION" else one for one in COMMANDS[command]]
+    (tmp_path / "avrdude").write_text("#!/bin/sh\nexec sleep 1\n")
+    (tmp_path / "avrdude").chmod(0o755)
+    near, far = os.openpty()  # nobody answers there
+    words = {"SESSION": str(session), "PORT": os.ttyname(far)}
+    given = [words.get(one, one) for one in COMMANDS[command]]
 
     def ended(after_s):
         """Strike so long after the program took over; the time it had, and how it ended."""
@@ -88,8 +144,9 @@ def test_ctrl_c_at_any_moment_of_a_command(command, tmp_path):
             time.sleep(after_s)
             process.send_signal(signal.SIGINT)
         _, told = process.communicate()
-        for one in ("imported", "recovered", "ran"):
+        for one in ("imported", "recovered", "ran", *(path.name for path in tmp_path.glob("new*"))):
             (tmp_path / one).unlink(missing_ok=True)
+        shutil.rmtree(tmp_path / "demo", ignore_errors=True)
         return time.monotonic() - began, process.returncode, told
 
     longest_s, usual, _ = ended(None)
@@ -98,4 +155,6 @@ def test_ctrl_c_at_any_moment_of_a_command(command, tmp_path):
         _, code, told = ended(longest_s * moment / MOMENTS)
         if code not in {130, usual} or "Traceback" in told:
             found.append((moment, code, told[-500:]))
+    os.close(near)
+    os.close(far)
     assert found == []

@@ -354,4 +354,4 @@ def test_an_interrupt_while_a_class_is_made_from_text_is_one_like_any_other(tmp_
         check=False,
     )
     assert done.returncode == 130
-    assert done.stderr == "rig: interrupted; the same command goes on from here\n"
+    assert done.stderr == "rig: interrupted\n"

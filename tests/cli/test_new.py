@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import pytest
 
@@ -56,8 +57,13 @@ def test_a_protocol_with_drawings_and_four_drops(call, tmp_path, monkeypatch):
     assert "SIMULATED DATA" in done.out
     assert "trial drops" in done.out or "g ± U (m/s²)" in done.out
     assert done.err.count("run ") >= 4
-    again = call("new", "my-ball.yaml", "--yes")
-    assert (again.code, "is there already" in again.err) == (2, True)
+    assert "How many drops of a kind? 12 (--repeats)" in done.err
+    assert "--gates" not in done.err, "that was no usual answer"
+    for here in ("my-ball.yaml", "my-ball-mounting.svg", "my-ball-wiring.svg"):
+        again = call("new", "my-ball.yaml", "--yes")
+        assert (again.code, f"{here} is there already" in again.err) == (2, True)
+        Path(here).unlink()
+    assert not any(tmp_path.iterdir()), "none was drawn anew while another was there"
 
 
 class Terminal(io.StringIO):

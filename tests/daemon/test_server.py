@@ -17,7 +17,7 @@ from bench.process_fixture import ProcessFixture
 from rig.daemon import rpc
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
-from rig.daemon.listener import notify_systemd
+from rig.daemon.listener import listen, notify_systemd
 from rig.daemon.server import Server
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, InputError, RigError
@@ -266,6 +266,20 @@ def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
         assert processes.socket.exists()
         processes.start_daemon()
         processes.client().close()
+
+
+def test_a_daemon_to_which_so_many_want_that_nobody_else_gets_through_is_one(tmp_path):
+    path = tmp_path / "door" / "rig.sock"
+    with listen(path, "") as other, contextlib.ExitStack() as waiting:
+        other.listen(0)  # nobody is let in, and the kernel keeps one or two
+        full = 0
+        while not full:
+            one = waiting.enter_context(socket.socket(socket.AF_UNIX))
+            one.setblocking(False)
+            full = one.connect_ex(str(path))
+        with pytest.raises(InputError, match="another daemon answers"):
+            listen(path, "")
+        assert path.exists()
 
 
 def test_over_tcp_too_a_second_daemon_is_refused_and_a_run_goes_through():

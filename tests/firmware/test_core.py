@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from tests.firmware.core_board import CoreBoard
+import pytest
+
+from rig.link import messages as wire
+from tests.firmware.core_board import BROWN_OUT, CoreBoard
 from tests.link.conformance import DeviceConformance
+from tests.link.talk import Wire
 from tests.link.virtual import VirtualBench
 
 
@@ -21,6 +25,16 @@ class CoreBench(VirtualBench):
 class TestCore(DeviceConformance):
     def make(self, lab):
         return CoreBench(lab, CoreBoard(lab))
+
+    @pytest.mark.parametrize("byte", [0x00, 0x5A, 0xFF])
+    def test_memory_that_was_lost_while_the_power_was_low_is_not_believed(self, bench, byte):
+        line = Wire(bench)
+        line.drop()
+        bench.board.core.host_forget(byte)
+        bench.brown_out()
+        assert Wire(bench).ask(wire.Status(), 1).phase is wire.Phase.IDLE
+        _, certificate = Wire(bench).drop()
+        assert certificate.restarts == 128 | BROWN_OUT
 
 
 class TestStreamingCore(DeviceConformance):

@@ -91,6 +91,15 @@ class MemorySuite(Suite):
         assert drop.faults == ()  # nothing that the drop needs is missing
         assert drop.certificate.glitches == certificate.glitches
 
+    @pytest.mark.parametrize("gates", [(0, 8), (8, 0), (1, 9), (0, 1), (8, 9), (0, 1, 8, 9)])
+    def test_gates_that_change_at_one_moment_are_no_pulse(self, bench, gates):
+        """Each port wakes the interrupt, and all have been read by the first of them."""
+        bench.lab.changes = [(at, one, at < 0.015) for at in (0.01, 0.02) for one in gates]
+        events, certificate = Wire(bench).drop()
+        assert [event.state for event in events][-1:] == [0]
+        assert certificate.glitches == 0
+        assert len({event.state for event in events}) == len(events)
+
     def test_stamps_close_behind_another_are_counted_as_late(self, bench, identity):
         near = 0.75 * identity.late_ticks / identity.tick_hz
         bench.lab.changes = [

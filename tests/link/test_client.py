@@ -362,10 +362,12 @@ def test_the_reference_is_told(clock):
 
 
 def test_a_recording_without_end_is_a_time_out(clock):
-    state = wire.State(wire.Phase.RECORDING, 0, 1, 3)
+    port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.RECORDING, 0, 1, 3)]})
     with pytest.raises(DeviceTimeoutError, match="never ends"):
-        device(clock, {wire.Status: [state]}).collect(1, timeout=10)
+        device_at(port).collect(1, timeout=10)
     assert clock.ns * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
+    each_s = LONGEST_RECORD_MS * 1e-3 / len(port.written)
+    assert 0.25 <= each_s < 0.4, "it is asked now and then, and not all the time"
 
 
 def test_after_an_abort_the_certificate_is_asked_for_soon(clock):
