@@ -57,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
 
     link = benches.add_parser("link", help="edges a second, latency, an idle daemon's costs")
+    link.add_argument("-o", "--output", metavar="DIR", help="folder for a page of the same")
 
     hostile = benches.add_parser("hostile_files", help="altered files through all commands")
     hostile.add_argument("--sessions", type=_count, default=2000, metavar="N")

@@ -23,8 +23,9 @@ from bench.decoding import bytewise, checked, frames, speed, to_edges
 from bench.process_fixture import ProcessFixture
 from bench.pty_writer import PtyWriter
 from rig.clock.host import SystemClock
-from rig.commands.output import print_json, say
+from rig.commands.output import print_json, say, write_page
 from rig.daemon.server import Server
+from rig.files import make_folder
 from rig.link.exchange import Exchange
 from rig.link.messages import EVENTS_PER_FRAME, Fired
 from rig.link.port import open_port
@@ -35,8 +36,14 @@ from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
+_HEAD = """\
+# What the way from the port to a client bears
+
+Written by `./run bench link`: edges a second decoded and delivered, how late they are, beside
+reading alone and a decoder that takes single bytes; and what an idle daemon costs. Times are of the
+machine and its load of that day."""
 _FRAMES = 65_000 // EVENTS_PER_FRAME  # the number of an event is a u16
 _RATE = 5000.0  # edges a second, where latency is measured
 _STEADY_FRAMES = 500
@@ -258,19 +265,26 @@ def link(say: Callable[[str], None]) -> dict[str, Any]:
 def main(arguments: Namespace) -> int:
     """Measure the way from the port to a client."""
     found = link(say)
+    lines = list(_lines(found))
+    if arguments.output is not None:
+        write_page(make_folder(arguments.output), "link", _HEAD, lines)
     if arguments.json:
         print_json(found)
         return 0
+    print("\n".join(lines))
+    return 0
+
+
+def _lines(found: Mapping[str, Any]) -> Iterator[str]:
     for name, rate in found["edges_per_s"].items():
-        print(f"{name.replace('_', ' '):<28}{rate:>12,.0f} edges/s")
-    print("latency at 5000 edges/s, median and p99")
+        yield f"{name.replace('_', ' '):<28}{rate:>12,.0f} edges/s"
+    yield "latency at 5000 edges/s, median and p99"
     for name, late in found["latency_at_5000_per_s_s"].items():
         median, p99 = late["median"] * 1e3, late["p99"] * 1e3
-        print(f"{name.replace('_', ' '):<28}{median:>7.1f} {p99:.1f} ms")
+        yield f"{name.replace('_', ' '):<28}{median:>7.1f} {p99:.1f} ms"
     idle = found["idle"]
-    print(f"{'idle daemon':<28}{idle['alone_cpu']:>12.1%} of a core")
-    print(f"{'with one who watches':<28}{idle['watched_cpu']:>12.1%} of a core")
-    print(f"{'memory, idle':<28}{idle['memory_mb']:>12.0f} MB")
-    print(f"{'memory, most in a flood':<28}{found['busy']['memory_mb']:>12.0f} MB")
-    print(f"{'load of the machine':<28}{found['load']:>12.1f} on {found['cores']} cores")
-    return 0
+    yield f"{'idle daemon':<28}{idle['alone_cpu']:>12.1%} of a core"
+    yield f"{'with one who watches':<28}{idle['watched_cpu']:>12.1%} of a core"
+    yield f"{'memory, idle':<28}{idle['memory_mb']:>12.0f} MB"
+    yield f"{'memory, most in a flood':<28}{found['busy']['memory_mb']:>12.0f} MB"
+    yield f"{'load of the machine':<28}{found['load']:>12.1f} on {found['cores']} cores"

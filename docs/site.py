@@ -6,6 +6,7 @@ what they link to. A link that leads nowhere ends the build.
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
@@ -20,13 +21,13 @@ ROOT = Path(__file__).resolve().parents[1]
 NAV: dict[str, tuple[str, ...]] = {
     "Learn": ("docs/tutorial.md", "docs/glossary.md"),
     "Do": ("docs/shopping.md", "docs/one-object.md", "docs/recipes.md", "firmware/README.md",
-           "docs/timers.md", "docs/daemon.md", "docs/python.md", "docs/troubleshooting.md"),
+           "docs/timers.md", "docs/daemon.md", "docs/python.md", "docs/notebook.ipynb",
+           "docs/troubleshooting.md"),
     "Look up": ("docs/boards.md", "docs/protocol.md", "docs/priors.md", "firmware/PROTOCOL.md",
                 "rig/daemon/API.md", "docs/tui/README.md"),
     "Understand": ("docs/method.md", "docs/benchmarks.md", "docs/resolved-world.md",
-                   "docs/threats.md", "docs/results/layouts/layouts.md",
-                   "docs/results/diagnoses/diagnoses.md",
-                   "docs/results/robustness.md"),
+                   "docs/threats.md"),
+    "Results": ("docs/results/README.md", "docs/results/*/*.md", "docs/results/[a-z]*.md"),
     "Work on it": ("docs/architecture.md", "CONTRIBUTING.md", "docs/decisions/*.md",
                    "CHANGELOG.md"),
 }  # fmt: skip
@@ -55,10 +56,25 @@ def stage(folder: Path) -> None:
     known = {Path("README.md"), *(page for found in pages().values() for page in found)}
     for page in known:
         text = (ROOT / page).read_text("utf-8")
-        there = folder / page
+        there = folder / as_page(page)
         there.parent.mkdir(parents=True, exist_ok=True)
+        if page.suffix == ".ipynb":
+            text = told(text)
         there.write_text(_LINK.sub(lambda link, at=page: _linked(link, at, known, folder), text),
                          "utf-8")  # fmt: skip
+
+
+def as_page(path: Path) -> Path:
+    """Where the page of a file stands: a notebook becomes one."""
+    return path.with_suffix(".md") if path.suffix == ".ipynb" else path
+
+
+def told(notebook: str) -> str:
+    """Write a notebook's words and code as a page; it is kept without what it prints."""
+    cells = ("".join(cell["source"]) if cell["cell_type"] == "markdown"
+             else "".join(["```python\n", *cell["source"], "\n```"])
+             for cell in json.loads(notebook)["cells"])  # fmt: skip
+    return "\n\n".join(cells) + "\n"
 
 
 def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> str:
@@ -71,7 +87,7 @@ def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> 
         raise FileNotFoundError(f"{page}: {target} leads nowhere")
     inside = source.resolve().relative_to(ROOT)
     if inside in known:
-        return link[0]
+        return f"{picture}[{words}]({as_page(Path(place)).as_posix()}{hash_}{anchor})"
     listed = sorted(one for one in known if one.parent == inside)
     if listed:  # a folder of pages: the first of them, and the menu has the rest
         return f"[{words}]({place.rstrip('/')}/{listed[0].name}{hash_}{anchor})"
@@ -85,7 +101,7 @@ def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> 
 def settings(source: Path, site: Path) -> dict[str, Any]:
     """Make MkDocs' settings, with every doubtful link a warning."""
     nav: list[dict[str, Any]] = [{"chainrig": "README.md"}]
-    nav += [{heading: [str(page) for page in found]} for heading, found in pages().items()]
+    nav += [{heading: [str(as_page(page)) for page in found]} for heading, found in pages().items()]
     doubts = {"not_found": "warn", "anchors": "warn", "unrecognized_links": "warn"}
     return {
         "site_name": "chainrig",

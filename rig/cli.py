@@ -410,15 +410,20 @@ def _parser() -> Parser:
         help="many short sessions, also with each dial of the simulation doubled",
     )
     accuracy.add_argument("--jobs", type=_count, metavar="N", help="cases at a time")
+    accuracy.add_argument("-o", "--output", metavar="DIR", help="folder for a page of the same")
     _json(accuracy)
     stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
     stability.set_defaults(module="bench_stability")
-    stability.add_argument("-o", "--output", metavar="DIR", help="folder for CSV and JSON")
+    stability.add_argument("-o", "--output", metavar="DIR", help="folder for page, CSV and JSON")
     _json(stability)
     precision = benches.add_parser("precision", help="error against run time of every method")
     precision.set_defaults(module="bench_precision")
     precision.add_argument(
-        "-o", "--output", required=True, metavar="DIR", help="folder for CSV, JSON and pictures"
+        "-o",
+        "--output",
+        required=True,
+        metavar="DIR",
+        help="folder for page, CSV, JSON and pictures",
     )
     precision.add_argument("--quick", action="store_true", help="a small subset, in seconds")
     _json(precision)
@@ -428,12 +433,18 @@ def _parser() -> Parser:
         "--protocols", default="protocols", metavar="DIR", help="ready protocols to be measured too"
     )
     scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
-    scenes.add_argument("-o", "--output", metavar="DIR", help="folder for CSV, JSON and a picture")
+    scenes.add_argument(
+        "-o", "--output", metavar="DIR", help="folder for page, CSV, JSON and picture"
+    )
     _json(scenes)
     every = benches.add_parser("estimators", help="error against run time from edges to Δz and V")
     every.set_defaults(module="bench_estimators")
     every.add_argument(
-        "-o", "--output", required=True, metavar="DIR", help="folder for CSV, JSON and a picture"
+        "-o",
+        "--output",
+        required=True,
+        metavar="DIR",
+        help="folder for page, CSV, JSON and picture",
     )
     every.add_argument(
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
@@ -500,6 +511,17 @@ def _parser() -> Parser:
     diagnoses.add_argument("--only", metavar="TEXT", help='layouts such as "10 rods: 2 + 2"')
     diagnoses.add_argument("--jobs", type=_count, metavar="N", help="layouts at a time")
     _json(diagnoses)
+    before = benches.add_parser("foretold", help="what rig design foretells, and what comes of it")
+    before.set_defaults(module="bench_foretold")
+    before.add_argument(
+        "-o", "--output", required=True, metavar="DIR", help="folder for page, CSV and JSON"
+    )
+    before.add_argument(
+        "--repeats", type=_count, default=4, metavar="N", help="drops at each incline (default 4)"
+    )
+    before.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
+    before.add_argument("--only", metavar="TEXT", help="protocols with this in their names")
+    _json(before)
     bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
     bulk.set_defaults(module="bench_bulk")
     bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")

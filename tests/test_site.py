@@ -23,12 +23,17 @@ def test_all_pages_are_in_the_site(site, tmp_path):
     site.main(tmp_path / "site")
     built = {page for found in site.pages().values() for page in found}
     wanted = {path.relative_to(ROOT) for path in ROOT.glob("docs/*.md")}
-    wanted |= {path.relative_to(ROOT) for path in ROOT.glob("docs/decisions/*.md")}
+    wanted |= {path.relative_to(ROOT) for path in ROOT.glob("docs/*.ipynb")}
+    for folder in ("decisions", "results"):
+        wanted |= {path.relative_to(ROOT) for path in ROOT.glob(f"docs/{folder}/**/*.md")}
     assert wanted <= built, "a new page takes its place in NAV of docs/site.py"
     for page in built:
         name = "index.html" if page.name == "README.md" else f"{page.stem}.html"
         assert (tmp_path / "site" / page.parent / name).is_file(), page
     text = (tmp_path / "site/index.html").read_text("utf-8")
+    notebook = (tmp_path / "site/docs/notebook.html").read_text("utf-8")
+    assert "session.analyze()" in notebook
+    assert 'href="notebook.html"' in (tmp_path / "site/docs/python.html").read_text("utf-8")
     assert 'src="docs/figure-3.svg"' in text
     assert 'src="https:' not in text
     assert 'rel="stylesheet" href="https:' not in text

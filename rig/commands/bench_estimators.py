@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.estimators import as_json, estimators
 from rig.bench.figures import estimators_figure
-from rig.commands.output import print_json, say
-from rig.files import make_folder, write_atomic
+from rig.commands.output import leave_study, say
+from rig.files import make_folder
 from rig.report.columns import Column, aligned
 from rig.text_table import csv_text
 
@@ -27,6 +26,16 @@ _COLUMNS: tuple[Column[dict[str, Any]], ...] = (
     Column("median", lambda one: f"{1e3 * one['speed_median_m_s']:.2f}"),
 )  # fmt: skip
 
+_HEAD = """\
+# Every way from edges to Δz and V
+
+Written by `rig bench estimators`: the same simulated drops read by a camera's frames, by two gates,
+by a straight line, by the adjustment alone and together, and by Monte Carlo with up to a million
+draws. Errors are against the hidden truth; times are of the machine of that day, so compare them
+with one another. Every number is in `estimators.csv`.
+
+![Error against time](estimators.svg)"""
+
 
 def main(arguments: Namespace) -> int:
     """Measure every estimator on the same drops."""
@@ -41,12 +50,9 @@ def main(arguments: Namespace) -> int:
     )
     whole = as_json(found, left_out)
     lines = whole["estimators"]
-    write_atomic(folder / "estimators.csv", csv_text(asdict(found[0]), lines))
-    write_atomic(folder / "estimators.json", json.dumps(whole, indent=2, ensure_ascii=False))
-    write_atomic(folder / "estimators.svg", estimators_figure(lines))
-    if arguments.json:
-        print_json(whole)
-    else:
-        said = ["SIMULATED DATA", *aligned(_COLUMNS, lines)]
-        print("\n".join([*said, *(f"left out: {one}" for one in left_out)]))
+    said = [*aligned(_COLUMNS, lines), *(f"left out: {one}" for one in left_out)]
+    leave_study(
+        folder, "estimators", _HEAD, said, whole, csv_text(asdict(found[0]), lines),
+        estimators_figure(lines), as_json=arguments.json,
+    )  # fmt: skip
     return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rig.bench.figures import precision_figure
 from rig.bench.precision import as_json, precision
-from rig.commands.output import print_json, say
+from rig.commands.output import print_json, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
 
@@ -18,6 +18,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.bench.precision import Cheapest, Gap, Precision
+
+_HEAD = """\
+# Error against run time of every way to compute the model
+
+Written by `rig bench precision`, which saves as it goes: every method at many tolerances, steps or
+nodes, its error against 50 digits of what it solves, its run time on the machine of that day. Times
+are therefore only good for comparing them with one another. Every point is in `precision.csv`."""
 
 _PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
 """Contact times whose rows are printed; the others are in ``precision.json``, s."""
@@ -86,3 +93,5 @@ def _write(folder: Path, found: Precision) -> None:
     for name, title in found.scenes:
         points = [point for point in found.points if point.scene == name]
         write_atomic(folder / f"precision-{name}.svg", precision_figure(title, points))
+    pictures = [f"![{title}](precision-{name}.svg)" for name, title in found.scenes]
+    write_page(folder, "precision", "\n\n".join([_HEAD, *pictures]), summary(found).splitlines())

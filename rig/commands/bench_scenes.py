@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.bench.scenes import as_json, scenes
-from rig.commands.output import print_json, say
+from rig.commands.output import print_json, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text, text_table
 
@@ -17,6 +17,16 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.bench.scenes import Cost, Quartiles
+
+_HEAD = """\
+# What each scene leaves out, and what it costs
+
+Written by `rig bench scenes`: what a scene does not have (a surface, friction, air, an uncertainty)
+is neither loaded nor computed. Modules, peak memory, bytecodes and evaluations are counted and are
+the same again on one version of Python; times are of the machine of that day, so compare their
+ratios. Every number is in `scenes.csv`.
+
+![Costs of scenes](scenes.svg)"""
 
 
 def main(arguments: Namespace) -> int:
@@ -85,6 +95,7 @@ def _write(folder: Path, costs: Sequence[Cost], text: str) -> None:
     write_atomic(folder / "scenes.csv", csv_text(lines[0], lines))
     write_atomic(folder / "scenes.json", text + "\n")
     write_atomic(folder / "scenes.svg", scenes_figure(costs))
+    write_page(folder, "scenes", _HEAD, table(costs).splitlines())
 
 
 def _flat(cost: Cost) -> dict[str, object]:

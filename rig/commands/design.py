@@ -14,7 +14,6 @@ from rig.design.rewriting import with_heights
 from rig.design.search import better, readable, room
 from rig.design.trials import trials, trials_text
 from rig.errors import InputError
-from rig.estimate.coefficients import KNOWN
 from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
@@ -126,7 +125,7 @@ def _said(
             for name, single in expected.single.items()
         ],
         "coefficients": [
-            {"name": name, "u": u, "identified": u <= KNOWN}
+            {"name": name, "u": u, "identified": name not in expected.held}
             for name, u in expected.coefficients.items()
         ],
     }

@@ -112,15 +112,20 @@ def leave_study(
     as_json
         Print the first and not the lines.
     """
-    page = "\n".join([head, "", "```text", *lines, "```", ""])
     json_text = json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
-    for kind, text in {"json": json_text, "csv": table, "svg": picture, "md": page}.items():
+    for kind, text in {"json": json_text, "csv": table, "svg": picture}.items():
         if text is not None:
             write_atomic(folder / f"{name}.{kind}", text)
+    write_page(folder, name, head, lines)
     if as_json:
         print_json(whole)
     else:
         print("\n".join(["SIMULATED DATA", *lines]))
+
+
+def write_page(folder: Path, name: str, head: str, lines: Iterable[str]) -> None:
+    """Write a study's page: what stands above, in Markdown, and its tables as text."""
+    write_atomic(folder / f"{name}.md", "\n".join([head, "", "```text", *lines, "```", ""]))
 
 
 def print_json(data: Mapping[str, Any]) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from rig.analysis.summary import by_case
 from rig.design.cases import BEAM
-from rig.estimate.coefficients import KNOWN, described, given_alphas
-from rig.estimate.hypotheses import alphas
+from rig.estimate.coefficients import KNOWN, described, first_held, given_alphas
+from rig.estimate.hypotheses import BETA, MU, alphas
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
+_EXACT = 1e18
+"""What is known of a coefficient that the protocol states without ±: 1/u²."""
+
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
@@ -36,12 +39,16 @@ class Forecast:
         Of a measurand in one run, and of its mean over an incline's runs with what makes the runs
         themselves differ, in the light of the whole session; by JSON name, then by condition.
     coefficients
-        Of the coefficients that the edges tell, by name; without any prior.
+        Of the coefficients, by name: of those that the edges tell, with the others held; of the
+        others, without any prior.
+    held
+        Coefficients that the edges do not tell: `rig estimate` would hold them as stated, too.
     """
 
     single: Mapping[str, Mapping[Condition, float]]
     mean: Mapping[str, Mapping[Condition, float]]
     coefficients: Mapping[str, float]
+    held: frozenset[str] = frozenset()
 
     def typical(self, name: str) -> float:
         """Root mean square over inclines of one run's uncertainty."""
@@ -101,7 +108,9 @@ def forecast(
             single.setdefault(name, {})[at] = math.sqrt(alone)
             both = together + float(common @ covariance @ common)
             mean.setdefault(name, {})[at] = math.sqrt(both)
-    return Forecast(single, mean, _coefficients(protocol, parts, size, sure=sure))
+    coefficients, held = _coefficients(protocol, parts, size)
+    kept = {name: u for name, u in coefficients.items() if sure or name not in held}
+    return Forecast(single, mean, kept, held)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,19 +180,19 @@ class _Part:
 
 
 def _coefficients(
-    protocol: Protocol, parts: Sequence[_Part], size: int, *, sure: bool
-) -> dict[str, float]:
-    """Standard uncertainties of β, μ and a pile's β by the edges alone."""
+    protocol: Protocol, parts: Sequence[_Part], size: int
+) -> tuple[dict[str, float], frozenset[str]]:
+    """Standard uncertainties of β, μ and a pile's β, and those that edges do not tell."""
     surface = protocol.surface
     if surface is None:
-        return {}
+        return {}, frozenset()
     drops = [
         (protocol.chains[part.case.run.impact or ""].chain, part.case.run.incline_deg)
         for part in parts
     ]
     kept, stated, _ = described(protocol, drops)
     if not stated:
-        return {}
+        return {}, frozenset()
     now = {name: quantity.value for name, quantity in stated.items()}
     given = given_alphas(protocol)
     total = np.eye(size + len(now))  # ±1 of a coefficient is as good as nothing known
@@ -197,6 +206,23 @@ def _coefficients(
         total[part.place, size:] += mixed
         total[size:, part.place] += mixed.T
         total[size:, size:] += n * part.square * np.outer(slopes, slopes)
-    sd = np.sqrt(np.diag(np.linalg.inv(total))[size:])
-    found = dict(zip(now, sd.tolist(), strict=True))
-    return {name: u for name, u in found.items() if sure or u <= KNOWN}
+    places = {name: size + n for n, name in enumerate(now)}
+
+    def uncertainties() -> dict[str, float]:
+        variances = np.diag(np.linalg.inv(total))
+        return {name: math.sqrt(variances[place]) for name, place in places.items()}
+
+    by_edges = found = uncertainties()
+    held: set[str] = set()
+    for name in first_held(now):  # as the estimate does
+        unsure = {one for one, u in found.items() if u > KNOWN}
+        if not unsure:
+            break
+        if name == MU and not unsure & {MU, BETA}:
+            continue
+        held.add(name)
+        u = stated[name].u
+        total[places[name], places[name]] += u**-2 if u else _EXACT
+        found = uncertainties()
+    held |= {one for one, u in found.items() if u > KNOWN}
+    return found | {one: by_edges[one] for one in held}, frozenset(held)

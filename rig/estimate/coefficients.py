@@ -20,7 +20,7 @@ from rig.estimate.hypothesis_fit import Parameter, fit
 from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -137,13 +137,17 @@ def words(name: str) -> str:
     return what.replace("_", " ") + (f" of chain {chain}" if chain else "")
 
 
+def first_held(names: Iterable[str]) -> list[str]:
+    """Order coefficients as they are held, one after the other, where edges do not tell all."""
+    known = list(names)
+    models = [name for name in (MU, BETA, PILE) if name in known]
+    return models + [name for name in known if name not in models]
+
+
 def _identified(protocol: Protocol, given: CoefficientProblem) -> CoefficientProblem:
     """Hold μ, and then β, where the edges do not tell them apart."""
     found = given
-    alphas = [name for name in given.stated if name not in {MU, BETA, PILE}]
-    for name in (MU, BETA, PILE, *alphas):
-        if name not in given.stated:
-            continue
+    for name in first_held(given.stated):
         outcome = best(protocol, found)
         unsure = [one for one in found.stated if outcome[one][1] > KNOWN]
         if not unsure:

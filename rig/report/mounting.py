@@ -16,7 +16,7 @@ from rig.text_table import text_table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rig.protocol.protocol import Gates, Protocol, Side
+    from rig.protocol.protocol import Gates, InclinedTrack, Protocol, Side
     from rig.report.canvas import Canvas
 
 _WORDS: dict[Side, str] = {"impact": "strikes", "free": "falls beside it"}
@@ -43,6 +43,8 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
     Canvas
         Lengths are in mm.
     """
+    if protocol.track is not None:
+        return _track_figure(protocol, protocol.track, gates)
     inclines = _inclines(protocol)
     text = "\n".join([protocol.title, "", *_zero(protocol, gates), *_slots(protocol, gates)])
     foot = _LINE_IN * (text.count("\n") + 2)
@@ -65,6 +67,44 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
             panel.axis("off")
         words = below.text(0, 1, text, va="top", family="DejaVu Sans Mono", color=INK)
         words.set_in_layout(False)  # it goes on under the other panel
+    return drawing
+
+
+def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Canvas:
+    """Draw a track from the side, with beams across it; all lengths are along it, from one mark."""
+    slope = math.radians(track.incline_deg.value)
+    text = "\n".join([
+        protocol.title, "",
+        *_wrapped("Lengths count along the track from one mark (x), such as its lower end: each "
+                  "beam's, and that of the object's middle before release."),
+    ])  # fmt: skip
+    with canvas(
+        (3.0, _LINE_IN * (text.count("\n") + 2)), _WIDTH_IN, simulated=False, sharex=False,
+        description=protocol.title,
+    ) as drawing:  # fmt: skip
+        side, below = drawing.axes
+        start = protocol.drop.value
+
+        def at(along: float, above: float = 0.0) -> tuple[float, float]:
+            return (
+                1e3 * ((start - along) * math.cos(slope) + above * math.sin(slope)),
+                1e3 * (along * math.sin(slope) + above * math.cos(slope)),
+            )
+
+        side.plot(*zip(at(1.05 * start), at(0.0), strict=True), color=INK, linewidth=2.0)
+        side.plot(*at(0.0), "x", color=INK)
+        side.plot(*at(start), "o", color=INK)
+        for gate in gates.gates:
+            ends = at(gate.height), at(gate.height, _POST_M)
+            side.plot(*zip(*ends, strict=True), color=MODEL, linewidth=0.9)
+            side.annotate(f"{1e3 * gate.height:g}", ends[1], (0, 4), textcoords="offset points",
+                          ha="center", color=MODEL)  # fmt: skip
+        side.set_aspect("equal", adjustable="datalim")
+        side.set_xlabel("mm")
+        side.set_title(f"the track at {track.incline_deg.value:g}°, from the side", loc="left")
+        side.grid(visible=False)
+        below.axis("off")
+        below.text(0, 1, text, va="top", family="DejaVu Sans Mono", color=INK)
     return drawing
 
 

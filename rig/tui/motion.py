@@ -11,6 +11,7 @@ from rig.analysis.chain_records import EdgeArrays, edge_trains
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.model.fall import kicks
 from rig.predictions import air_of, predict_incline
+from rig.protocol.contact import at_contact
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -88,6 +89,7 @@ def motions(
     """
     if protocol.gates is None:
         return ()
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     table = _table(edges, hz, thin=matches is None)
     found = []
     for role, _, parts in edge_trains(protocol, run, table):
@@ -236,6 +238,7 @@ def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
     role
         ``impact`` or ``free``.
     """
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     start, gravity = protocol.drop.value, protocol.gravity.value
     name = run.impact if role == "impact" else run.free
     assert name is not None

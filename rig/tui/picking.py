@@ -89,7 +89,8 @@ def drops(app: CommandContext) -> None:
         verdict = found.results[job].verdict
         symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
         run = found.plan[job.run]
-        hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
+        falls = "free fall" if found.protocol.track is None else "down the track"
+        hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else falls
         lines.append(
             Content.assemble(f"run {job.run:3}, attempt {job.attempt}   {hung:28}",
                              (f"{symbol} {verdict:10}", color),

@@ -1,4 +1,7 @@
-"""Both chains to scale at one moment of a drop, as strokes in metres: rods, board, gates, Δz."""
+"""Both chains to scale at one moment of a drop, as strokes in metres: rods, board, gates, Δz.
+
+Heights are above the contact point, as those of falls and films are.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from rig.protocol.contact import at_contact
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -60,6 +65,7 @@ def drawing(
     film
         Of the striking chain, where a simulation knows how each rod moved: shown as measured.
     """
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
     pitch = 2.4 * max(map(_rod_m, (protocol, protocol), (run.impact, run.free)))
     length = max(rods.chain.length for rods in protocol.chains.values())

@@ -58,7 +58,7 @@ def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
     camera, ours = (by_name[name] for name in ("camera reading", "session fit"))
     assert ours["separation_median_m"] < camera["separation_median_m"]
     assert any("M = 1e+06" in one for one in found["left_out"])
-    assert {path.suffix for path in (tmp_path / "o").iterdir()} == {".csv", ".json", ".svg"}
+    assert {path.suffix for path in (tmp_path / "o").iterdir()} == {".csv", ".json", ".md", ".svg"}
     assert "SIMULATED" in (tmp_path / "o" / "estimators.svg").read_text("utf-8")
 
 

@@ -107,11 +107,17 @@ def test_unlike_chains_have_forecasts_of_their_own():
         assert by_striker[50.0, "B"] > by_striker[50.0, "A"]
 
 
-def test_one_incline_tells_no_friction():
-    protocol = replace(UNIFORM, plan=Plan((40.0,), 12))
+def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
+    """As `rig estimate` has it of such a session."""
+    protocol = replace(UNIFORM, plan=Plan((40.0,), 4))
     beams = beams_of(protocol)
-    found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)))
-    assert found.coefficients == {}
+    learned = analysis((40.0,), 4).joint.components
+    found = forecast(protocol, cases(protocol, beams, learned), range(len(beams)))
+    problem = coefficient_problem(protocol, merged(forms((40.0,), 4)))
+    assert found.held == set(problem.held) == {"friction"}
+    assert set(found.coefficients) == {"restitution"}
+    (u,) = found.coefficients.values()
+    assert u == pytest.approx(best(protocol, problem)["restitution"][1], rel=0.2)
 
 
 BEFORE = (0.06, 0.07, 0.1, 0.13, 0.16, 0.204, 0.35, 0.69)

@@ -49,6 +49,17 @@ def test_from_the_board_heights_are_those_above_its_face():
     assert "contact point" not in drawn
 
 
+def test_a_track_is_drawn_as_it_lies():
+    protocol = read(PROTOCOLS / "glider.yaml")
+    drawn = mounting_figure(protocol, protocol.gates)
+    side = drawn.axes[0]
+    assert "track" in side.get_title(loc="left")
+    (low, _), (far, height) = side.lines[1].get_xydata()[0], side.lines[2].get_xydata()[0]
+    slope = math.degrees(math.atan2(height, low - far))
+    assert slope == pytest.approx(protocol.track.incline_deg.value)
+    assert math.hypot(height, low - far) == pytest.approx(1e3 * protocol.drop.value)
+
+
 def test_check_draws_it(tmp_path):
     drawn = tmp_path / "mounting.svg"
     fence = PROTOCOLS / "picket-fence.yaml"

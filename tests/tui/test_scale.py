@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from rig.protocol import reader
@@ -10,6 +12,7 @@ from rig.tui.indicators import Indicators
 from rig.tui.motion import motions, separation
 from rig.tui.scale import Drawing, Stroke, drawing
 from rig.tui.widgets.chains import painted
+from rig.units import Quantity
 from tests.cli.lab import short
 from tests.report.test_figures import FILM
 from tests.tui.test_motion import HZ, edges_of
@@ -39,6 +42,30 @@ def test_both_chains_stand_where_they_were_measured_and_the_bracket_is_their_dif
     bracket = by_color["success"][0]
     assert bracket.to_z - bracket.z == pytest.approx(found.apart_m)
     assert drawing(scene, run, falls, lit, 0.0).apart_m is None
+
+
+def test_from_the_board_rods_lie_where_they_touch_it():
+    """The same fall with heights counted from 8 mm below the contact point is the same picture."""
+    scene, level = reader.parse(short()), 0.008
+    gates = tuple(replace(one, height=one.height + level) for one in scene.gates.gates)
+    higher = replace(
+        scene,
+        drop=Quantity(scene.drop.value + level, scene.drop.u),
+        gates=replace(scene.gates, gates=gates),
+        contact=replace(scene.contact, level=Quantity(level, 0.001)),
+    )
+    run = runs(scene)[0]
+    pairs = edges_of(scene, run)
+    rods = {number: rod for number, (_, rod) in enumerate(pairs)}
+    pictures = []
+    for one in (scene, higher):
+        falls = motions(one, run, [edge for edge, _ in pairs], HZ, rods)
+        lit = Indicators.of((0, 8))
+        shown = drawing(one, run, falls, lit, float(falls[0].times[-1]))
+        pictures.append([(s.z, s.to_z) for s in shown.strokes] + [(shown.apart_m, shown.top_m)])
+    assert len(pictures[0]) == len(pictures[1])
+    for one, other in zip(*pictures, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
 
 
 def test_a_film_shows_each_rod_as_it_lies_and_the_strings_that_are_slack():
