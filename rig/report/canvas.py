@@ -6,6 +6,7 @@ import io
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from rig.ctrl_c import ctrl_c_waits
 from rig.errors import InputError
 from rig.files import replacing
 
@@ -98,7 +99,7 @@ class Canvas:
         import matplotlib as mpl  # noqa: PLC0415 - as in `canvas`
 
         made = io.BytesIO()
-        with mpl.rc_context(_STYLE):
+        with ctrl_c_waits(), mpl.rc_context(_STYLE):
             self.figure.savefig(made, format=kind, dpi=_DPI, metadata=self._metadata(kind))
         return made.getvalue()
 
@@ -174,7 +175,7 @@ def canvas(
     import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    with mpl.rc_context(_STYLE):
+    with ctrl_c_waits(), mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width_in, sum(heights)), layout="constrained")
         panels = figure.subplots(
             len(heights), columns, sharex=sharex, squeeze=False, height_ratios=list(heights)

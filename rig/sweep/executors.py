@@ -11,11 +11,11 @@ from multiprocessing import resource_tracker
 from threading import Thread
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from rig.ctrl_c import ctrl_c_waits
 from rig.errors import RigError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from types import FrameType
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -78,16 +78,12 @@ class _Pool(ProcessPoolExecutor):
         # Processes start in here and inherit what is blocked, so not even one that is still
         # starting can be hit. This process gets its own signal afterwards: its start of another
         # one must not be torn, and any thread of a library may take a signal for it.
-        held: list[FrameType | None] = []
-        handler = signal.signal(signal.SIGINT, lambda _number, frame: held.append(frame))
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            return super().submit(fn, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            signal.signal(signal.SIGINT, handler)
-            if held and callable(handler):
-                handler(signal.SIGINT, held[0])
+        with ctrl_c_waits():
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                return super().submit(fn, *args, **kwargs)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_with_parent() -> None:

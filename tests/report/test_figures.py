@@ -1,6 +1,7 @@
 """Figures are well-formed, repeat byte for byte, and survive what is missing."""
 
 import re
+import signal
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -9,7 +10,7 @@ import pytest
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.films import Film
 from rig.protocol.protocol import Run
-from rig.report.canvas import PAPER, PARTS, SECOND, Canvas
+from rig.report.canvas import PAPER, PARTS, SECOND, Canvas, canvas
 from rig.report.embed import dark_figure_css
 from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.film import film_figure
@@ -33,6 +34,31 @@ def all_three() -> list[str]:
         runs_figure(TWO, True, 0.005),
         gravity_figure(fake_analysis.gravity(), True, 9.82),
     ]
+
+
+def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(monkeypatch) -> None:
+    """From matplotlib's C++ an exception would end the process, without a word."""
+    drawings = []
+
+    def drawn() -> None:
+        with canvas((1.0,), simulated=True) as drawing:
+            signal.raise_signal(signal.SIGINT)
+            drawings.append(drawing)
+
+    with pytest.raises(KeyboardInterrupt):
+        drawn()
+    (drawing,) = drawings
+    write = drawing.figure.savefig
+
+    def struck(*where, **how) -> None:
+        signal.raise_signal(signal.SIGINT)
+        write(*where, **how)
+        drawings.append(drawing)
+
+    monkeypatch.setattr(drawing.figure, "savefig", struck)
+    with pytest.raises(KeyboardInterrupt):
+        drawing.file("svg")
+    assert len(drawings) == 2
 
 
 def test_svg_is_well_formed_and_repeats() -> None:
