@@ -112,11 +112,14 @@ def _channels(protocol: Protocol, found: TimerFile, arguments: Namespace) -> dic
     if len(labels) == 1 and (arguments.channel is not None or len(gates) == 1):
         return {labels[0]: _beam(protocol, arguments.channel).channel}
     channels = {one: n for one in labels if (n := label_number(one)) in gates and n is not None}
-    if not channels or len(set(channels.values())) < len(channels):
+    # As many inputs as gates, and not all of the same number: counted from 1, perhaps.
+    shifted = len(labels) == len(gates) and len(channels) < len(labels)
+    if not channels or shifted or len(set(channels.values())) < len(channels):
+        meant = [f"{one}={n}" for one, n in zip(labels, gates, strict=False)]
         raise InputError(
             f"{arguments.events}: its inputs {', '.join(labels)} are not the gates' channels "
             f"{', '.join(map(str, gates))}",
-            f"say which is which: --map {labels[0]}={gates[0] if gates else 0},…",
+            f"say which is which: --map {','.join(meant)!r}",
         )
     return channels
 

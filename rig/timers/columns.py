@@ -47,7 +47,19 @@ _TIME = re.compile(
     r"^t$|^t[\s_/(\[0-9]|^(?:micros|millis)\b", _I)  # fmt: skip
 _NUMBERED_RUN = re.compile(r"^(?:run|trial|versuch|lauf|drop|prova|essai|set)\b", _I)
 _EDGE = re.compile(r"\bedge|flanke|\bkante|transition|slope|polarity|fronte\b|^level$", _I)
-_VOLTS = re.compile(r"volt|[\[(]\s*m?V\s*[\])]|spannung|tension|potential", _I)
+_VOLTS = re.compile(
+    r"volt|[\[(]\s*(?:m?V|lx)\s*[\])]|spannung|tension|potential|illumin|luminan|\blux\b", _I
+)
+_SCOPE = re.compile(r"^(?:ch|chan|channel|kanal)[\s_]*[0-9a-d]$", _I)
+_MOMENT = re.compile(r"^(?:start|stop|on|off)(?![a-z])\s*[0-9]*", _I)
+_NUMBERED = re.compile(r"^(?:t|time|zeit|event)[\s_#]*[0-9]+(?![0-9])", _I)
+_DARKENS = re.compile(
+    r"(?<![a-z])(?:(un|not )?block(?:ed|s)?|(clear)(?:ed|s)?|dark(?:ens?)?)(?![a-z])", _I
+)
+_ANY_INPUT = re.compile(
+    r"(?:photogate|gate|channel|chan|ch|pin|input|beam|sensor|port|lichtschranke)[\s_#]*[0-9]+", _I
+)
+_VOLT_WORDS = {"v", "volt", "volts", "mv", "lx"}
 _INPUT = re.compile(
     r"^(?:d|ch|chan|channel|digital|pin|gate|input|in|beam|sensor|di|dio|kanal|logic)?"
     r"[\s_#:-]*([0-9]+)$", _I)  # fmt: skip
@@ -67,8 +79,9 @@ _SAID = {
     "duration": "durations, not used",
     "time": "times",
     "time of an input": "times",
+    "moment": "times",
     "edge": "edges, up or down",
-    "volts": "volts",
+    "volts": "volts, or light",
     "level": "levels of an input",
     "run": "run",
     "channel": "which gate",
@@ -91,12 +104,15 @@ class TimeColumn:
         The column of states that belongs to it.
     label
         The input that all of them are of; empty where other columns say that.
+    blocked
+        What all of them did to the beam, where the heading says it.
     """
 
     at: int
     power: int
     state: int | None = None
     label: str = ""
+    blocked: bool | None = None
 
 
 @dataclass(slots=True)
@@ -118,7 +134,9 @@ class Columns:
     unused
         Headings of all others.
     derived
-        Whether places or speeds stand beside the times.
+        Whether places, speeds or other measured things stand beside the times.
+    row_is_run
+        Whether each row is a drop of its own, its times side by side.
     said
         What each column was taken for, in words, by its heading or number.
     """
@@ -131,6 +149,7 @@ class Columns:
     volts: dict[int, str] = field(default_factory=dict)
     unused: list[str] = field(default_factory=list)
     derived: bool = False
+    row_is_run: bool = False
     said: dict[str, str] = field(default_factory=dict)
 
 
@@ -146,7 +165,7 @@ def columns_of(block: RowBlock, separator: str, unit: str | None, problems: Prob
     """
     width = max(len(row.cells) for row in block.rows[:_WORTH])
     values = [_values(block, n) for n in range(width)]
-    heading = _heading(block, width)
+    heading = _with_units(block, _heading(block, width))
     if heading is None:
         return _by_values(block, values, separator, unit, problems)
     return _by_heading(block, heading, values, separator, unit, problems)
@@ -162,13 +181,41 @@ def _heading(block: RowBlock, width: int) -> Row | None:
 
     def known(row: Row) -> int:
         return sum(
-            any(one.search(text) for one in (_TIME, _STATE, _VOLTS, _CHANNEL, _EDGE, _INPUT))
+            any(
+                one.search(text)
+                for one in (_TIME, _STATE, _VOLTS, _CHANNEL, _EDGE, _INPUT, _MOMENT)
+            )
             for text in row.texts
         )
 
     rows = [row for row in block.headings if len(row.cells) > 1 or width == 1]
     named = [row for row in rows if known(row)]
     return max(named, key=known) if named else None
+
+
+def _with_units(block: RowBlock, heading: Row | None) -> Row | None:
+    """Join names and the units that stand in a row of their own, as oscilloscopes write them."""
+    if heading is None:
+        return None
+
+    def units(row: Row) -> list[str]:
+        said = [text.strip("()[] ") for text in row.texts]
+        known = [one.lower() in UNITS or one.lower() in _VOLT_WORDS for one in said if one]
+        return said if len(known) > 1 and all(known) else []
+
+    rows = [row for row in block.headings if len(row.cells) == len(heading.cells)]
+    stated = next(filter(None, map(units, rows)), None)
+    if stated is None or not _VOLT_WORDS & {one.lower() for one in stated}:
+        return heading
+    names = (
+        heading if not units(heading) else next((row for row in rows if not units(row)), heading)
+    )
+    cells = []
+    for n, (cell, unit) in enumerate(zip(names.cells, stated, strict=True)):
+        plain = n == 0 and unit.lower() in UNITS and not _TIME.search(cell.text)
+        name = "time" if plain else cell.text
+        cells.append(cell._replace(text=f"{name} ({unit})" if unit else name))
+    return names._replace(cells=cells)
 
 
 def _by_heading(
@@ -190,10 +237,13 @@ def _by_heading(
             states.append(n)
         elif kind == "duration":
             durations.append(cell)
-        elif kind in {"time", "time of an input"}:
+        elif kind in {"time", "time of an input", "moment"}:
             power = _power(block, heading, n, here, unit, problems)
-            label = "" if kind == "time" else text
-            found.times.append(TimeColumn(n, power, label=label))
+            dark = _DARKENS.search(text)
+            blocked = None if dark is None or kind == "moment" else not (dark[1] or dark[2])
+            label = "" if kind != "time of an input" else text if dark is None else _input(text)
+            found.times.append(TimeColumn(n, power, label=label, blocked=blocked))
+            found.row_is_run |= kind == "moment" or blocked is not None
             said = f"times in {_SYMBOLS[power]}"
         elif kind == "volts":
             found.volts[n] = text
@@ -206,8 +256,9 @@ def _by_heading(
             _check_unused(heading.line, cell, here, problems)
         if text or here:
             found.said[_name(heading, n)] = said
-    found.derived = any(_DERIVED.search(name) for name in found.unused)
-    _pair_states(found, states, len(heading.cells))
+    found.derived = bool(found.unused)
+    _side_by_side(found, heading, values, separator)
+    _pair_states(found, heading, states, len(heading.cells))
     _check_gate(found, heading, values, problems)
     _one_clock(found, heading, block, separator)
     if not (found.times or found.levels or found.volts):
@@ -253,12 +304,15 @@ def _kind(text: str, here: Sequence[str]) -> str:
     match = _UNIT.search(text)
     timed = match is not None and (match[1] or "").lower() in UNITS
     by_heading = (
+        ("time of an input", _DARKENS, timed and not levels),
+        ("moment", _MOMENT, timed and not levels),
         ("state", _STATE, True),
         ("duration", _DURATION, True),
         ("time", _TIME, True),
         ("time of an input", _CHANNEL, timed and not levels),
         ("edge", _EDGE, levels),
         ("volts", _VOLTS, True),
+        ("volts", _SCOPE, _fractions(here)),
         ("level", _INPUT, levels),
         ("run", _NUMBERED_RUN, _whole(here)),
         ("state", _CHANNEL, levels and not _digits(here)),  # a gate that is blocked or clear
@@ -275,13 +329,49 @@ def _name(heading: Row, n: int) -> str:
     return heading.cells[n].text or f"column {n + 1}"
 
 
-def _pair_states(found: Columns, states: Sequence[int], width: int) -> None:
+def _input(text: str) -> str:
+    """Find the name of an input in a heading that says more."""
+    match = _ANY_INPUT.search(text)
+    return match[0] if match else text
+
+
+def _side_by_side(
+    found: Columns, heading: Row, values: Sequence[list[str]], separator: str
+) -> None:
+    """Find out whether times that stand side by side are one drop: a row each, gate after gate."""
+    times = found.times
+    numbered = all(one.label or _NUMBERED.search(heading.cells[one.at].text) for one in times)
+    if len(times) < 2 or found.channel is not None or not numbered or found.row_is_run:
+        return
+    if any(_RUN.search(heading.cells[one.at].text) for one in times):
+        return
+    down = all(_rises(values[one.at], separator) for one in times)
+    if found.run is None and (down and len(values[times[0].at]) > 1):
+        return
+    found.row_is_run = True
+    for one in times:
+        one.label = one.label or heading.cells[one.at].text
+
+
+def _pair_states(found: Columns, heading: Row, states: Sequence[int], width: int) -> None:
     """Give each column of times the states that stand behind it, or before the first."""
+    paired: list[TimeColumn] = []
     for one, end in pairwise([*found.times, None]):
         assert one is not None
         behind = [n for n in states if one.at < n < (width if end is None else end.at)]
         before = [n for n in states if n < one.at] if one is found.times[0] else []
-        one.state = next(iter([*behind, *before]), None)
+        here = [*behind, *before]
+        if len(here) < 2:
+            one.state = here[0] if here else None
+            paired.append(one)
+            continue
+        # One clock, and a column of states for each input.
+        names = [heading.cells[n].text for n in here]
+        short = [_input(name) for name in names]
+        labels = short if len(set(short)) == len(short) else names
+        paired += [TimeColumn(one.at, one.power, n, label)
+                   for n, label in zip(here, labels, strict=True)]  # fmt: skip
+    found.times = paired
 
 
 def _one_clock(found: Columns, heading: Row, block: RowBlock, separator: str) -> None:

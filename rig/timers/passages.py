@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
+from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers.edges_csv import TICK_HZ, picoseconds
@@ -18,6 +20,10 @@ MAX_SPAN_S = 60
 _MAX_RECORDING_S = 86400
 PAUSE_S = 3
 """Drops that stand one after the other are parted by more than this."""
+_DATE = re.compile(
+    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)"
+    r"(?:Z|[+-][0-9:]{4,6})?"
+)
 
 
 class Passage(NamedTuple):
@@ -47,6 +53,7 @@ class _Run:
 
     passages: list[Passage] = field(default_factory=list)
     last: dict[str, int] = field(default_factory=dict)
+    states: dict[str, bool] = field(default_factory=dict)
 
 
 class PassageRows:
@@ -59,6 +66,7 @@ class PassageRows:
         self._runs: dict[tuple[int, int], _Run] = {}
         self._backwards = 0
         self._rows = 0
+        self._drops = 0
 
     def runs(self) -> list[tuple[int, list[Passage]]]:
         """Return each run's number, 0 where rows have none, and its passages."""
@@ -73,6 +81,13 @@ class PassageRows:
         """Read one row; runs that ended earlier have blanks."""
         columns = self._columns
         number = self._whole(row, columns.run, "run")
+        if columns.row_is_run:
+            key = (number, self._drops)
+            self._drops += 1
+            for column in columns.times:
+                if not self._never(row, column):
+                    self._time(row, column, key, column.label)
+            return
         label = self._label(row)
         for beside, column in enumerate(columns.times):
             if column.label:  # side by side stand inputs, and not runs
@@ -82,15 +97,17 @@ class PassageRows:
 
     def _time(self, row: Row, column: TimeColumn, key: tuple[int, int], label: str) -> None:
         cell = row.cell(column.at)
-        if not cell.text:
+        if not cell.text or cell.text.lower() == "nan":
             return
-        time = picoseconds(pointed(cell.text, self._separator), -column.power)
+        time = moment(cell.text, self._separator, column.power)
         if time is None or abs(time) >= 10**12 * TICK_HZ:
             self._fault(row, cell, "time", f"{cell.text!r:.40} is not a time a drop can have")
             return
-        blocked = high = None
+        blocked, high = column.blocked, None
         if column.state is not None:
             state = row.cell(column.state)
+            if column.label and not state.text:
+                return  # another input's row
             blocked = _said(state.text, BLOCKED, CLEAR)
             if blocked is None:
                 self._fault(
@@ -105,6 +122,8 @@ class PassageRows:
                 self._fault(row, edge, "edge", f"{edge.text!r:.40} is no edge: rising or falling")
                 return
         run = self._runs.setdefault(key, _Run())
+        if column.state is not None and column.label and not self._changes(run, label, blocked):
+            return
         before = run.last.get(label, time)
         if run.passages and time - run.passages[0].tick > _MAX_RECORDING_S * TICK_HZ:
             self._fault(row, cell, "time", "a recording would last more than a day")
@@ -116,6 +135,18 @@ class PassageRows:
             return
         run.last[label] = time
         run.passages.append(Passage(time, label, blocked, high))
+
+    def _never(self, row: Row, column: TimeColumn) -> bool:
+        """Whether a time side by side was never reached: a zero after others."""
+        zero = picoseconds(pointed(row.cell(column.at).text, self._separator)) == 0
+        return zero and column is not self._columns.times[0]
+
+    @staticmethod
+    def _changes(run: _Run, label: str, blocked: bool | None) -> bool:
+        """Whether an input's state is another one than above; beams begin clear."""
+        changes = run.states.get(label, False) is not blocked
+        run.states[label] = bool(blocked)
+        return changes
 
     def _label(self, row: Row) -> str:
         at = self._columns.channel
@@ -132,6 +163,20 @@ class PassageRows:
 
     def _fault(self, row: Row, cell: TableCell, key: str, message: str) -> None:
         self._problems.add(row.line, cell.column, key, message)
+
+
+def moment(text: str, separator: str, power: int) -> int | None:
+    """Read a time as picoseconds: a number, or a date with its time of day."""
+    match = _DATE.fullmatch(text)
+    if match is None:
+        return picoseconds(pointed(text, separator), -power)
+    try:
+        day = date.fromisoformat(match[1]).toordinal()
+    except ValueError:
+        return None
+    seconds = picoseconds(match[4])
+    assert seconds is not None
+    return ((day * 24 + int(match[2])) * 60 + int(match[3])) * 60 * TICK_HZ + seconds
 
 
 def _said(text: str, yes: set[str], no: set[str]) -> bool | None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.timers.edges_csv import TICK_HZ, picoseconds
-from rig.timers.passages import Passage
-from rig.timers.table import FALLING, NO_LEVEL, RISING, as_state, pointed
+from rig.timers.edges_csv import TICK_HZ
+from rig.timers.passages import Passage, moment
+from rig.timers.table import FALLING, NO_LEVEL, RISING, as_state
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -167,7 +167,7 @@ def sample_times(
     found: list[int] = []
     for row in rows:
         cell = row.cell(column.at)
-        time = picoseconds(pointed(cell.text, separator), -column.power)
+        time = moment(cell.text, separator, column.power)
         if time is None:
             problems.add(row.line, cell.column, "time", f"{cell.text!r:.40} is not a time")
             time = found[-1] if found else 0

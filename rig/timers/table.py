@@ -26,6 +26,9 @@ _WORDS = BLOCKED | CLEAR | RISING | FALLING | NO_LEVEL
 _NEW_BLOCK = re.compile(
     r"^(?:run|trial|drop|data ?set|series|lauf|versuch|messung|vernier format)\b", re.IGNORECASE
 )
+_CLOCK = re.compile(r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> ")
+"""What Arduino's serial monitor writes before a line."""
+_KEYED = re.compile(r"([A-Za-z_]\w*)\s*[=:]\s*([^\s,;=:]+)")
 _REMARK = re.compile(r'^\s*"?(?:#|%|//)|^;\s+[^;]+$')
 NAME_AND_NUMBER = re.compile(r"[A-Za-z_]+[ _-]?[0-9]+")
 
@@ -113,10 +116,13 @@ def lines_of(path: str | os.PathLike[str]) -> list[str]:
 
 def read_table(lines: Sequence[str]) -> Table:
     """Split a file into remarks, headings and blocks of rows."""
+    lines, names = _unkeyed([_CLOCK.sub(_blanks, line) for line in lines])
     marked = [_REMARK.match(line) is not None for line in lines]
     plain = [line for line, remark in zip(lines, marked, strict=True) if not remark]
     separator = _separator(plain)
     remarks, blocks, last = [], [RowBlock()], None
+    if names:
+        blocks[0].headings.append(Row(1, [TableCell(1, name) for name in names]))
     for number, line in enumerate(lines, 1):
         if marked[number - 1]:
             last = Row(number, _cells(_unmarked(line), separator))
@@ -144,6 +150,23 @@ def read_table(lines: Sequence[str]) -> Table:
         else:
             block.headings.append(row)
     return Table(separator, tuple(remarks), tuple(one for one in blocks if one.rows))
+
+
+def _blanks(found: re.Match[str]) -> str:
+    return " " * len(found[0])
+
+
+def _unkeyed(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
+    """Take the names out of lines such as ``gate=1 t=402345`` where all have the same."""
+    parts = [_KEYED.findall(line) for line in lines]
+    names = next(([name for name, _ in one] for one in parts if len(one) > 1), None)
+    rows = [one for one in parts if [name for name, _ in one] == names]
+    if names is None or len(rows) * 2 <= sum(bool(line.strip()) for line in lines):
+        return lines, []
+    return [
+        "\t".join(value for _, value in one) if one in rows else f"# {line}"
+        for line, one in zip(lines, parts, strict=True)
+    ], names
 
 
 def is_data(row: Row, separator: str) -> bool:

@@ -164,8 +164,9 @@ def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFil
                 )
             if columns.derived and _sampled(rows.runs(), columns):
                 raise InputError(
-                    f"{problems.file}:{block.rows[0].line}:1: places at regular times, as from "
-                    "video or a motion detector: wanted are the times at which gates change",
+                    f"{problems.file}:{block.rows[0].line}:1: samples at regular times, as from "
+                    f"video or a sensor ({', '.join(columns.unused)}): wanted are the times at "
+                    "which gates change, or samples of gates in volts",
                     "if these are passages nevertheless, leave the other columns out",
                 )
             for number, passages in rows.runs():
@@ -232,13 +233,11 @@ def _samples(
         problems.raise_if_any(_HINT)
         crossed = volt_passages(heading, times, volts)
         if crossed is None:
-            found.notes.append(
-                f"{heading}: nothing passes, {volts.min():.3g} to {volts.max():.3g} V"
-            )
+            found.notes.append(f"{heading}: nothing passes, {volts.min():.3g} to {volts.max():.3g}")
             continue
         more, found.begins[heading], middle = crossed
         passages += more
-        found.notes.append(f"{heading}: {len(more)} crossings of {middle:.3g} V")
+        found.notes.append(f"{heading}: {len(more)} crossings of {middle:.3g}")
         found.period_s = float(np.median(steps)) if steps.size else None
     if passages:
         found.add(passages)

@@ -311,7 +311,7 @@ def test_old_windows_writes_micro_in_one_byte(tmp_path):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "places at regular times"),
+        ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "samples at regular times"),
         ("1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n", "they are durations"),
         ("Time,Gate\n0.1,1\n0.2,0\n0.3,1\n", "a gate's number or its state"),
         ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "are durations"),
@@ -360,3 +360,72 @@ def test_a_long_table_is_read_in_any_order_of_columns(tmp_path, steps, order, un
     (drop,) = drops_of(read_timer_file(path), {str(n): n for n in range(4)}, 8)
     start = drop.edges[0].tick - wanted[0][0]
     assert [(e.tick - start, e.channel, e.blocked) for e in drop.edges] == wanted
+
+
+FALL = (0.24, 0.29, 0.41, 0.44)
+
+
+def _row(times, separator=","):
+    return separator.join(f"{one:.9E}" for one in times)
+
+
+@pytest.mark.parametrize(
+    ("text", "passed"),
+    [
+        ('"Event time (s)","Interval (s)"\n' + "".join(f"{_row((t, 0.1))}\n" for t in FALL),
+         {"": FALL}),
+        ('"Start (s)"\t"Stop 1 (s)"\t"Stop 2 (s)"\t"Stop 3 (s)"\t"Stop 4 (s)"\n'
+         + _row(FALL, "\t") + "\tNaN\n", {"": FALL}),
+        ('"On 0 (s)";"Off 0 (s)";"On 1 (s)";"Off 1 (s)";"On 2 (s)";"Off 2 (s)"\n'
+         + _row((*FALL, 0, 0), ";").replace(".", ",") + "\n", {"": FALL}),
+        ("Gate 1 blocked (s),Gate 1 unblocked (s),Gate 2 blocked (s),Gate 2 unblocked (s)\n"
+         "0.24,0.29,0.41,0.44\n", {"Gate 1": FALL[:2], "Gate 2": FALL[2:]}),
+        ("Trial,t1 (s),t2 (s),t3 (s),t4 (s)\n1,0.24,0.29,0.41,0.44\n2,0.25,0.3,0.42,0.45\n",
+         {f"t{n} (s)": (t,) for n, t in enumerate(FALL, 1)}),
+        ("Latest: Time (s),Latest: Gate 1 State,Latest: Gate 2 State\n"
+         "0.24,1,\n0.29,0,\n0.41,,1\n0.44,,0\n", {"Gate 1": FALL[:2], "Gate 2": FALL[2:]}),
+        ("Time (s)\tState, Ch 1 Run #1\tState, Ch 2 Run #1\n0\t0\t0\n0.24\t1\t0\n0.29\t0\t0\n"
+         "0.41\t0\t1\n0.44\t0\t0\n", {"Ch 1": FALL[:2], "Ch 2": FALL[2:]}),
+        ("Time [s],Channel 0\n" + "".join(
+            f"2026-03-01T12:00:00.{ms:03}+00:00,{level}\n"
+            for ms, level in ((0, 1), (240, 0), (290, 1), (410, 0), (440, 1))
+        ), {"Channel 0": FALL}),
+        ("10:01:02.345 -> gate=1 t_us=240000 state=1\n10:01:02.390 -> gate=1 t_us=290000 state=0\n"
+         "10:01:02.500 -> gate=2 t_us=410000 state=1\n10:01:02.520 -> gate=2 t_us=440000 state=0\n",
+         {"1": FALL[:2], "2": FALL[2:]}),
+    ],
+)  # fmt: skip
+def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
+    path = tmp_path / "table.csv"
+    path.write_text(text, "utf-8")
+    run = read_timer_file(path).runs[1]
+    origin = min(one.tick for one in run) - round(FALL[0] * TICK_HZ)  # of a date it is far away
+    found = {}
+    for one in run:
+        found.setdefault(one.label, []).append((one.tick - origin) / TICK_HZ)
+    assert {label: pytest.approx(times) for label, times in passed.items()} == found
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "Source,CH1,CH2\nSecond,Volt,Volt",
+        "x-axis,1,2\nsecond,Volt,Volt",
+        "Time,Channel A,Channel B\n(s),(V),(V)",
+        "TIME,CH1,CH2",
+        "t (s),Illuminance 1 (lx),Illuminance 2 (lx)",
+    ],
+)
+def test_what_oscilloscopes_write_is_read_input_by_input(tmp_path, heading):
+    dark = (range(241, 290), range(411, 440))
+    rows = [",".join([f"{k * 1e-3:.4f}", *("0.100" if k in one else "4.900" for one in dark)])
+            for k in range(500)]  # fmt: skip
+    path = tmp_path / "scope.csv"
+    path.write_text("\n".join([heading, *rows]), "utf-8")
+    found = read_timer_file(path)
+    times = {label: [one.tick / TICK_HZ for one in found.runs[1] if one.label == label]
+             for label in found.labels}  # fmt: skip
+    assert len(times) == 2
+    assert sorted(times.values()) == [
+        pytest.approx([0.2405, 0.2895]), pytest.approx([0.4105, 0.4395])
+    ]  # fmt: skip
