@@ -303,6 +303,9 @@ def _parser() -> Parser:
         "--scatter", action="store_true", help="SD, SE and U of each incline, and half-SD bars"
     )
     analyze.add_argument(
+        "--video", metavar="FILE", help="t, x, y of a tracked video of the same fall, as a check"
+    )
+    analyze.add_argument(
         "--priors", action="store_true", help="how results move with each prior: takes longer"
     )
     _json(analyze)

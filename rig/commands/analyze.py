@@ -5,18 +5,25 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.video import VideoFall, video_fall
 from rig.commands.output import print_results, progress, show
 from rig.errors import SessionError
+from rig.measurands import acceleration_in
 from rig.report.columns import aligned
+from rig.report.numbers import plus_minus
 from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
 from rig.results import keep, results
 from rig.session.store import Session
+from rig.timers.video import read_video
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Iterator
 
     from rig.analysis.identified import Identified
+    from rig.analysis.result import Measured
     from rig.records import Job
+    from rig.results import SessionResults
 
 
 def main(arguments: Namespace) -> int:
@@ -25,6 +32,7 @@ def main(arguments: Namespace) -> int:
         from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
 
         return budget.main(arguments)
+    track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
         extent = session.extent()
         known: dict[Job, Identified] = {}
@@ -38,6 +46,9 @@ def main(arguments: Namespace) -> int:
         from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - likewise
 
         more["prior_sensitivity"] = prior_sensitivity(found.analysis)
+    video = None if track is None else video_fall(*track)
+    if video is not None and not found.blind:
+        more["video"] = video.json(_by_gates(found))
     # A session that is being written, or on a read-only disk, is analysed all the same.
     with suppress(SessionError), Session.open(arguments.session) as session:
         if session.extent() == extent:  # else it went on meanwhile, and these are out of date
@@ -49,8 +60,36 @@ def main(arguments: Namespace) -> int:
         asked += [*gate_parts(found.analysis.summary), *effects_parts(found.analysis.effects)]
         for part in asked:
             show(["", part.heading, *aligned(part.columns, part.records)])
+        if video is not None and "video" in more:
+            show(["", *_video_lines(video, _by_gates(found))])
         if "monte_carlo" in more:
             from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise
 
             show(["", *trials_lines(more["monte_carlo"])])
     return code
+
+
+def _by_gates(found: SessionResults) -> Measured | None:
+    """Acceleration that the gates found: of what only falls, or of the free chain."""
+    for line in found.analysis.summary:
+        row = acceleration_in(line.means)
+        if row is not None:
+            return line.means[row.name]
+    return None if found.gravity is None else found.gravity.measured
+
+
+def _video_lines(video: VideoFall, gates: Measured | None) -> Iterator[str]:
+    yield f"acceleration by {video.frames} frames of a video: {_said(video.acceleration)}"
+    if gates is not None:
+        error = video.beside(gates)
+        word = (
+            "they agree" if abs(error) <= 1.0 else "they disagree: the video's scale, or its frames"
+        )
+        yield f"by the gates: {_said(gates)}; Eₙ {error:+.2f}, {word}"
+    if video.bent:
+        yield "the frames follow no parabola: cut those before the release and after the end"
+    yield "± is what the frames' scatter allows, without how well the video's lengths are scaled"
+
+
+def _said(value: Measured) -> str:
+    return f"{plus_minus(value, 1.0, 3)} m/s²"

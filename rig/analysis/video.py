@@ -1,0 +1,74 @@
+"""What a video of the same fall says of its acceleration, beside what the gates say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.result import Measured
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_BENT = 0.5
+"""Correlation of neighbours' residuals above which frames follow another curve."""
+_ENOUGH = 8  # frames that tell such a correlation
+
+
+@dataclass(frozen=True, slots=True)
+class VideoFall:
+    """Acceleration by a video.
+
+    Attributes
+    ----------
+    acceleration
+        m/s², with what the frames' scatter allows; the video's scale of lengths is not in it.
+    frames
+        How many.
+    bent
+        Whether they follow another curve than a parabola, by more than chance.
+    """
+
+    acceleration: Measured
+    frames: int
+    bent: bool
+
+    def beside(self, gates: Measured) -> float:
+        """E_n of the video's acceleration less that of the gates; within ±1 they agree."""
+        width = np.hypot(self.acceleration.expanded, gates.expanded)
+        return float((self.acceleration.value - gates.value) / width)
+
+    def json(self, gates: Measured | None) -> dict[str, Any]:
+        """As ``video`` in the results."""
+        said: dict[str, Any] = {"acceleration_m_s2": self.acceleration.json()}
+        said |= {"frames": self.frames, "bent": self.bent}
+        return said if gates is None else said | {"normalized_error": self.beside(gates)}
+
+
+def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
+    """Fit parabolas to both coordinates; which way is down, and where it began, do not matter.
+
+    Parameters
+    ----------
+    times, x, y
+        s and m, shape ``(frames,)``, at least 4 frames.
+    """
+    design = np.vander(times - times.mean(), 3)  # centred, so that squares do not drown
+    inverse = np.linalg.inv(design.T @ design)
+    places = np.column_stack([x, y])
+    solved = inverse @ design.T @ places
+    left = places - design @ solved
+    rates = 2.0 * solved[0]
+    size = float(np.hypot(*rates))
+    along = rates / size if size else np.array([0.0, 1.0])
+    degrees = times.size - 3
+    off = left @ along  # only what scatters the same way moves the size
+    u = 2.0 * float(np.sqrt(off @ off / degrees * inverse[0, 0]))
+    total = float(off @ off)
+    neighbours = float(off[1:] @ off[:-1]) / total if total else 0.0
+    bent = times.size >= _ENOUGH and neighbours > _BENT
+    return VideoFall(Measured(size, u, float(degrees)), int(times.size), bent)

@@ -1,0 +1,99 @@
+"""Where something was, frame by frame, as trackers of videos write it: t, x, y."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rig.errors import InputError
+from rig.timers.problems import ProblemList
+from rig.timers.table import is_number, lines_of, pointed, read_table
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+    from rig.timers.table import Row
+
+    Array = NDArray[np.float64]
+
+FEWEST = 6
+"""Frames that tell an acceleration and how much they scatter."""
+_NAMES = {name: re.compile(rf"^{name}(?![A-Za-z])", re.IGNORECASE) for name in "txy"}
+_SCALES = {"s": 1.0, "ms": 1e-3, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_HINT = (
+    "accepted is what Tracker copies or exports: columns t, x and y with a heading, in s and m "
+    "where it says no unit"
+)
+
+
+class VideoTrack(NamedTuple):
+    """Moments, s, and places then, m; each of shape ``(frames,)``."""
+
+    times: Array
+    x: Array
+    y: Array
+
+
+def read_video(path: str | os.PathLike[str]) -> VideoTrack:
+    """Read a table of places; frames without one are left out.
+
+    Raises
+    ------
+    InputError
+        Another kind of file, too few frames, or values that are no numbers, at their places.
+    """
+    problems = ProblemList(str(path))
+    table = read_table(lines_of(path))
+    block = next(iter(table.blocks), None)
+    heading = None if block is None else next(filter(_named, reversed(block.headings)), None)
+    if block is None or heading is None:
+        raise InputError(f"{path}:1:1: no columns t, x and y", _HINT)
+    at = {name: _column(heading, name) for name in _NAMES}
+    scales = {name: _scale(heading, n, problems) for name, n in at.items()}
+    frames: list[list[float]] = []
+    for row in block.rows:
+        cells = {name: row.cell(n) for name, n in at.items()}
+        if any(cell.text.lower() in {"", "nan"} for cell in cells.values()):
+            continue
+        for name, cell in cells.items():
+            if not is_number(cell.text, table.separator):
+                problems.add(row.line, cell.column, name, f"{cell.text!r:.40} is not a number")
+                break
+        else:
+            frames.append([scales[name] * float(pointed(cell.text, table.separator))
+                           for name, cell in cells.items()])  # fmt: skip
+    problems.raise_if_any(_HINT)
+    found = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)
+    if found.times.size < FEWEST or not np.all(np.diff(found.times) > 0):
+        raise InputError(
+            f"{path}: {found.times.size} frames one after the other; at least {FEWEST} are wanted",
+            "track one object over one fall, each frame once",
+        )
+    return found
+
+
+def _named(row: Row) -> bool:
+    return all(any(one.search(text) for text in row.texts) for one in _NAMES.values())
+
+
+def _column(heading: Row, name: str) -> int:
+    return next(n for n, text in enumerate(heading.texts) if _NAMES[name].search(text))
+
+
+def _scale(heading: Row, at: int, problems: ProblemList) -> float:
+    cell = heading.cells[at]
+    match = re.search(r"[(\[/_]\s*([^\W\d_]+)", cell.text)
+    if match is None:
+        return 1.0
+    if match[1] not in _SCALES or (match[1] in {"s", "ms"}) is not cell.text[0].lower().startswith(
+        "t"
+    ):
+        problems.add(
+            heading.line, cell.column, cell.text, f"{match[1]!r} is no unit: s, ms; m, cm, mm"
+        )
+        return 1.0
+    return _SCALES[match[1]]
