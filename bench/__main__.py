@@ -79,6 +79,12 @@ def _parser() -> argparse.ArgumentParser:
     mutation.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
     mutation.add_argument("--page", metavar="FILE", help="write what came of it there")
 
+    states = benches.add_parser("states", help="every state of a drop, with all that goes wrong")
+    states.add_argument(
+        "--depths", type=_count, nargs=2, default=[5, 3], metavar="N",
+        help="steps from the beginning: undisturbed, and disturbed at each moment",
+    )  # fmt: skip
+
     stop = benches.add_parser("stop", help="how long STOP takes to the wire, whatever is going on")
     stop.add_argument("--stops", type=_count, default=50, metavar="N", help="in each condition")
 
@@ -86,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     tui.add_argument(
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
-    for one in (clock, faults, hostile, link, mutation, soak, stop, tui):
+    for one in (clock, faults, hostile, link, mutation, soak, states, stop, tui):
         one.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser
 

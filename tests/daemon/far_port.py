@@ -44,6 +44,8 @@ class FarPort:
         self.baudrates = []
         self._over = threading.Event()
         self._hung_up = threading.Event()
+        self._silent = threading.Event()
+        self._half_open = []
         self._thread = threading.Thread(target=self._run)
 
     def __enter__(self):
@@ -54,9 +56,16 @@ class FarPort:
         self._over.set()
         self._thread.join()
         self._server.close()
+        for one in self._half_open:
+            one.close()
 
     def hang_up(self):
         """Lose the client that is connected now."""
+        self._hung_up.set()
+
+    def fall_silent(self):
+        """Lose it without a word, as a cable does that is pulled between two switches."""
+        self._silent.set()
         self._hung_up.set()
 
     def _run(self):
@@ -68,6 +77,9 @@ class FarPort:
                     with contextlib.suppress(ConnectionError):
                         self._serve(client, port)
                     self.baudrates.append(port.baudrate)
+                    if self._silent.is_set():
+                        self._half_open.append(client.dup())
+                        self._silent.clear()
 
     def _serve(self, client, port):
         to_board = to_host = bytes

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
+import threading
 from contextlib import closing, suppress
 
+from rig.daemon.stopper import Stopper
 from rig.errors import DeviceTimeoutError
 from rig.link.frames import Decoder
-from rig.link.messages import CODES, Abort, Done, Phase
+from rig.link.messages import CODES, HOST_SILENCE_MS, Abort, Done, Phase
 from rig.session.store import Session
 from tests.waiting import PATIENCE_S, until
 
@@ -20,6 +22,20 @@ def frames(session, direction):
         if chunk.direction == direction
         for frame in decoder.feed(chunk.data)
     ]
+
+
+def test_without_a_worker_all_five_leave_before_the_board_switches_itself_off(monkeypatch):
+    """It would by then, and a later one could only end what somebody armed anew."""
+    paused, sent = [], threading.Semaphore(0)
+    stopper = Stopper(lambda: sent.release() or True)
+    monkeypatch.setattr(stopper._taken_over, "wait", paused.append)
+    stopper.start()
+    stopper.ask()
+    for _ in range(5):
+        assert sent.acquire(timeout=PATIENCE_S)
+    until(lambda: len(paused) == 5)
+    stopper.end()
+    assert 0.0 < sum(paused) < HOST_SILENCE_MS * 1e-3
 
 
 def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
