@@ -41,6 +41,11 @@ def test_every_command_of_the_readme_works(tmp_path):
     held, of = re.search(r"([0-9]+) of ([0-9]+) results hold", said["./run demo"]).groups()
     assert int(of) == 18
     assert int(held) >= 14, "at 95 % that is fewer once in a thousand seeds"
+    for symbol, hidden in (("β", 0.5), ("μ", 0.2)):
+        told = rf"{symbol} ([0-9.]+) ± ([0-9.]+) \(hidden: {hidden}\)"
+        found = re.search(told, " ".join(said["./run demo"].split()))
+        value, expanded = map(float, found.groups())
+        assert abs(value - hidden) < 2 * expanded, "four standard uncertainties"
     assert "g ± U (m/s²)" in said[".venv/bin/rig analyze my.session"]
 
 

@@ -13,21 +13,26 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.commands import report
-from rig.commands.output import VOID, goes_on, say
+from rig.commands.narration import narrator
+from rig.commands.output import VOID, goes_on, say, show
+from rig.errors import InputError
+from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
 from rig.measurands import averaged
 from rig.ports import truth_file
-from rig.protocol.reader import parse
+from rig.protocol.reader import parse, read
 from rig.ready import ready_protocol
 from rig.recorder.interrupts import Interrupts
 from rig.report.columns import Column, aligned
+from rig.report.estimate import symbol
 from rig.report.numbers import fixed, plus_minus
-from rig.runner import Operator, run_protocol
+from rig.runner import run_protocol
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.session import Analysis
+    from rig.protocol.protocol import Protocol
 
 _PROTOCOL = "inclined-uniform"
 _REPEATS = "repeats: 12 "
@@ -54,11 +59,13 @@ def _dropped(protocol: Path, session: Path, arguments: Namespace) -> int:
     """Let chains fall, or those that have not fallen yet, and show what was found."""
     interrupts = Interrupts()
     with interrupts.caught():
+        told = narrator(str(protocol), None)
         found = run_protocol(
-            str(protocol), "sim://", str(session), Operator(say), arguments.seed, interrupts
+            str(protocol), "sim://", str(session), told, arguments.seed, interrupts
         )
     print("SIMULATED DATA")
     print("\n".join(beside_truth(found.analysis, session)))
+    show([impacts(read(protocol), found.analysis)])
     page = session.with_name("report.html")
     code = report.main(
         Namespace(session=str(session), output=str(page), figures=str(page.parent), bars="U95")
@@ -114,6 +121,21 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
         *aligned(columns, [dict.fromkeys(headings, "") | cells for cells in rows]),
         f"{held} of {of} results hold the hidden truth within ± U, which is meant to hold 95 %",
     ]
+
+
+def impacts(protocol: Protocol, analysis: Analysis) -> str:
+    """Say which β and μ the drops tell, beside those that the simulated board has."""
+    try:
+        found = estimate(protocol, analysis).coefficients
+    except InputError as error:
+        return error.message
+    parts = [
+        f"{symbol(one.name)} {plus_minus(one.least_squares)} (hidden: {one.stated.value:g})"
+        for one in (found.parameters if found else ())
+        if one.identified
+    ]
+    said = ", ".join(parts).replace("-", "−")
+    return f"what the impacts have in common: {said or 'too few drops tell it'}"
 
 
 def _has_screen() -> bool:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.commands.narration import narrator
 from rig.commands.output import goes_on, print_results, say
-from rig.protocol import reader
 from rig.recorder.interrupts import Interrupts
 from rig.report.finding import finding
-from rig.runner import Operator, run_protocol
+from rig.runner import run_protocol
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Carry out a protocol."""
     attended = not arguments.yes and sys.stdin.isatty()
-    operator = _operator(arguments.protocol, attended=attended)
+    operator = narrator(arguments.protocol, _ask if attended else None)
     interrupts = Interrupts()
     with goes_on("the same command goes on from here"), interrupts.caught():
         found = run_protocol(
@@ -36,20 +35,6 @@ def main(arguments: Namespace) -> int:
     say(f"session: {arguments.session}")
     say(finding(found.analysis))
     return code
-
-
-def _operator(source: str, *, attended: bool) -> Operator:
-    """Narrate by a picture where it can be drawn and there is one, or else by lines."""
-    ask = _ask if attended else None
-    if not sys.stderr.isatty() or sys.stderr.encoding.lower() != "utf-8":
-        return Operator(say, ask)
-    protocol = reader.read(source)
-    if protocol.surface is None or protocol.blind or os.environ.get("TERM") == "dumb":
-        return Operator(say, ask)
-    from rig.commands.growing import Growing  # noqa: PLC0415 - only where somebody looks
-
-    screen = Growing(protocol, sys.stderr)
-    return Operator(screen.say, screen.ask if attended else None, screen.judged)
 
 
 def _ask(request: str) -> None:
