@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from rig.analysis.alone import Alone
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import silent
@@ -80,6 +81,23 @@ def fit_drop(
         What was found out before about drops of this session, and is found out here. Results are
         the same with it and without.
     """
+    known, job = {} if known is None else known, Job(drop.run, drop.attempt)
+    result, fit = _fitted(protocol, run, drop, scale, components, known, explain=explain)
+    if explain:
+        known[job] = replace(known[job], alone=Alone(scale.hz, result))
+    return result, fit
+
+
+def _fitted(
+    protocol: Protocol,
+    run: Run,
+    drop: Drop,
+    scale: TimeScale,
+    components: Components | None,
+    known: MutableMapping[Job, Identified],
+    *,
+    explain: bool,
+) -> tuple[DropResult, Fit | None]:
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
@@ -89,8 +107,7 @@ def fit_drop(
     if drop.certificate is not None:
         lost = drop.certificate.overflows
     blank = Audit(received, 0, expected, received, lost)
-    job, known = Job(drop.run, drop.attempt), {} if known is None else known
-    rough = scale.rounded()
+    job, rough = Job(drop.run, drop.attempt), scale.rounded()
     one = known.get(job)
     if one is None or one.scale != rough:
         one = known[job] = identified(protocol, run, drop, rough, components)

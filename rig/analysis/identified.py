@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.alone import Alone
 from rig.analysis.chain_records import chain_records
 from rig.analysis.fit import Begun
 from rig.analysis.identify import identify
@@ -42,6 +43,8 @@ class Identified:
         The fall, as it was adjusted; `None` where there is none.
     explained
         What else than the protocol would explain edges that are like no fall; `None` if not sought.
+    alone
+        What they say by themselves; `None` before they were asked with all that `explained` takes.
     """
 
     scale: TimeScale
@@ -49,6 +52,7 @@ class Identified:
     poor: tuple[str, ...] = ()
     begun: Begun | None = None
     explained: tuple[str, ...] | None = None
+    alone: Alone | None = None
 
     def json(self) -> dict[str, Any]:
         """Return it so that `read` gives the same, to the last bit."""
@@ -67,12 +71,14 @@ class Identified:
                 },
                 "x": self.begun.x.tolist(),
             }
+        if self.alone is not None:
+            found["alone"] = self.alone.json()
         return found
 
     @classmethod
     def read(cls, said: Mapping[str, Any]) -> Identified:
         """Take it from what `json` returned."""
-        why, begun = said["explained"], None
+        why, begun, alone = said["explained"], None, said.get("alone")
         if "begun" in said:
             kept = said["begun"]
             begun = Begun(
@@ -89,6 +95,7 @@ class Identified:
             tuple(said["poor"]),
             begun,
             None if why is None else tuple(why),
+            None if alone is None else Alone.read(alone),
         )
 
 

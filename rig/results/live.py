@@ -227,10 +227,18 @@ class LiveAnalysis:
             From `read`.
         """
         of = self._members(view.results)
-        fits = [self._known[job].fit for job in view.results]
+        fits = [self._fit(view, job) for job in view.results]
         found = gather(view.protocol, list(view.results.values()), fits)
         size = sum(result.learned for result in (*found.runs, *found.superseded))
         self._joint_fit = _JointFit(of, size, found)
+
+    def _fit(self, view: SessionView, job: Job) -> Fit | None:
+        known = self._known[job]
+        if known.fit is None and known.result.verdict in GOOD:
+            drop, scale = view.drops[job], view.scales[job]
+            _, fit = fit_drop(view.protocol, view.plan[job.run], drop, scale, known=self.identified)
+            self._known[job] = known = known._replace(fit=fit)
+        return known.fit
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
         return {job: (result.verdict, self._known[job].hz) for job, result in results.items()}
@@ -249,11 +257,21 @@ class LiveAnalysis:
     ) -> None:
         known = self._known.get(job)
         if known is None or abs(known.hz / scale.hz - 1.0) > _SAME_SCALE:
-            result, fit = fit_drop(protocol, run, drop, scale, known=self.identified)
+            result, fit = self._alone(protocol, run, job, drop, scale)
             falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)
         self.done = len(self._known)
+
+    def _alone(
+        self, protocol: Protocol, run: Run, job: Job, drop: Drop, scale: TimeScale
+    ) -> tuple[DropResult, Fit | None]:
+        """Say what a drop says by itself; what was kept of that needs no fit until a joint one."""
+        one = self.identified.get(job)
+        kept = one.alone if one else None
+        if kept and kept.result.run == run and abs(kept.hz / scale.hz - 1.0) <= _SAME_SCALE:
+            return kept.result, None
+        return fit_drop(protocol, run, drop, scale, known=self.identified)
 
 
 def _veiled_view(view: SessionView) -> SessionView:

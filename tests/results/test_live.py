@@ -9,6 +9,7 @@ import pytest
 
 from rig import __version__
 from rig.analysis import identified
+from rig.analysis.alone import Alone
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import FEWEST
 from rig.clock.calibration import TimeScale
@@ -101,20 +102,40 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
 def test_what_a_run_found_out_about_its_drops_is_not_found_out_again(
     session, tmp_path, monkeypatch
 ):
+    """Nor fitted before a joint fit asks for it, which says the same."""
     bare = shutil.copy(session, tmp_path / "bare.session")
     with Session.open(bare) as opened:
         opened.put_results([], "none")
         opened.commit()
-    anew = LiveAnalysis(bare).read()
+    anew, opener = LiveAnalysis(bare), LiveAnalysis(session)
+    expected = anew.read()
+    anew.fit_jointly(expected)
     monkeypatch.setattr(identified, "identify", None)
-    kept = LiveAnalysis(session).read()
-    assert {job: one.json() for job, one in kept.results.items()} == {
-        job: one.json() for job, one in anew.results.items()
-    }
+    with monkeypatch.context() as without:
+        without.setattr("rig.results.live.fit_drop", None)
+        kept = opener.read()
+    assert kept.results == expected.results
+    opener.fit_jointly(kept)
+    assert opener.read().analysis.json() == anew.read().analysis.json()
     with Session.open(session, readonly=True) as opened:
         assert (
             opened.results() == results(opened, known=kept_identified(opened, kept.drops)).records()
         )
+
+
+def test_what_a_drop_said_at_another_tick_rate_or_as_another_run_is_not_taken(session):
+    view = LiveAnalysis(session).read()
+    with Session.open(session, readonly=True) as opened:
+        known = kept_identified(opened, view.drops)
+    false = {job: replace(one.alone.result, verdict="void") for job, one in known.items()}
+    quick, other = Job(1, 1), Job(2, 1)
+    false[other] = replace(false[other], run=view.plan[1])
+    for job, one in known.items():
+        hz = one.alone.hz * (1.0 + 1e-5 * (job == quick))
+        known[job] = replace(one, alone=Alone(hz, false[job]))
+    taken = LiveAnalysis(session, identified=known).read().results
+    assert [job for job, one in taken.items() if one.verdict != "void"] == [quick, other]
+    assert all(taken[job] == view.results[job] for job in (quick, other))
 
 
 @pytest.mark.parametrize("altered", [None, 7, ["", "{}"], ["", 7], {}, "more edges"])

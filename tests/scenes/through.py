@@ -11,8 +11,11 @@ import traceback
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rig import __version__
+from rig.analysis.identified import Identified
 from rig.analysis.result import GOOD
 from rig.cli import main
+from rig.session.store import Session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -297,6 +300,11 @@ class _Journey:
             self.fault("replay", done.out[-300:])
         self.call("recover", self.session, "-o", self.folder / "recovered.session")
         self.call("doctor", "--session", self.session)
+        with Session.open(self.session, readonly=True) as session:
+            for _, text in session.beside_results(__version__).values():
+                again = json.dumps(Identified.read(json.loads(text)).json())
+                if again != text:
+                    self.fault("run", f"what is kept of a drop is read as another: {again}")
 
 
 def _around(text: str, met: re.Match[str] | None) -> str:
