@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import sys
 from contextlib import suppress
@@ -34,7 +35,8 @@ def main(arguments: Namespace) -> int:
         return 0
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InputError("rig tui needs a terminal", "without one: rig run PROTOCOL --port URL")
-    asyncio.run(_shown(RigApp(options, keys)))
+    # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
+    asyncio.run(_shown(RigApp(options, keys, loaded=gc.freeze)))
     return 0
 
 

@@ -44,11 +44,12 @@ if TYPE_CHECKING:
     from rig.tui.state import DaemonState
 
 TICK_S = 0.1
+_LEAST_S = 0.01  # between ticks, when one was late
 _COUNTED_S = 0.3
 """Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
 _TOLD_S = 15.0
-_SHARE = 0.15  # of a core, that this may take for long
-_SAVED_S = 0.3  # of processor time: enough to draw a whole fall at each tick
+_SHARE = 0.18  # of a core, that this may take for long
+_SAVED_S = 0.1  # of processor time, that a fall may take beyond it
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
     Stage.DEVICE: "device",
@@ -132,6 +133,8 @@ class RigApp(App[None], inherit_bindings=False):
         Of every action, by name.
     client
         Another line to the rig than the options ask for.
+    loaded
+        Called when all that a session needs is in memory.
     """
 
     TITLE = "chainrig"
@@ -144,7 +147,11 @@ class RigApp(App[None], inherit_bindings=False):
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 
     def __init__(
-        self, options: Options, keys: Mapping[str, str], client: ReconnectingClient | None = None
+        self,
+        options: Options,
+        keys: Mapping[str, str],
+        client: ReconnectingClient | None = None,
+        loaded: Callable[[], object] | None = None,
     ) -> None:
         super().__init__()
         self.options = options
@@ -152,6 +159,7 @@ class RigApp(App[None], inherit_bindings=False):
         self.action_of = {key: name for name, given in keys.items() for key in given.split(",")}
         self.page: str = ""
         self.client = client
+        self._loaded = loaded
         if client is None and not options.offline:
             self.client = ReconnectingClient(options.port, options.socket, self._reached)
         self.follower = Follower(self.client, self.begin)
@@ -162,7 +170,7 @@ class RigApp(App[None], inherit_bindings=False):
         self._turning = asyncio.Lock()
         self._turned_to = ""
         self._stillness = Stillness(options.still_s)
-        self._last = monotonic()
+        self._last = self._due = monotonic()
         self._spent, self._saved_s = process_time(), _SAVED_S
         self._told, self._told_s = "", 0.0
         self._followed = ""
@@ -208,7 +216,8 @@ class RigApp(App[None], inherit_bindings=False):
         took, self._spent = spent - self._spent, spent
         self._saved_s = min(_SAVED_S, self._saved_s + _SHARE * passed - took)
         pause = TICK_S if self._saved_s > 0.0 else max(TICK_S, took / _SHARE)
-        self.set_timer(min(pause, 2 * TICK_S), self._tick)
+        self._due = max(now + _LEAST_S, self._due + min(pause, 2 * TICK_S))
+        self.set_timer(self._due - now, self._tick)
         if not self._open():
             return
         self._stillness.alive(now)
@@ -321,6 +330,8 @@ class RigApp(App[None], inherit_bindings=False):
         for name in _PAGES:
             await asyncio.to_thread(_page, name)
         await asyncio.to_thread(import_module, "rig.results.live")
+        if self._loaded is not None:
+            self._loaded()
 
     @property
     def history(self) -> HistoryPage:
