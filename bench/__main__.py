@@ -92,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     tui.add_argument(
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
+    tui.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
     for one in (clock, faults, hostile, link, mutation, soak, states, stop, tui):
         one.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser

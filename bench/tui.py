@@ -2,7 +2,7 @@
 
 The real program in a real terminal: ``rig tui`` as a process of its own behind a pseudo-terminal, a
 client of a daemon's server, whose view is told of edges as by a board's stream. The share is
-processor time, which other programs on the machine do not change; lateness does depend on them.
+processor time, which other programs on the machine change little; lateness does depend on them.
 """
 
 from __future__ import annotations
@@ -27,10 +27,13 @@ from bench.link import cpu_s
 from rig.commands.output import print_json, say
 from rig.daemon.client import Client
 from rig.daemon.server import Server
+from rig.files import write_atomic
 from rig.link.messages import Fired
 from rig.link.transcript import Received
 from rig.recorder.feed import StateFeed
 from rig.session.schema import RunState
+from rig.session.store import Session
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -45,7 +48,9 @@ _GATES = 16
 _TICK_HZ = 16_000_000
 _THERE = b"STOP"
 _COUNTED = re.compile(rb"FALLING  (\d+) edges")
+_RESULTS = "Δz".encode()
 _PATIENCE_S = 60.0
+_RIG = (sys.executable, "-m", "rig")
 
 
 class Terminal:
@@ -53,8 +58,8 @@ class Terminal:
 
     Parameters
     ----------
-    socket
-        Of the daemon.
+    arguments
+        Of ``rig tui``.
 
     Attributes
     ----------
@@ -62,14 +67,14 @@ class Terminal:
         What the program wrote, and when, s (monotonic).
     """
 
-    def __init__(self, socket: Path) -> None:
+    def __init__(self, *arguments: str | Path) -> None:
         self.written: list[tuple[float, bytes]] = []
         self._far, near = pty.openpty()
         columns, rows = SIZE
         fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         self.begun = time.monotonic()
         self.process = subprocess.Popen(  # noqa: S603 - our own program
-            [sys.executable, "-m", "rig", "tui", "--socket", str(socket)],
+            [*_RIG, "tui", *map(str, arguments)],
             stdin=near,
             stdout=near,
             stderr=near,
@@ -95,13 +100,13 @@ class Terminal:
         """Press keys."""
         os.write(self._far, keys)
 
-    def until(self, text: bytes) -> float:
-        """Wait until something was written; return when, s (monotonic)."""
+    def until(self, text: bytes) -> dict[str, float]:
+        """Wait until something was written; return after what time, also of the processor's."""
         end = time.monotonic() + _PATIENCE_S
         while time.monotonic() < end:
             for at, data in list(self.written):
                 if text in data:
-                    return at
+                    return {"wall_s": at - self.begun, "cpu_s": cpu_s(self.process.pid)}
             time.sleep(0.01)
         raise TimeoutError(f"{text!r} does not appear on the screen")
 
@@ -115,7 +120,7 @@ class Terminal:
 
 
 def tui(protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
-    """Measure the first paint, a quiet screen, and one of a drop with `RATE` edges a second.
+    """Measure the first paint, a quiet screen, one with `RATE` edges a second, and a long session.
 
     Parameters
     ----------
@@ -125,7 +130,9 @@ def tui(protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
         Narration.
     """
     with TemporaryDirectory(prefix="rig-") as folder:
-        return asyncio.run(_measure(Path(folder), str(Path(protocol).resolve()), say))
+        path = str(Path(protocol).resolve())
+        found = asyncio.run(_measure(Path(folder), path, say))
+        return found | _opened(Path(folder), path, say)
 
 
 async def _measure(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
@@ -140,6 +147,20 @@ async def _measure(folder: Path, protocol: str, say: Callable[[str], None]) -> d
         await serving
 
 
+def _opened(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
+    say("a whole session of the protocol …")
+    session = folder / "whole.session"
+    subprocess.run(  # noqa: S603 - our own program
+        [*_RIG, "run", protocol, "--port", "sim://", "--session", session, "--yes"],
+        check=True,
+        capture_output=True,
+    )
+    with Session.open(session, readonly=True) as opened:
+        drops = len(opened.latest_drops())
+    with Terminal("--session", session) as terminal:
+        return {"opened": {"runs": drops, **terminal.until(_RESULTS)}}
+
+
 def _in_terminal(
     folder: Path, protocol: str, server: Server, say: Callable[[str], None]
 ) -> dict[str, Any]:
@@ -147,10 +168,9 @@ def _in_terminal(
     client.take_control()
     client.open_session(protocol, str(folder / "bench.session"))
     try:
-        with Terminal(server.path) as terminal:
+        with Terminal("--socket", server.path) as terminal:
             say("first paint …")
-            there = terminal.until(_THERE)
-            first = {"wall_s": there - terminal.begun, "cpu_s": cpu_s(terminal.process.pid)}
+            first = terminal.until(_THERE)
             terminal.until(b"clear")  # the session is read, and shown
             time.sleep(2.0)
             say("a quiet screen …")
@@ -217,13 +237,26 @@ def main(arguments: Namespace) -> int:
     if arguments.json:
         print_json(found)
         return 0
-    first, lag = found["first_paint"], found["lag_s"]
-    print(
-        f"{'first paint':<28}{first['wall_s']:>7.2f} s, of which {first['cpu_s']:.2f} s computing"
-    )
-    print(f"{'quiet screen':<28}{found['quiet_cpu']:>8.1%} of a core")
-    print(f"{f'{RATE:.0f} edges a second':<28}{found['live_cpu']:>8.1%} of a core")
-    print(f"{'frames a second':<28}{found['frames_per_s']:>7.1f}")
-    print(f"{'one frame':<28}{found['cpu_per_frame_s'] * 1e3:>7.1f} ms computing")
-    print(f"{'lag, median and p99':<28}{lag['median'] * 1e3:>7.0f} {lag['p99'] * 1e3:.0f} ms")
+    rows = _rows(found)
+    print("\n".join(text_table(rows, left={0, 1})))
+    if arguments.output:
+        Path(arguments.output).mkdir(parents=True, exist_ok=True)
+        lines = ["| the terminal | |", "|---|---|", *(f"| {a} | {b} |" for a, b in rows)]
+        write_atomic(Path(arguments.output) / "terminal.md", "\n".join(lines) + "\n")
     return 0
+
+
+def _rows(found: dict[str, Any]) -> list[list[str]]:
+    first, opened, lag = found["first_paint"], found["opened"], found["lag_s"]
+    return [
+        ["first paint", f"{first['wall_s']:.2f} s, {first['cpu_s']:.2f} s of them computing"],
+        [
+            f"a session of {opened['runs']} runs, from the command to its results",
+            f"{opened['wall_s']:.2f} s, {opened['cpu_s']:.2f} s of them computing",
+        ],
+        ["a quiet screen", f"{found['quiet_cpu']:.1%} of a core"],
+        [f"{RATE:.0f} edges a second", f"{found['live_cpu']:.1%} of a core"],
+        ["frames a second", f"{found['frames_per_s']:.1f}"],
+        ["one frame", f"{found['cpu_per_frame_s'] * 1e3:.1f} ms computing"],
+        ["lag, median and p99", f"{lag['median'] * 1e3:.0f} ms, {lag['p99'] * 1e3:.0f} ms"],
+    ]
