@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from rig.analysis.remedies import remedy
-from rig.campaign.machine import Flow, Stage
+from rig.campaign.events import GoOn, Stage
+from rig.campaign.machine import Flow, step
 from rig.records import Job
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model
@@ -41,6 +44,17 @@ def test_what_comes_from_outside_is_shown_as_text(text):
 def test_a_void_drop_says_what_to_do():
     reason = "release skew 9.19 ms is beyond 5 ms"
     assert verdict_words(model(reason)).plain.endswith(f"{reason}\n  → {remedy(reason)}")
+
+
+def test_enter_is_not_offered_before_the_verdict_is_kept():
+    """It would do nothing: what comes next depends on the verdict."""
+    waits = replace(model("x"), driving=True)
+    kept, job = replace(waits, flow=replace(waits.flow, logged=True)), Job(2, 1)
+    waits = replace(waits, flow=replace(waits.flow, logged=False))
+    assert step(waits.flow, GoOn(job, 0.0)) == (waits.flow, ())
+    assert "Enter once the verdict is kept" in hints(waits, "result", KEYS, 80).plain
+    assert step(kept.flow, GoOn(job, 0.0))[0].job == job
+    assert "Enter next run" in hints(kept, "result", KEYS, 80).plain
 
 
 @pytest.mark.parametrize("width", [20, 40, 78, 198])

@@ -105,6 +105,8 @@ def _label(name: str, label: str, model: Model, page: str) -> str:
     if name == "go_on":
         if model.flow.stage is Stage.PREPARE and page != "run":
             return "to the run"
+        if not model.flow.logged:  # what comes next depends on it
+            return "once the verdict is kept"
         return _GO_ON.get(model.flow.stage, label)
     if name == "reject" and model.flow.verdict == "rejected":
         return "take back"
