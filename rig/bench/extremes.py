@@ -32,6 +32,8 @@ class Extreme:
         How far, in words.
     alpha
         Given α instead of the surface's; `None` otherwise.
+    kappa
+        Of the air, 1/m, the same on every leg.
     """
 
     group: str
@@ -44,6 +46,7 @@ class Extreme:
     gravity: float = 9.81
     initial_speed: float = 0.0
     alpha: float | None = None
+    kappa: float = 0.0
     allowed: float = TIGHT
 
     @property
@@ -76,6 +79,7 @@ def extremes() -> Iterator[Extreme]:
     yield from _chains()
     yield from _impacts()
     yield from _falls()
+    yield from _in_air()
     yield from _units()
 
 
@@ -115,6 +119,18 @@ def _falls() -> Iterator[Extreme]:
         yield Extreme("gravity (m/s²)", f"{gravity:g}", PAPER, gravity=gravity)
     yield Extreme("gravity (m/s²)", "0, at 1 m/s", PAPER, gravity=0.0, initial_speed=1.0)
     yield Extreme("gravity (m/s²)", "0, at rest", PAPER, gravity=0.0)
+
+
+def _in_air() -> Iterator[Extreme]:
+    for kappa in (1e-12, 1e-3, 0.06, 1.0, 10.0, 1000.0):
+        yield Extreme("air, κ (1/m)", f"{kappa:g}", PAPER, kappa=kappa)
+    yield Extreme("air, κ (1/m)", "0.06, 1000 rods", uniform(1000), kappa=0.06)
+    yield Extreme("air, κ (1/m)", "0.06, mass 1e-12", decades(-12.0), kappa=0.06)
+    yield Extreme("air, κ (1/m)", "0.06, α 1e-12", PAPER, alpha=1e-12, kappa=0.06)
+    terminal = math.sqrt(9.81)  # of κ = 1/m
+    for share in (0.5, 10.0):
+        yield Extreme("air, terminal speed ×", f"{share:g}", PAPER, kappa=1.0,
+                      initial_speed=share * terminal)  # fmt: skip
 
 
 def _units() -> Iterator[Extreme]:

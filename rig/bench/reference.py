@@ -68,6 +68,47 @@ def exact_fall(
         return Exact(top - start * time - g * time * time / 2, arrival, time)
 
 
+def exact_air_fall(
+    masses: Sequence[float],
+    heights: Sequence[float],
+    alphas: Sequence[Decimal],
+    gammas: Sequence[Decimal],
+    drop: float,
+    gravity: float,
+    kappa: float,
+    initial_speed: float = 0.0,
+) -> Exact:
+    """Eq. 9 rod by rod, and g − κv² between, integrated as textbooks have it; κ > 0, g > 0."""
+    # The free chain's way is the logarithm of nearly 1, over κ, and a speed in thick air is nearly
+    # the terminal one: hardly any air and very much of it both take digits.
+    spare = _SPARE + max(0, round(-4.0 * math.log10(kappa)))
+    spare += round(kappa * (drop + heights[-1]))
+    with mpmath.workdps(DIGITS + spare):
+        g, k = mpmath.mpf(gravity), mpmath.mpf(kappa)
+        terminal = mpmath.sqrt(g / k)
+        masses_ = [mpmath.mpf(mass) for mass in masses]
+        above = [*accumulate(reversed(masses_[1:]))][::-1]
+        start = mpmath.mpf(initial_speed)
+        time, speed, before = mpmath.mpf(0), start, -mpmath.mpf(drop)
+        arrival = speed
+        for n, (m, height) in enumerate(zip(masses_, map(mpmath.mpf, heights), strict=True)):
+            fading = mpmath.exp(-2 * k * (height - before))
+            arrival = mpmath.sqrt(speed**2 * fading + terminal**2 * (1 - fading))
+            gone = (terminal + arrival) * (terminal - speed)
+            time += mpmath.log(gone / ((terminal - arrival) * (terminal + speed))) / (
+                2 * mpmath.sqrt(g * k)
+            )
+            speed = arrival
+            if n < len(above):
+                alpha, gamma = mpmath.mpf(str(alphas[n])), mpmath.mpf(str(gammas[n]))
+                speed += alpha * m * arrival / (1 + gamma * m / above[n]) / above[n]
+            before = height
+        turns = mpmath.sqrt(g * k) * time
+        way = mpmath.log(mpmath.cosh(turns) + start / terminal * mpmath.sinh(turns)) / k
+        apart = mpmath.mpf(drop) + mpmath.mpf(heights[-1]) - way
+        return Exact(*(Decimal(mpmath.nstr(one, DIGITS)) for one in (apart, arrival, time)))
+
+
 def exact_coefficients(
     restitution: float,
     friction: float,

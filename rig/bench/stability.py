@@ -9,10 +9,11 @@ from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from rig.bench.extremes import PITCH, extremes
-from rig.bench.reference import exact_coefficients, exact_fall
+from rig.bench.reference import exact_air_fall, exact_coefficients, exact_fall
 from rig.errors import DomainError
 from rig.model.chain import Chain
-from rig.model.fall import fall
+from rig.model.drag import drag_fall
+from rig.model.fall import fall, kicks
 from rig.model.impact import impact_on
 from rig.model.surface import Surface
 from rig.units import Quantity
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from rig.bench.extremes import Extreme
     from rig.bench.reference import Exact
+    from rig.model.fall import Fall
     from rig.model.impact import Impact
 
 SOUND = 343.0
@@ -81,14 +83,7 @@ def examine(scene: Extreme) -> StabilityRow:
         warnings.simplefilter("error")
         try:
             impact = _impact(scene)
-            found = fall(
-                scene.chain,
-                impact.alpha,
-                impact.gamma,
-                scene.drop,
-                scene.gravity,
-                scene.initial_speed,
-            )
+            found = _found(scene, impact)
         except DomainError as error:
             return StabilityRow(scene.group, scene.value, None, None, "refused", error.message, "–")
         except (ArithmeticError, ValueError, Warning) as error:
@@ -114,6 +109,14 @@ def relative_error(found: float, exact: Decimal) -> float:
     return float(abs(Decimal(found) / exact - 1))
 
 
+def _found(scene: Extreme, impact: Impact) -> Fall:
+    chain, where = scene.chain, (scene.drop, scene.gravity, scene.initial_speed)
+    if not scene.kappa:
+        return fall(chain, impact.alpha, impact.gamma, *where)
+    gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
+    return drag_fall(chain, gains, [scene.kappa] * chain.rods, *where)
+
+
 def _impact(scene: Extreme) -> Impact:
     chain = scene.chain
     if scene.alpha is not None:
@@ -129,21 +132,17 @@ def _exact(scene: Extreme) -> Exact:
     )
     if scene.alpha is not None:
         alpha = Decimal(scene.alpha)
-    rods = chain.rods
-    return exact_fall(
-        chain.masses,
-        chain.heights,
-        [alpha] * rods,
-        [gamma] * rods,
-        scene.drop,
-        scene.gravity,
-        scene.initial_speed,
-    )
+    body = chain.masses, chain.heights, [alpha] * chain.rods, [gamma] * chain.rods
+    if scene.kappa:
+        return exact_air_fall(*body, scene.drop, scene.gravity, scene.kappa, scene.initial_speed)
+    return exact_fall(*body, scene.drop, scene.gravity, scene.initial_speed)
 
 
 def _naive(scene: Extreme, impact: Impact, exact: Exact) -> str:
     """Evaluate as printed: times as (V' − V)/g, Δz as a difference of heights, J before J/M."""
     chain, g = scene.chain, scene.gravity
+    if scene.kappa:
+        return "without air"
     try:
         mass = sum(chain.masses)
         time, speed, before = 0.0, scene.initial_speed, -scene.drop

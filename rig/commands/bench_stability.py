@@ -21,10 +21,10 @@ _HEAD = """\
 # The model at the ends of what can be asked
 
 Written by `rig bench stability`: heavy and light rods, long and short chains, hardly any gravity,
-hardly any impulse, computed and compared with 50 digits. Errors are relative. *Noted* scenes lie
-outside the model's domain, and the model says so; *refused* ones end with an error that says why.
-Beside each stands what becomes of it when the equations are computed as they are printed. Every
-line is in `stability.csv`."""
+hardly any impulse, thin and thick air, computed and compared with 50 digits. Errors are relative.
+*Noted* scenes lie outside the model's domain, and the model says so; *refused* ones end with an
+error that says why. Beside each stands what becomes of it when the equations are computed as they
+are printed. Every line is in `stability.csv`."""
 
 
 def main(arguments: Namespace) -> int:
