@@ -77,6 +77,9 @@ def _parser() -> argparse.ArgumentParser:
     mutation.add_argument("--jobs", type=_count, default=1, metavar="N", help="side by side")
     mutation.add_argument("--list", action="store_true", help="only say which they are")
     mutation.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
+    mutation.add_argument(
+        "--most", type=float, default=600.0, metavar="S", help="of tests each, the quickest first"
+    )
     mutation.add_argument("--page", metavar="FILE", help="write what came of it there")
 
     states = benches.add_parser("states", help="every state of a drop, with all that goes wrong")

@@ -20,6 +20,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
@@ -146,7 +147,7 @@ def main(arguments: Namespace) -> int:
         for number in range(arguments.jobs):
             copies.put(_copied(Path(folder) / str(number)))
         reached = {room: _reached(room, copies) for room in rooms}
-        outcomes = list(_tried(mutants, reached, copies, arguments.jobs))
+        outcomes = list(_tried(mutants, reached, copies, arguments.jobs, arguments.most))
     if arguments.output:
         _write(Path(arguments.output) / "mutation.csv", outcomes)
     if arguments.page:
@@ -302,7 +303,11 @@ def _pytest(
 
 
 def _tried(
-    mutants: list[Mutant], reached: dict[str, Reached], copies: SimpleQueue[Path], jobs: int
+    mutants: list[Mutant],
+    reached: dict[str, Reached],
+    copies: SimpleQueue[Path],
+    jobs: int,
+    most_s: float,
 ) -> Iterator[Outcome]:
     memory = Memory(ROOT, KEPT / "noticed.json")
     faulty = {one: one.fault.put_into((ROOT / one.path).read_text("utf-8")) for one in mutants}
@@ -312,7 +317,7 @@ def _tried(
             return Outcome(mutant, by, 0, 0.0)
         copy = copies.get()
         try:
-            return _try(mutant, reached[mutant.room], copy)
+            return _try(mutant, reached[mutant.room], copy, most_s)
         finally:
             copies.put(copy)
 
@@ -325,8 +330,11 @@ def _tried(
             yield one
 
 
-def _try(mutant: Mutant, reached: Reached, copy: Path) -> Outcome:
+def _try(mutant: Mutant, reached: Reached, copy: Path, most_s: float) -> Outcome:
     tests = reached.tests(mutant.path, mutant.fault.line)
+    if mutant.path.endswith(".py"):
+        spent = accumulate(reached.seconds[one] for one in tests)
+        tests = [one for one, until in zip(tests, spent, strict=True) if until <= most_s]
     begun = monotonic()
     place = copy / mutant.path
     sound = place.read_text("utf-8")

@@ -15,6 +15,21 @@ if TYPE_CHECKING:
     _Reply: TypeAlias = Callable[[bytes | None], None]
 
 
+class Turns:
+    """Has answers begin one by one, and what comes in be read between any two of them.
+
+    Many that wait would else be worked on in a row, and a stop that came meanwhile wait for all.
+    """
+
+    def __init__(self) -> None:
+        self._guard = asyncio.Lock()
+
+    async def come(self) -> None:
+        """Wait for the turn to begin an answer."""
+        async with self._guard:
+            await asyncio.sleep(0)
+
+
 class Connection:
     """One client.
 
@@ -26,6 +41,8 @@ class Connection:
         Carries out one of its requests.
     heard
         Called with each line it sends.
+    turns
+        Among all clients.
 
     Attributes
     ----------
@@ -43,6 +60,7 @@ class Connection:
         writer: asyncio.StreamWriter,
         do: Callable[[Connection, rpc.Request], Awaitable[Any]],
         heard: Callable[[Connection], None],
+        turns: Turns,
     ) -> None:
         self.name = ""
         self.subscribed = self.behind = False
@@ -50,6 +68,7 @@ class Connection:
         self._writer = writer
         self._do = do
         self._heard = heard
+        self._turns = turns
         self._urgent: set[asyncio.Task[None]] = set()
 
     def send(self, line: bytes) -> None:
@@ -99,6 +118,7 @@ class Connection:
                     self._take(one, reply, waiting)
             else:
                 self._take(found, self._send_any, waiting)
+            await asyncio.sleep(0)  # many lines are there already: others' are read between them
 
     def _take(
         self, one: rpc.Request | rpc.RpcError, reply: _Reply, waiting: asyncio.Queue[_Asked]
@@ -123,7 +143,9 @@ class Connection:
 
     async def _answer_all(self, waiting: asyncio.Queue[_Asked]) -> None:
         while True:
-            await self._answer(await waiting.get())
+            asked = await waiting.get()
+            await self._turns.come()
+            await self._answer(asked)
             await self._writer.drain()
             if not self.name:
                 self.close()

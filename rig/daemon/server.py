@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from rig import __version__
 from rig.daemon import rpc
 from rig.daemon.admission import HELLO_S, Admission
-from rig.daemon.connection import Connection
+from rig.daemon.connection import Connection, Turns
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import leave, listen
 from rig.daemon.publisher import Publisher
@@ -74,6 +74,7 @@ class Server:
         self._service = Service(
             url, self._token, self._worker, self._lease, self.publisher, self._admission
         )
+        self._turns = Turns()
         self._idle_s = idle_s
         self._left_at = 0.0  # when the last client went
         self._serving: set[asyncio.Task[None]] = set()
@@ -182,7 +183,7 @@ class Server:
             line.close()
             return
         reader, writer = await asyncio.open_connection(sock=line, limit=rpc.REQUEST_LIMIT)
-        connection = Connection(reader, writer, self._service.do, self._lease.heard)
+        connection = Connection(reader, writer, self._service.do, self._lease.heard, self._turns)
         self._admission.arrived(connection)
         late = loop.call_later(HELLO_S, self._hurry, connection)
         try:

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 _TIMES = 5
 _AGAIN_S = 0.03
 """As an ABORT of the worker is repeated: all within the 250 ms after which everything is off."""
+_ASIDE_S = 0.005
+"""How long whoever asks stands aside: beside threads that compute, the one that sends would have to
+wait until Python gives it a turn."""
 
 
 class Stopper:
@@ -26,6 +29,7 @@ class Stopper:
         self._send = send
         self._asked = threading.Event()
         self._taken_over = threading.Event()
+        self._left = threading.Event()
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="rig stop", daemon=True)
 
@@ -36,7 +40,9 @@ class Stopper:
     def ask(self) -> None:
         """Have everything switched off, now."""
         self._taken_over.clear()
+        self._left.clear()
         self._asked.set()
+        self._left.wait(_ASIDE_S)
 
     def taken_over(self) -> None:
         """Note that the worker is at it, which also hears the answers."""
@@ -52,5 +58,7 @@ class Stopper:
         while self._asked.wait() and not self._ending:
             self._asked.clear()
             for _ in range(_TIMES):
-                if not self._send() or self._taken_over.wait(_AGAIN_S):
+                left = self._send()
+                self._left.set()
+                if not left or self._taken_over.wait(_AGAIN_S):
                     break

@@ -222,7 +222,10 @@ def test_batches_and_ids_are_as_json_rpc_has_them(door):
             b'{"jsonrpc":"2.0","method":"dance","params":[1]}\n',
             b'{"jsonrpc":"2.0","id":null,"method":"renew"}\n',
         ]
-        answers, last = await asyncio.to_thread(spoken, path, *lines)
+        told = await asyncio.to_thread(spoken, path, *lines)
+        answers, last = sorted(
+            told, key=lambda one: isinstance(one, dict)
+        )  # signs of life overtake
         codes = {one["id"]: one["error"]["code"] for one in answers if "error" in one}
         assert codes == {1.5: rpc.NO_METHOD, None: rpc.INVALID, 3: rpc.BAD_PARAMS}
         assert [one["id"] for one in answers if "result" in one] in (["a", None], [None, "a"])
@@ -265,6 +268,35 @@ def test_a_stop_is_read_behind_any_number_of_requests(door):
         assert told[1000]["result"] == {}
         assert told[299]["error"]["data"]["kind"] == "BusyError"
         writer.close()
+
+    door(test)
+
+
+def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch):
+    async def test(server, path, _):
+        lines = [await asyncio.open_unix_connection(path) for _ in range(21)]
+        for _, writer in lines:
+            writer.write(HELLO)
+        while len(server.publisher.connections) < len(lines):
+            await asyncio.sleep(0)
+        (_, stopping), *many = lines
+        done, do = [], server._service.do
+
+        def noted(client, request):
+            if not done:
+                stopping.write(rpc.request("stop", {}, 9))
+            done.append(request.method)
+            return do(client, request)
+
+        for one in server.publisher.connections:
+            monkeypatch.setattr(one, "_do", noted)
+        for _, writer in many:
+            writer.write(b"".join(rpc.request("subscribe", {}, number) for number in range(20)))
+        while "stop" not in done:
+            await asyncio.sleep(0)
+        assert done.count("subscribe") < len(many)
+        for _, writer in lines:
+            writer.close()
 
     door(test)
 
