@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import NormalEquations, normal_equations, scaled
+from rig.analysis.equations import (
+    NormalEquations,
+    normal_equations,
+    scaled,
+    with_kept_slopes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +35,7 @@ PATIENT = 6
 """Steps after which one back is no part of finding the way: an edge at the very moment of an impact
 has a slope on either side, and steps go to and fro over the best place, which lies between them."""
 _AGAIN = 0.5  # of the last step, taken back by the next one
+_KEPT = 0.1  # of the step before, beyond which a step with its slopes is none
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 _MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
 
@@ -52,6 +58,8 @@ class Estimate:
         How much more the edges scatter than assumed; at least 1, and already allowed for.
     settled
         Whether the steps came to an end.
+    plain
+        JᵀWJ and JᵀWr in the unknowns' own units; nothing where no edges were adjusted.
     """
 
     x: Array
@@ -62,6 +70,7 @@ class Estimate:
     edges: int
     scatter: float
     settled: bool = True
+    plain: tuple[Array, Array] | None = None
 
     @cached_property
     def covariance(self) -> Array:
@@ -85,6 +94,8 @@ def adjust(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
+    *,
+    rough: bool = False,
 ) -> Estimate:
     """Find the unknowns that fit all matched edges best.
 
@@ -102,13 +113,18 @@ def adjust(
         How short a step is the last, see `length`.
     steps
         How many there are at most.
+    rough
+        Whether only the way matters, and edges are weighed as they were.
     """
     sd = model.unknowns.sd
 
     def equations(at: Array, inflation: float) -> NormalEquations:
         return normal_equations(model, matches, at, sd, inflation)
 
-    return least_squares(equations, sd, x, centre, done, steps)
+    def again(at: Array, inflation: float, near: NormalEquations) -> NormalEquations | None:
+        return with_kept_slopes(model, matches, at, sd, inflation, near, rough=rough)
+
+    return least_squares(equations, sd, x, centre, done, steps, again, rough=rough)
 
 
 def least_squares(
@@ -118,6 +134,9 @@ def least_squares(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
+    again: Callable[[Array, float, NormalEquations], NormalEquations | None] | None = None,
+    *,
+    rough: bool = False,
 ) -> Estimate:
     """Find the unknowns that fit any observations best, given what is known of them beforehand.
 
@@ -127,46 +146,75 @@ def least_squares(
         Normal equations about a point, if the observations scatter so many times as assumed.
     sd
         Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
-    x, centre, done, steps
+    x, centre, done, steps, rough
         As in `adjust`.
+    again
+        The same about a point near by, with the slopes that they had before: much quicker, and as
+        good while steps get shorter and shorter; nothing where these do not do.
     """
     y = scaled(x, sd)
     prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
-    identity = np.eye(x.size)
-    information = data = identity
-    chi2, edges, moved = 0.0, 0, 0.0
+    information = identity = np.eye(x.size)
+    found: NormalEquations | None = None
+    chi2, moved = 0.0, 0.0
     inflation = damping = 1.0
-    settled, ahead = False, np.zeros_like(y)
+    settled, kept, ahead = False, False, np.zeros_like(y)
     for step in range(steps):
-        found = equations(y * sd, inflation)
-        data = found.matrix
-        information = data + identity
-        right = data @ y - found.vector + prior
-        turned, ahead = ahead, np.linalg.solve(information, right).astype(np.float64) - y
+        near = found if kept and again is not None else None
+        if near is not None and again is not None:
+            near = again(y * sd, inflation, near)
+        kept = near is not None
+        found = near or equations(y * sd, inflation)
+        if not kept:
+            information = found.matrix + identity
+        turned = ahead
+        ahead = np.linalg.solve(information, prior - y - found.vector).astype(np.float64)
+        size = length(ahead, information)
+        if kept and size > _KEPT * moved:
+            kept, ahead = False, turned  # slopes are others here: once more with these
+            continue
         # Steps to and fro that get shorter end by themselves, and sooner.
         taken_back = -(ahead @ information @ turned)
         if step > PATIENT and taken_back > _AGAIN * length(turned, information) ** 2:
             damping *= 0.5
         y = y + damping * ahead
-        last, moved = moved, damping * length(ahead, information)
-        previous, chi2, edges = chi2, found.chi2, found.size
+        last, moved = moved, damping * size
+        previous, chi2 = chi2, found.chi2
+        short = moved < done or (damping == 1.0 and moved**2 < done * last)
         # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
-        calm = chi2 <= edges - x.size
+        calm = chi2 <= found.size - x.size
         steady = step and abs(chi2 - previous) <= _STEADY * max(chi2, 1.0)
-        if calm or steady:
-            factor = 1.0
-            # No unknown is left open by less than if all others were known.
-            least = edges - x.size + float(np.sum(1.0 / np.diag(information)))
-            if chi2 >= _MORE**2 * max(least, 1.0):
-                degrees = edges - float(np.trace(np.linalg.solve(information, data)))
-                factor = float(np.sqrt(max(1.0, chi2 / max(degrees, 1.0))))
-            if factor >= _MORE:
-                inflation *= factor  # the edges scatter more than assumed: weigh them so
-            elif moved < done or (damping == 1.0 and moved**2 < done * last):
-                settled = True
-                break
-    return Estimate(y * sd, sd, information, data, chi2, edges, inflation, settled)
+        kept = damping == 1.0 and (rough or calm or bool(steady))
+        if not (short if rough else calm or steady):
+            continue
+        factor = _scatter(found, information)
+        if factor >= _MORE:
+            inflation *= factor  # the edges scatter more than assumed: weigh them so
+            kept = False
+        if short and (rough or factor < _MORE):
+            settled = True
+            break
+    if found is None:
+        return Estimate(y * sd, sd, information, identity, chi2, 0, inflation, settled)
+    plain = found.plain
+    if plain is not None:
+        # As it is after the last step.
+        plain = plain[0], plain[1] + plain[0] @ (damping * ahead * sd)
+    return Estimate(
+        y * sd, sd, information, found.matrix, chi2, found.size, inflation, settled, plain
+    )
+
+
+def _scatter(found: NormalEquations, information: Array) -> float:
+    """How many times as much as assumed observations scatter; 1 where that is near enough."""
+    free = found.size - len(information)
+    # No unknown is left open by less than if all others were known.
+    least = free + float(np.sum(1.0 / np.diag(information)))
+    if found.chi2 < _MORE**2 * max(least, 1.0):
+        return 1.0
+    degrees = found.size - float(np.trace(np.linalg.solve(information, found.matrix)))
+    return math.sqrt(max(1.0, found.chi2 / max(degrees, 1.0)))
 
 
 def length(step: Array, information: Array) -> float:

@@ -8,6 +8,7 @@ nobody else may have.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rig.analysis.trajectory import Trajectory
 
     Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
 
 # Both together are the worth of a match: an edge 6 widths off is better called extra and missed.
@@ -28,6 +30,7 @@ MISSED = 9.0
 """Cost of an expected edge that was not seen, in units of ½ (residual/scale)²."""
 EXTRA = 9.0
 """Cost of an edge that belongs to no rod."""
+_REACH = (2.0 * (MISSED + EXTRA)) ** 0.5  # widths: what is further off is never matched
 _ROUNDING = 1e-9  # the way back through the table meets sums made in another order
 
 
@@ -44,105 +47,132 @@ def align(
     ----------
     levels
         For each train the height of the reference point at every expected edge, m.
-    trajectory
-        Where the chain is believed to be.
-    scale
-        Standard deviation of the distance between where a chain is when an edge comes and where
-        it should be, m.
-    clock
-        By what share the edges' clock is believed to be slow.
+    trajectory, scale, clock
+        As in `Pairing.matched`.
 
     Returns
     -------
     list of ndarray
-        For each train the index of its edge for every expected edge, −1 for a missed one; shape
-        ``(expected,)``.
+        As there.
     """
-    if not trains:
-        return []
-    costs, sizes = _costs(trains, levels, trajectory, scale, clock)
-    matched = _match(costs, sizes).reshape(len(trains), -1)
-    return [row[:size] for row, size in zip(matched, sizes[0], strict=True)]
+    every = np.concatenate([*levels, np.zeros(0)])
+    return Pairing.of(trains).matched(every, trajectory, scale, clock)
 
 
-def possible(train: EdgeTrain, trajectory: Trajectory, scale: float, clock: float) -> int:
-    """Most expected edges that any matching could match at the nominal levels, see `align`."""
-    costs, _ = _costs([train], [train.levels], trajectory, scale, clock)
-    return int(_worth(costs).any(axis=0).sum())
+@dataclass(frozen=True, slots=True)
+class Pairing:
+    """The edges of one side, ready to be matched again and again.
 
-
-def _costs(
-    trains: Sequence[EdgeTrain],
-    levels: Sequence[Array],
-    trajectory: Trajectory,
-    scale: float,
-    clock: float,
-) -> tuple[Array, Index]:
-    """Cost of every pairing of an edge and an expected edge of its gate, and how many there are.
-
-    Returns
-    -------
-    costs
-        Shape ``(edges of all gates, most expected edges of a gate)``; infinite for unlike
-        polarities and beyond a gate's expected edges.
-    sizes
-        Expected and observed edges of each gate, shape ``(2, gates)``.
+    Attributes
+    ----------
+    times, number
+        Of every observed edge, gate by gate, and its number in its train.
+    kind
+        Of each: twice the number of its train, and one more where it darkens the beam.
+    blocks
+        Whether each expected edge darkens the beam.
+    order, kinds
+        Expected edges sorted by kind, and the kind of each of these.
+    ends
+        Number of expected edges after each train.
     """
-    sizes = np.array([[t.rods.size for t in trains], [t.times.size for t in trains]])
-    wide, gates = int(sizes[0].max()), np.arange(len(trains))
-    gate = np.repeat(gates, sizes[0])
-    place = np.concatenate([np.arange(size) for size in sizes[0]])
-    blocks = np.concatenate([train.blocks for train in trains])
-    expected = np.full((gates.size, 2, wide), np.inf)  # of either polarity
-    expected[gate, blocks.astype(np.intp), place] = np.concatenate(levels)
-    blocked = np.concatenate([train.blocked for train in trains])
-    # One row of expected levels a gate and polarity: an unlike polarity costs infinity by itself.
-    like = 2 * np.repeat(gates, sizes[1]) + blocked
-    times = np.concatenate([train.times for train in trains]) * (1.0 + clock)
-    distance = expected.reshape(2 * gates.size, wide)[like]
-    distance -= trajectory.heights(times)[0][:, None]
-    distance /= scale
-    return 0.5 * distance**2, sizes
 
+    times: Array
+    number: Index
+    kind: Index
+    blocks: Flags
+    order: Index
+    kinds: Index
+    ends: Index
 
-def _worth(costs: Array) -> NDArray[np.bool_]:
-    """Which pairs cost less than a missed and an extra edge: no other is ever matched."""
-    return costs < MISSED + EXTRA
+    @classmethod
+    def of(cls, trains: Sequence[EdgeTrain]) -> Pairing:
+        """Take the edges of a side's trains."""
+        none = np.zeros(0, dtype=np.bool_)
+        blocks = np.concatenate([none, *(train.blocks for train in trains)])
+        blocked = np.concatenate([none, *(train.blocked for train in trains)])
+        numbers = [np.arange(train.times.size) for train in trains]
+        kinds = 2 * np.repeat(np.arange(len(trains)), [train.rods.size for train in trains])
+        kinds += blocks
+        order = np.argsort(kinds, kind="stable")
+        return cls(
+            np.concatenate([np.zeros(0), *(train.times for train in trains)]),
+            np.concatenate([np.zeros(0, dtype=np.intp), *numbers]),
+            2 * np.repeat(np.arange(len(trains)), [one.size for one in numbers]) + blocked,
+            blocks,
+            order,
+            kinds[order],
+            np.cumsum([train.rods.size for train in trains], dtype=np.intp),
+        )
 
+    def matched(
+        self, levels: Array, trajectory: Trajectory, scale: float, clock: float = 0.0
+    ) -> list[Index]:
+        """Match the edges to rods.
 
-def _match(costs: Array, sizes: Index) -> Index:
-    """Match all gates, see `_costs`; shape ``(gates · most expected edges of a gate,)``."""
-    gates, wide = sizes.shape[1], costs.shape[1]
-    matched = np.full(gates * wide, -1, dtype=np.intp)
-    if not costs.size:
-        return matched
-    worth = _worth(costs)
-    first = worth.argmax(axis=1)
-    rows = np.flatnonzero(worth[np.arange(first.size), first])
-    if not rows.size:
-        return matched
-    gate = np.repeat(np.arange(gates), sizes[1])[rows]
-    begins_at = np.cumsum(sizes[1]) - sizes[1]  # a gate's edges are numbered by themselves
-    number = rows - begins_at[gate]
-    # All gates' expected edges in one line, so that gates are cut apart like everything else.
-    first = first[rows] + gate * wide
-    end = (gate + 1) * wide - worth[rows, ::-1].argmax(axis=1)
-    # Cut where no edge's choice bears on another's: all later ones begin beyond all earlier ones.
-    later = np.minimum.accumulate(first[::-1])[::-1]
-    earlier = np.maximum.accumulate(end)
-    cuts = np.concatenate([[0], 1 + np.flatnonzero(later[1:] >= earlier[:-1]), [rows.size]])
-    begins, lengths = cuts[:-1], np.diff(cuts)
-    sole = (lengths == 1) & ((end - first)[begins] == 1)
-    matched[first[begins[sole]]] = number[begins[sole]]
-    for begin, length in zip(begins[~sole].tolist(), lengths[~sole].tolist(), strict=True):
-        edges = slice(begin, begin + length)
-        left, right = int(later[begin]), int(earlier[begin + length - 1])
-        base = gate[begin] * wide
-        block = costs[rows[edges], left - base : right - base]
-        # What is left is a few edges: plain lists are quicker here than arrays.
-        for row, column in _cheapest(block.tolist()):
-            matched[left + column] = number[begin + row]
-    return matched
+        Parameters
+        ----------
+        levels
+            The height of the reference point at every expected edge of all trains, m.
+        trajectory
+            Where the chain is believed to be.
+        scale
+            Standard deviation of the distance between where a chain is when an edge comes and where
+            it should be, m.
+        clock
+            By what share the edges' clock is believed to be slow.
+
+        Returns
+        -------
+        list of ndarray
+            For each train the index of its edge for every expected edge, −1 for a missed one; shape
+            ``(expected,)``.
+        """
+        found = np.full(levels.size, -1, dtype=np.intp)
+        heights = trajectory.heights(self.times * (1.0 + clock))[0]
+        rows, first, end = self._windows(levels, heights, scale * _REACH)
+        # Cut where no edge's choice bears on another's: all later ones begin beyond all earlier.
+        later = np.minimum.accumulate(first[::-1])[::-1]
+        earlier = np.maximum.accumulate(end)
+        cuts = np.flatnonzero(later[1:] >= earlier[:-1]) + 1
+        begins = np.concatenate([np.zeros(min(1, rows.size), dtype=np.intp), cuts])
+        lengths = np.diff(begins, append=rows.size)
+        sole = (lengths == 1) & ((end - first)[begins] == 1)
+        found[first[begins[sole]]] = self.number[rows[begins[sole]]]
+        for begin, length in zip(begins[~sole].tolist(), lengths[~sole].tolist(), strict=True):
+            mine = rows[begin : begin + length]
+            its = slice(later[begin], earlier[begin + length - 1])
+            costs = 0.5 * ((levels[its] - heights[mine, None]) / scale) ** 2
+            costs[self.blocks[its] != self.kind[mine, None] % 2] = np.inf
+            # What is left is a few edges: plain lists are quicker here than arrays.
+            for row, column in _cheapest(costs.tolist()):
+                found[its.start + column] = self.number[mine[row]]
+        return np.split(found, self.ends[:-1]) if self.ends.size else []
+
+    def _windows(self, levels: Array, heights: Array, reach: float) -> tuple[Index, Index, Index]:
+        """Find the expected edges that are near enough to each observed one.
+
+        Returns
+        -------
+        rows
+            The observed edges that have any.
+        first, end
+            Of each: before `first` there is none, from `end` on neither.
+        """
+        none = np.zeros(0, dtype=np.intp)
+        low = levels.min(initial=np.inf) - 2.0 * reach
+        high = levels.max(initial=-np.inf) + 2.0 * reach
+        if not np.isfinite(high - low):
+            return none, none, none
+        # All kinds in one line, further apart than any two edges of a kind; what is later is lower.
+        apart = high - low + 2.0 * reach
+        line = self.kinds * apart - levels[self.order]
+        mine = self.kind * apart - np.clip(heights, low, high)
+        # Levels that are not in order open a window, and never close one.
+        begin = np.searchsorted(np.maximum.accumulate(line), mine - reach)
+        end = np.searchsorted(np.minimum.accumulate(line[::-1])[::-1], mine + reach, side="right")
+        rows = np.flatnonzero(end > begin)
+        return rows, self.order[begin[rows]], self.order[end[rows] - 1] + 1
 
 
 def _cheapest(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.align import Pairing
 from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.swing import drawn, lever, swing_sd
@@ -109,6 +110,9 @@ class DropModel:
         self.expected: dict[str, Expected] = {
             role: Expected.of(record, protocol) for role, record in self.records.items()
         }
+        self.pairings: dict[str, Pairing] = {
+            role: Pairing.of(record.trains) for role, record in self.records.items()
+        }
         slopes: dict[str, float] = {
             record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
         }
@@ -124,6 +128,7 @@ class DropModel:
         # The last path and the last matches of each side: nothing older is asked for again.
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
         self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
+        self._fixed: dict[str, tuple[Seen, Index, Array]] = {}
 
     def _unknowns(self) -> Unknowns:
         """Name everything that is not known, with what is known of it beforehand."""
@@ -205,8 +210,7 @@ class DropModel:
         other.protocol = replace(self.protocol, priors=tight)
         impulse = min(_ALIKE, self.components.impulse)
         other.components = replace(self.components, impulse=impulse, bounce=0.0)
-        other.unknowns = other._unknowns()
-        other._paths = {}
+        other.unknowns = other._unknowns()  # other priors, and the same paths
         return other
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
@@ -258,7 +262,7 @@ class DropModel:
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return the same drop with its edges moved in time, by so many seconds each."""
         other = copy(self)
-        other._paths, other._seen = {}, {}
+        other._paths, other._seen, other._fixed = {}, {}, {}
         other.expected = {
             role: expected._replace(times=expected.times + shifts[role])
             for role, expected in self.expected.items()
@@ -370,6 +374,10 @@ class DropModel:
         expected = self.expected[role]
         return np.split(self._levels(role, x, expected), expected.ends)
 
+    def all_levels(self, role: str, x: Array) -> Array:
+        """Return `levels` of all trains in one line."""
+        return self._levels(role, x, self.expected[role])
+
     def _levels(self, role: str, x: Array, edges: Expected | Seen) -> Array:
         at = self.unknowns
         found: Array = edges.levels - edges.sign * x[at[f"{role} width"]]
@@ -430,6 +438,30 @@ class DropModel:
         found: Array = np.sqrt(variance + struck * known.departure**2)
         return found
 
+    def left_over(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
+        """Return the left sides of `equations` alone."""
+        seen, path = self._matched(role, matches), self.trajectory(role, x)
+        times, late, levels, struck = self._stamps(role, x, seen)
+        height, speed = path.heights(times)
+        values, sigma = height - levels + speed * late, self._sigma(seen, speed, struck)
+        self._part(seen, struck, values, sigma)
+        return Residuals(values, sigma, speed, seen.burst == 0.0, struck)
+
+    def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Flags]:
+        """When each edge should have been stamped, by how much later that is than it was, s.
+
+        Then the level that it is of, and whether a rod had struck before.
+        """
+        path = self.trajectory(role, x)
+        levels = self._levels(role, x, seen)
+        stamps = seen.times * (1.0 + float(x[self.unknowns["clock"]][0]))
+        height, speed = path.heights(stamps)
+        off = height - levels
+        struck = _loose(path, stamps, seen)
+        near = np.abs(off) <= STRAY * self._sigma(seen, speed, struck)
+        late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
+        return stamps + late, late, levels, struck
+
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges.
 
@@ -439,37 +471,46 @@ class DropModel:
         """
         at, local, seen = self.unknowns, self._local[role], self._matched(role, matches)
         rate, path = 1.0 + float(x[at["clock"]][0]), self.trajectory(role, x)
-        levels, stamps = self._levels(role, x, seen), seen.times * rate
-        height, speed = path.heights(stamps)
-        off = height - levels
-        struck = _loose(path, stamps, seen)
-        near = np.abs(off) <= STRAY * self._sigma(seen, speed, struck)
-        late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
-        times = stamps + late
+        times, late, levels, struck = self._stamps(role, x, seen)
         height, speed, moved = path.sights(times, local.path)
         values = height - levels + speed * late
         sigma = self._sigma(seen, speed, struck)
         slopes = np.zeros((times.size, local.columns.size))
-        slopes[:, : local.moving] = moved
-        row = np.arange(times.size)
+        places, fixed = self._fixed_slopes(role, seen)
+        slopes.ravel()[places] = fixed
+        slopes[:, : local.moving] += moved
         # Of a slow clock the true time is later, and the chain lower by then.
         slopes[:, local.at[at["clock"].start]] -= speed * times / rate
-        slopes[row, local.at[at[f"{role} rods"].start + seen.rods]] += 1.0
-        slopes[:, local.at[at[f"{role} width"].start]] += seen.sign
-        slopes[row, local.at[at["beams"].start + seen.gate]] -= 1.0
-        slopes[row, local.at[at["datum"].start + self._post[seen.gate]]] -= 1.0
-        if "ripple" in at:
-            ripple = self._tilts[role] * seen.turn
-            slopes[row, local.at[at["ripple"].start + seen.gate]] += ripple
-        if f"{role} swing" in at:
-            slopes[:, local.at[at[f"{role} swing"].start]] -= seen.drawn
-        if role == "impact":
-            slopes[:, local.at[at["top"].start]] += seen.alone
         told = self._part(seen, struck, values, sigma)
         second = np.flatnonzero(told)
         slopes[second] -= told[second, None] * slopes[second - 1]
         left = Residuals(values, sigma, speed, seen.burst == 0.0, struck)
         return Equations(left, told, slopes, local.columns, len(at))
+
+    def _fixed_slopes(self, role: str, seen: Seen) -> tuple[Index, Array]:
+        """Return what of the slopes is the same wherever the chain is: flat places, and values."""
+        known = self._fixed.get(role)
+        if known is not None and known[0] is seen:
+            return known[1:]
+        at, of = self.unknowns, self._local[role].at
+        columns: list[tuple[Index | int, Array | float]] = [
+            (at[f"{role} rods"].start + seen.rods, 1.0),
+            (at[f"{role} width"].start, seen.sign),
+            (at["beams"].start + seen.gate, -1.0),
+            (at["datum"].start + self._post[seen.gate], -1.0),
+        ]
+        if "ripple" in at:
+            columns.append((at["ripple"].start + seen.gate, self._tilts[role] * seen.turn))
+        if f"{role} swing" in at:
+            columns.append((at[f"{role} swing"].start, -seen.drawn))
+        if role == "impact":
+            columns.append((at["top"].start, seen.alone.astype(np.float64)))
+        edges = seen.times.size
+        rows = np.arange(edges) * self._local[role].columns.size
+        places = np.concatenate([rows + of[column] for column, _ in columns])
+        values = np.concatenate([np.broadcast_to(value, edges) for _, value in columns])
+        self._fixed[role] = seen, places, values
+        return places, values
 
 
 def _loose(path: Trajectory, times: Array, seen: Seen) -> Flags:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import STEPS, Estimate, adjust
-from rig.analysis.align import align
 from rig.analysis.equations import STRAY
+from rig.analysis.pattern import middle
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -23,10 +23,15 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
     Matches = dict[str, list[Index]]
 
+CLOSE = 0.05
+"""Of a standard uncertainty: after a step so short a drop's readings are weighed, for that is near
+enough by its square."""
+ROUGHLY = 1.0
+"""And those of a side, which are adjusted once more with the other: the next step is a thousandth
+of this one."""
 _COARSE = 2.5e-3  # m: how far off a first guess may put a rod
 _FINE = 0.5e-3  # m: how far off an adjusted trajectory may
 _NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
-_CLOSE = 0.05  # and after one so short, readings weighed: that is near enough by its square
 _SAME = 0.1  # of a standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
 _MEDIAN = 0.6745  # of |normal numbers|, in standard deviations
@@ -75,6 +80,7 @@ def settle(
     rounds: int = _ROUNDS,
     steps: int = STEPS,
     x: Array | None = None,
+    done: float = CLOSE,
 ) -> Fit:
     """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
 
@@ -90,6 +96,8 @@ def settle(
     x
         Unknowns to begin with, if not as the guesses have them; with `matches` too, they bend
         already to what they should.
+    done
+        Of a standard uncertainty: how short the last step is.
     """
     begun = x is not None and matches is not None
     x = model.first() if x is None else x
@@ -97,16 +105,21 @@ def settle(
     if matches is None:
         matches = match(model, x, _COARSE)
     # Not to the end where the matches are about to change.
-    estimate = adjust(stiff, matches, x, done=_CLOSE if begun else _NEAR, steps=steps)
+    estimate = adjust(
+        stiff, matches, x, done=done if begun else _NEAR, steps=steps, rough=not begun
+    )
     last = model if begun else None
     for round_ in range(rounds):
         x, before = estimate.x, matches
         matches = without_strays(model, x, match(model, x), estimate.scatter)
         now = model if round_ else stiff
-        if now is last and _alike(matches, before):
-            break
-        estimate, last = adjust(now, matches, x, done=_CLOSE, steps=steps), now
-        if round_ and estimate.beyond(x) < _SAME:
+        if _alike(matches, before):
+            matches = before  # what was made for these is at hand
+            if now is last:
+                break
+        estimate = adjust(now, matches, x, done=done, steps=steps, rough=now is not model)
+        last = now
+        if round_ and estimate.beyond(x) < max(_SAME, done):
             break
     return Fit(model, matches, estimate)
 
@@ -142,6 +155,11 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
     return Fit(model, begun.matches, adjust(model, begun.matches, x))
 
 
+def first_match(model: DropModel) -> Matches:
+    """Match all edges to rods where the first guess has the chains."""
+    return match(model, model.first(), _COARSE)
+
+
 def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
     """Match all edges to rods, given where the chains are.
 
@@ -152,8 +170,8 @@ def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
     """
     clock = float(x[model.unknowns["clock"]][0])
     return {
-        role: align(record.trains, model.levels(role, x), model.trajectory(role, x), width, clock)
-        for role, record in model.records.items()
+        role: pairing.matched(model.all_levels(role, x), model.trajectory(role, x), width, clock)
+        for role, pairing in model.pairings.items()
     }
 
 
@@ -169,12 +187,12 @@ def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float 
 
 
 def _kept(
-    model: DropModel, role: str, x: Array, matches: Sequence[Index], scatter: float
+    model: DropModel, role: str, x: Array, matches: list[Index], scatter: float
 ) -> list[Index]:
     rows = model.residuals(role, x, matches)
     far = np.abs(rows.values) / rows.sigma
     # A few strays enlarge the scatter, and would hide behind it: most edges tell how much it is.
-    usual = max(1.0, _MOST * float(np.median(far)) / _MEDIAN) if far.size else 1.0
+    usual = max(1.0, _MOST * middle(far) / _MEDIAN) if far.size else 1.0
     limit = STRAY * min(scatter, usual)
     stray = far > limit
     # Of a rod's two sides that do not go together one is wrong, or both: the one that is further
@@ -185,6 +203,8 @@ def _kept(
     stray[second - (far[second - 1] > far[second])] = True
     for side in (second, second - 1):
         stray[side] |= far[side] > 0.5 * limit
+    if not stray.any():
+        return matches
     kept, position = [], 0
     for one in matches:
         copy = one.copy()

@@ -72,29 +72,38 @@ def fall_through(
     distance: Array, speed: Array, gravity: float, kappa: float | Array
 ) -> tuple[Array, Array]:
     """Speed at the end of a leg and how long it takes, as in `rig.model.drag.drag_leg`."""
+    reach = reach_of(distance, kappa)
     # An adjustment may try a rod that strikes above where the one before it did.
-    arrival = np.sqrt(np.maximum(squared_after(distance, speed, gravity, kappa), 0.0))
+    arrival = np.sqrt(np.maximum(_squared(reach, speed, gravity, kappa), 0.0))
+    return arrival, lasting(reach, speed, arrival, gravity, kappa)
+
+
+def lasting(
+    reach: Array, speed: Array, arrival: Array, gravity: float, kappa: float | Array
+) -> Array:
+    """How long a leg takes, by its `reach_of` and the speeds at both ends."""
+    tiny = np.finfo(float).tiny
     largest = _largest(kappa)
     if abs(largest) < _NONE:
-        return arrival, 2.0 * distance / np.maximum(speed + arrival, np.finfo(float).tiny)
-    reach = _reach(distance, kappa)
+        return np.asarray(reach / np.maximum(speed + arrival, tiny))
     rate = np.sqrt(np.abs(kappa) * gravity)
-    sum_of_speeds = arrival + (1.0 - kappa * reach) * speed
-    slow = rate * reach / np.maximum(sum_of_speeds, np.finfo(float).tiny)
-    if largest > 0.0:
-        return arrival, np.arctanh(np.minimum(slow, _NEVER)) / rate
-    return arrival, np.arctan(slow) / rate
+    slow = rate * reach / np.maximum(arrival + (1.0 - kappa * reach) * speed, tiny)
+    curve = np.arctanh(np.clip(slow, -_NEVER, _NEVER)) if largest > 0.0 else np.arctan(slow)
+    return np.asarray(curve / rate)
 
 
 def squared_after(distance: Array, speed: Array, gravity: float, kappa: float | Array) -> Array:
     """Square of the speed at the end of a leg; before its beginning it may be negative."""
-    reach = _reach(distance, kappa)
+    return _squared(reach_of(distance, kappa), speed, gravity, kappa)
+
+
+def _squared(reach: Array, speed: Array, gravity: float, kappa: float | Array) -> Array:
     found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
     return found
 
 
-def _reach(distance: Array, kappa: float | Array) -> Array:
-    """(1 − e^(−2κd))/κ."""
+def reach_of(distance: Array, kappa: float | Array) -> Array:
+    """(1 − e^(−2κd))/κ, which is twice the distance d where no air is."""
     if abs(_largest(kappa)) < _NONE:
         return 2.0 * distance
     found: Array = -np.expm1(-2.0 * kappa * distance) / kappa
@@ -125,26 +134,13 @@ def _slowed(since: Array, speed: Array, gravity: float) -> Array:
     return found
 
 
-def one_leg(distance: float, speed: float, gravity: float, kappa: float) -> tuple[float, float]:
-    """`fall_through` of one leg: much quicker than an array of one."""
-    if abs(kappa) < _NONE:
-        arrival = math.sqrt(speed * speed + 2.0 * gravity * max(distance, 0.0))
-        return arrival, 2.0 * distance / (speed + arrival)
-    left = math.exp(-2.0 * kappa * distance)
-    reach = -math.expm1(-2.0 * kappa * distance) / kappa
-    arrival = math.sqrt(max(left * speed * speed + gravity * reach, 0.0))
-    rate = math.sqrt(abs(kappa) * gravity)
-    slow = rate * reach / (arrival + left * speed)
-    return arrival, (math.atanh(min(slow, _NEVER)) if kappa > 0.0 else math.atan(slow)) / rate
-
-
 def reach_slopes(distance: Array, kappa: float | Array) -> tuple[Array, Array]:
     """(1 − e^(−2κd))/κ and its derivative by κ, by their series where these are short."""
     y = 2.0 * kappa * distance
     if np.abs(y).max() < _SHORT:
         one, two = (_polynomial(terms, y) for terms in _SERIES)
         return 2.0 * distance * one, 4.0 * distance**2 * two
-    reach = _reach(distance, kappa)
+    reach = reach_of(distance, kappa)
     return reach, (2.0 * distance * np.exp(-y) - reach) / kappa
 
 

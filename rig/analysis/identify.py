@@ -18,7 +18,7 @@ import numpy as np
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel, prior_air
 from rig.analysis.equations import HUBER, scaled
-from rig.analysis.fit import Fit, settle
+from rig.analysis.fit import ROUGHLY, Fit, first_match, settle
 from rig.analysis.pattern import (
     AIRS,
     ANY_ALPHA,
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
+    from rig.analysis.fit import Matches
     from rig.analysis.pattern import Span
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol
@@ -71,19 +72,6 @@ _INSTANTS = 12  # at which two falls are compared
 _SAME = 1.0  # how far apart they may be, in what a vote may be off
 _TAIL = 8.0  # standard deviations beyond which a normal distribution's tail is its first term
 _ROUNDS, _STEPS = 3, 15  # of matching and of adjusting them
-_OWN = {
-    "datum",
-    "beams",
-    "ripple",
-    "rods",
-    "width",
-    "impulses",
-    "contact",
-    "strike",
-    "top",
-    "strings",
-}
-"""Unknowns that a side tells which is read by itself; each beam and post is of one side."""
 _PULLS = 0.7, 0.5
 """By what share one object's acceleration may be less than stated, and more."""
 _CLOCKS = (-2.0, -1.0, 1.0, 2.0)  # standard uncertainties of the clock that are tried
@@ -226,11 +214,11 @@ def _strain(fit: Fit) -> float:
 
 def possible(record: ChainRecord) -> int:
     """Count the edges of a side that could be rods by their gates and polarities alone."""
-    return sum(
-        min(int((train.blocked == polarity).sum()), int((train.blocks == polarity).sum()))
-        for train in record.trains
-        for polarity in (True, False)
-    )
+    count = 0
+    for train in record.trains:
+        dark, due = int(np.count_nonzero(train.blocked)), int(np.count_nonzero(train.blocks))
+        count += min(dark, due) + min(train.blocked.size - dark, train.blocks.size - due)
+    return count
 
 
 def _around(releases: Sequence[float], window: Span) -> Span:
@@ -342,7 +330,11 @@ class _Side:
             )
             if self._known(model, one, enough):
                 continue
-            fit = settle(model, rounds=_ROUNDS, steps=_STEPS)
+            matches = first_match(model)
+            # Of edges that are rods alike, the same adjustment follows.
+            if any(not _apart(matches, reading.fit.matches) for reading in enough):
+                continue
+            fit = settle(model, matches, rounds=_ROUNDS, steps=_STEPS, done=ROUGHLY)
             evidence = log_evidence(fit) if fit.matched else 0.0
             if evidence > 0.0:  # likelier than that all edges are strays and every rod was missed
                 found.append(Reading(fit, evidence))
@@ -374,8 +366,12 @@ def _best(readings: Iterable[Reading]) -> list[Reading]:
 
 def different(one: Fit, other: Fit) -> bool:
     """Whether two readings give really different rods to the same edges of a side."""
-    for role, matches in one.matches.items():
-        mine, theirs = np.concatenate(matches), np.concatenate(other.matches[role])
+    return _apart(one.matches, other.matches)
+
+
+def _apart(one: Matches, other: Matches) -> bool:
+    for role, matches in one.items():
+        mine, theirs = np.concatenate(matches), np.concatenate(other[role])
         matched = int(np.count_nonzero((mine >= 0) | (theirs >= 0)))
         if np.count_nonzero(mine != theirs) > max(_FEW, _OTHER * matched):
             return True
@@ -497,14 +493,31 @@ def _together(
 
 
 def _begun(model: DropModel, sides: Sequence[Reading]) -> Array:
-    """Unknowns of both sides together, as far as each side tells its own; the rest is guessed."""
-    x = model.first()
+    """Unknowns of both sides together, as far as each side has told them by itself.
+
+    Each side's equations at its own estimate, one below the other: were they linear, this would be
+    the solution of all.
+    """
+    at, size = model.unknowns, len(model.unknowns)
+    matrix, vector = np.zeros((size, size)), np.zeros(size)
     for side in sides:
-        own = side.fit.model.unknowns
-        for name, block in own.blocks.items():
-            if name.removeprefix(f"{next(iter(side.fit.matches))} ") in _OWN:
-                x[model.unknowns[name]] += side.fit.x[block]
-    return x
+        (role,), own, estimate = side.fit.matches, side.fit.model.unknowns, side.fit.estimate
+        assert estimate.plain is not None
+        x = estimate.x.copy()
+        for name in (f"{role} release", "alpha"):  # are counted from what was found
+            if name in own:
+                x[own[name]] = 0.0
+        rows = [*range(len(own))]
+        places = [n for name in own.blocks for n in range(at[name].start, at[name].stop)]
+        if role == "free" and "side" in at:  # where a side begins is one number by itself
+            rows.append(own["drop"].start)
+            places.append(at["side"].start)
+        seen, left = estimate.plain
+        matrix[np.ix_(places, places)] += seen[np.ix_(rows, rows)]
+        vector[places] += (seen @ x - left)[rows]
+    sd = at.sd
+    told = matrix * np.outer(sd, sd) + np.eye(size)
+    return np.asarray(sd * np.linalg.solve(told, sd * vector), dtype=np.float64)
 
 
 def weighed(fit: Fit) -> Reading:

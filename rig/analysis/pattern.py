@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.free_flight import fall_through
+from rig.analysis.free_flight import fall_through, lasting, reach_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -138,7 +138,8 @@ def guesses(
         return []
     found: list[Guess] = []
     for height in _heights(start, slack):
-        paths = _paths(record, height, gravity, kappa, slack, alphas)
+        tried = _alphas(record, height, gravity, kappa, slack, alphas)
+        paths = _paths(record, height, gravity, kappa, tried)
         for release, path, votes in _moments(pairs, paths, slack, window, least):
             alpha = float(paths.alphas[path])
             found.append(Guess(release, height, alpha, kappa, clock, votes))
@@ -179,49 +180,51 @@ def _pairs(record: ChainRecord, clock: float) -> _Pairs:
     return _Pairs(np.concatenate(times) * (1.0 + clock), np.concatenate(numbers))
 
 
-def _paths(
+def _alphas(
     record: ChainRecord, start: float, gravity: float, kappa: float, slack: float, span: Span
-) -> _Paths:
-    """Let the chain fall with every α that must be tried; once where nothing is struck."""
-    levels = np.concatenate([train.levels for train in record.trains])
+) -> Array:
+    """Impact coefficients to try, so many that none between them is missed; 0 for a free chain."""
     if record.ratios is None:
-        times, speeds = _passages(
-            levels,
-            np.zeros((1, 1)),
-            np.array([start]),
-            np.zeros((1, 1)),
-            gravity,
-            kappa * record.air,
-        )
-        return _Paths(np.zeros(1), times, speeds, _end(times))
-    height = np.concatenate([[start], -record.strikes])
-    kappas = kappa * np.broadcast_to(record.air, height.shape)
-    ends = _legs(height, record.ratios, np.array(span), gravity, kappas)
+        return np.zeros(1)
+    time, _, speed = _legs(record, start, np.array(span), gravity, kappa)
     # So fine that the chain's top is never off by more than half a vote's width.
-    apart = float((ends[0][-1, 0] - ends[0][-1, 1]) * ends[1][-1, 1])
-    count = int(np.ceil(max(apart, 0.0) / slack)) + 2
-    alphas = np.linspace(*span, count)
-    time, speed = _legs(height, record.ratios, alphas, gravity, kappas)
-    times, speeds = _passages(levels, time, height, speed, gravity, kappas)
-    return _Paths(alphas, times, speeds, _end(times))
+    apart = float((time[-1, 0] - time[-1, 1]) * speed[-1, 1])
+    return np.linspace(*span, int(np.ceil(max(apart, 0.0) / slack)) + 2)
 
 
-def _end(times: Array) -> Array:
-    found: Array = np.where(np.isnan(times), 0.0, times).max(axis=0, initial=0.0)
-    return found
+def _paths(
+    record: ChainRecord, start: float, gravity: float, kappa: float, alphas: Array
+) -> _Paths:
+    """Let the chain fall with each α."""
+    levels = np.concatenate([train.levels for train in record.trains])
+    time, height, speed = _legs(record, start, alphas, gravity, kappa)
+    air = kappa * np.broadcast_to(record.air, height.shape)
+    times, speeds = _passages(levels, time, height, speed, gravity, air)
+    end: Array = np.where(np.isnan(times), 0.0, times).max(axis=0, initial=0.0)
+    return _Paths(alphas, times, speeds, end)
 
 
 def _legs(
-    height: Array, ratios: Array, alphas: Array, gravity: float, kappas: Array
-) -> tuple[Array, Array]:
-    """Times and speeds at the beginning of each leg for every α, shape ``(legs, alphas)``."""
-    time, speed = np.zeros((height.size, alphas.size)), np.zeros((height.size, alphas.size))
-    for k, ratio in enumerate(ratios):
-        distance = height[k] - height[k + 1]
-        arrival, lasted = fall_through(distance, speed[k], gravity, float(kappas[k]))
-        time[k + 1] = time[k] + lasted
-        speed[k + 1] = arrival * (1.0 + alphas * ratio)
-    return time, speed
+    record: ChainRecord, start: float, alphas: Array, gravity: float, kappa: float
+) -> tuple[Array, Array, Array]:
+    """Where each leg begins for every α: time, shape ``(legs, alphas)``, height, and speed."""
+    if record.ratios is None:
+        return np.zeros((1, 1)), np.array([start]), np.zeros((1, 1))
+    height = np.concatenate([[start], -record.strikes])
+    air = kappa * np.broadcast_to(record.air, height.shape)[:-1]
+    reach = reach_of(height[:-1] - height[1:], air)
+    left, gained = 1.0 - air * reach, gravity * reach
+    factors = (1.0 + alphas * record.ratios[:, None]) ** 2
+    # Squares of the speeds, before and after each impact.
+    before, after = np.empty_like(factors), np.zeros((height.size, alphas.size))
+    for k, factor in enumerate(factors):
+        before[k] = left[k] * after[k] + gained[k]
+        after[k + 1] = before[k] * factor
+    time, speed = np.zeros_like(after), np.sqrt(np.maximum(after, 0.0))
+    arrival = np.sqrt(np.maximum(before, 0.0))
+    lasted = lasting(reach[:, None], speed[:-1], arrival, gravity, air[:, None])
+    np.cumsum(lasted, axis=0, out=time[1:])
+    return time, height, speed
 
 
 def _passages(
@@ -341,12 +344,9 @@ def _peaks(
         yield float(moments[at]), path, count
         yielded += 1
         # A fall of another α that begins and ends with this one is the same.
-        ends = paths.end - paths.end[path]
-        for other in range(paths.alphas.size):
-            if abs(ends[other]) < 2.0 * apart:
-                near = np.abs(moments - moments[at]) < apart
-                votes[other, near] = 0
-                best[other] = votes[other].max()
+        alike = np.abs(paths.end - paths.end[path]) < 2.0 * apart
+        votes[np.ix_(alike, np.abs(moments - moments[at]) < apart)] = 0
+        best[alike] = votes[alike].max(axis=1)
 
 
 def near_alpha(record: ChainRecord) -> Span:
@@ -360,8 +360,7 @@ def in_order(record: ChainRecord, start: float, gravity: float) -> Span:
     The first edge of a gate is its first expected one and the last the last, but for few that were
     missed or did not belong: a window of some rods, which may be wrong.
     """
-    slack = slack_of(record)
-    paths = _paths(record, start, gravity, 0.0, slack, (record.alpha, record.alpha))
+    paths = _paths(record, start, gravity, 0.0, np.array([record.alpha]))
     late, begin = [], 0
     for train in record.trains:
         due = paths.times[begin : begin + train.rods.size, 0]
@@ -371,14 +370,14 @@ def in_order(record: ChainRecord, start: float, gravity: float) -> Span:
             wanted = wanted[~np.isnan(wanted)]
             size = min(seen.size, wanted.size)
             if size >= _FEW:
-                late += [_middle(seen[:size] - wanted[:size])]
-                late += [_middle(seen[-size:] - wanted[-size:])]
+                late += [middle(seen[:size] - wanted[:size])]
+                late += [middle(seen[-size:] - wanted[-size:])]
     if not late:
         return EVER
     return min(late), max(late)
 
 
-def _middle(values: Array) -> float:
+def middle(values: Array) -> float:
     """Return the upper median; much quicker than that of numpy."""
     return float(np.sort(values)[values.size // 2])
 

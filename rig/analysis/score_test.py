@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.equations import normal_equations
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -59,12 +57,12 @@ def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
     """
     if not directions:
         return []
-    model, estimate = fit.model, fit.estimate
-    unit = np.ones_like(estimate.sd)
-    raw = normal_equations(model, fit.matches, estimate.x, unit, estimate.scatter)
+    estimate = fit.estimate
+    assert estimate.plain is not None
+    matrix, vector = estimate.plain
     along = np.stack(directions, axis=1)
-    slope = along.T @ raw.vector
-    seen = raw.matrix @ along
+    slope = along.T @ vector
+    seen = matrix @ along
     whole = np.einsum("ij,ij->j", along, seen)
     shared = estimate.sd[:, None] * seen
     follow = np.linalg.solve(estimate.information, shared)

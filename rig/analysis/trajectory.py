@@ -8,13 +8,21 @@ request.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.free_flight import fall_for, fall_through, leg_slopes, one_leg, reach_slopes
+from rig.analysis.free_flight import (
+    fall_for,
+    fall_through,
+    lasting,
+    leg_slopes,
+    reach_of,
+    reach_slopes,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -236,20 +244,22 @@ def struck_trajectory(
     height[0] = start
     np.negative(places, out=height[1:])
     distance = height[:-1] - height[1:]
+    kappas = kappa * (float(air[0]) if air.size == 1 else air[:rods])
+    reach = reach_of(distance, kappas)
     # Each leg needs the speed after the one before: a loop over floats is quicker than numpy here.
-    now, speed = release, 0.0
-    time, speeds, arrivals = [now], [speed], []
-    kappas = (kappa * np.broadcast_to(air, rods + 1)).tolist()[:rods]
-    for fallen, more, held in zip(distance.tolist(), gain.tolist(), kappas, strict=True):
-        arrival, lasted = one_leg(fallen, speed, gravity, held)
-        now += lasted
+    speed, speeds, arrivals = 0.0, [0.0], []
+    legs = np.stack([1.0 - kappas * reach, gravity * reach, 1.0 + gain], axis=1).tolist()
+    for left, gained, factor in legs:
+        arrival = math.sqrt(max(left * speed * speed + gained, 0.0))
         # What an adjustment tries may throw the chain back up: no chain does.
-        speed = arrival * max(1.0 + more, 1e-3)
-        time.append(now)
+        speed = arrival * max(factor, 1e-3)
         speeds.append(speed)
         arrivals.append(arrival)
-    hits = Hits(distance, np.array(arrivals), gain, ratios)
-    return Trajectory(np.array(time), height, np.array(speeds), gravity, hits, kappa, air)
+    begins, ends = np.array(speeds), np.array(arrivals)
+    lasted = lasting(reach, begins[:-1], ends, gravity, kappas)
+    time = np.cumsum(np.concatenate([[release], lasted]))
+    hits = Hits(distance, ends, gain, ratios)
+    return Trajectory(time, height, begins, gravity, hits, kappa, air)
 
 
 def _struck_slopes(path: Trajectory) -> Slopes:

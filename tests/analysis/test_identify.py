@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from scipy.special import log_ndtr
 
+from rig.analysis import identify
 from rig.analysis.deciding import deciding_gate
+from rig.analysis.fit import CLOSE, settle
 from rig.analysis.identify import MISSED, STRAYS
 from rig.analysis.verdict import LEAD, pattern_faults
 from rig.errors import InputError
@@ -18,7 +20,7 @@ from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.records import Edge
 from sim.dials import Dials
-from tests.analysis.drops import CLOCK_U, STATED, Case, case, wrong_rods
+from tests.analysis.drops import CLOCK_U, STATED, UNIFORM, Case, case, wrong_rods
 
 FENCE = """
 protocol: 1
@@ -315,3 +317,22 @@ def test_any_layout_is_read(written, dials):
         assert wrong_rods(result, one.truth) == []
         if dials.missed == 0.0:
             assert result.verdict != "void", (protocol.title, result.reasons)
+
+
+# What it takes ------------------------------------------------------------------------------------
+
+
+def test_no_fall_is_adjusted_twice_and_both_sides_begin_where_each_ended(monkeypatch):
+    """Of the chain that strikes two guesses of one α and two of another are the same fall."""
+    settled = []
+
+    def remember(model, matches=None, **rest):
+        fit = settle(model, matches, **rest)
+        settled.append((model.records.keys(), rest.get("x"), fit))
+        return fit
+
+    monkeypatch.setattr(identify, "settle", remember)
+    assert case(UNIFORM, seed=6, incline=40.0).identify().fit is not None
+    assert [*map(len, (roles for roles, *_ in settled))] == [1, 1, 1, 2]
+    _, begun, both = settled[-1]
+    assert both.estimate.beyond(begun) < CLOSE
