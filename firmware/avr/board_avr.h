@@ -13,6 +13,7 @@
 
 #define BOARD_HZ F_CPU
 #define BOARD_BYTES_WAIT 0
+#define BOARD_STEPS 1
 #define BOARD_FLASH PROGMEM
 /* A stamp may be off when the interrupt before it was still running: three passes through the
  * interrupt, with room to spare. */
@@ -245,14 +246,12 @@ static inline bool board_receive(uint8_t *byte)
     return true;
 }
 
-static inline bool board_send_ready(void)
+static inline uint8_t board_send(const uint8_t *bytes, uint8_t count)
 {
-    return UCSR0A & _BV(UDRE0);
-}
-
-static inline void board_send(uint8_t byte)
-{
-    UDR0 = byte;
+    if (!count || !(UCSR0A & _BV(UDRE0)))
+        return 0;
+    UDR0 = *bytes;
+    return 1;
 }
 
 static inline void board_kick(void)

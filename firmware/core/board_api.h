@@ -31,6 +31,8 @@
  *   is put off on its way.
  * BOARD_SHORT: a pulse of fewer ticks may be too short for that hardware.
  * BOARD_BYTES_WAIT: 1 where bytes on the line wait until they are taken, 0 where they are lost.
+ * BOARD_STEPS: how many entries become events, and events go into a frame, in one turn of the main
+ *   loop.
  * BOARD_FLASH: attribute of tables that stay in flash; BOARD_KEPT: of variables that a reset leaves
  *   as they are.
  * board_type, board_channels: tables of text, what the board and its gate pins are called. */
@@ -46,8 +48,8 @@
 #if !defined BOARD_REACH || !defined BOARD_SHORT
 #error "board.h must bring BOARD_REACH and BOARD_SHORT"
 #endif
-#if !defined BOARD_BYTES_WAIT
-#error "board.h must bring BOARD_BYTES_WAIT"
+#if !defined BOARD_BYTES_WAIT || !defined BOARD_STEPS
+#error "board.h must bring BOARD_BYTES_WAIT and BOARD_STEPS"
 #endif
 #if !defined BOARD_FLASH || !defined BOARD_KEPT
 #error "board.h must bring BOARD_FLASH and BOARD_KEPT"
@@ -150,9 +152,10 @@ NEEDS_FUNCTION(board_supply_mv, uint16_t (*)(uint16_t),
 /* Take a byte, if there is one. */
 NEEDS_FUNCTION(board_receive, bool (*)(uint8_t *), "bool board_receive(uint8_t *byte)");
 
-/* Whether a byte can be sent, and send it. Where nobody listens it can, and is lost. */
-NEEDS_FUNCTION(board_send_ready, bool (*)(void), "bool board_send_ready(void)");
-NEEDS_FUNCTION(board_send, void (*)(uint8_t), "void board_send(uint8_t byte)");
+/* Send as many of these as the line takes now, and tell how many. Where nobody listens it takes all,
+ * and they are lost. */
+NEEDS_FUNCTION(board_send, uint8_t (*)(const uint8_t *, uint8_t),
+               "uint8_t board_send(const uint8_t *bytes, uint8_t count)");
 
 /* -- the rest */
 

@@ -53,6 +53,7 @@ static struct {
 static struct {
     uint8_t causes, check;
 } restarts BOARD_KEPT;
+static uint8_t untold;  /* the DISARM_REASON that the host has still to be told, or 0 */
 static bool aborted;    /* ABORT came for the drop that is recorded or held */
 static bool closing;    /* the recording is over, but not everything is sent */
 static uint8_t room;    /* events that still belong into the frame being written */
@@ -110,13 +111,11 @@ static void send_text(const char *text, uint8_t size)
 
 static void send_events(uint16_t first, uint16_t end, uint8_t ack)
 {
-    uint8_t n;
     send_begin(MSG_EVENTS, ack);
     send32(drop.label);
     send16(first);
     for (; first != end; first++)
-        for (n = 0; n < EVENT_SIZE; n++)
-            send8(events_at(first)[n]);
+        send_bytes(events_at(first), EVENT_SIZE);
     send_end();
 }
 
@@ -149,14 +148,21 @@ static const uint8_t *name_board(uint8_t record[NAME_RECORD])
 
 /* -- what goes on */
 
+/* At once, also while the line takes nothing: on USB that is for as long as nobody reads. */
 static void disarm(uint8_t reason)
 {
     board_watch(0);
     phase = PHASE_IDLE;
+    untold = reason;
+}
+
+static RARE void tell_disarmed(void)
+{
     send_begin(MSG_DISARMED, 0);
     send32(order.label);
-    send8(reason);
+    send8(untold);
     send_end();
+    untold = 0;
 }
 
 static void end_recording(void)
@@ -204,10 +210,7 @@ static void stream(void)
         send16(events.sent);
         room = (uint8_t)(unsent < BATCH ? unsent : BATCH);
     } else {
-        uint8_t n;
-        for (n = 0; n < EVENT_SIZE; n++)
-            send8(events.unsent[n]);
-        send_pass();
+        send_bytes(events.unsent, EVENT_SIZE);
         events_sent_one();
         if (--room == 0) {
             send_end();
@@ -219,8 +222,6 @@ static void stream(void)
 static void watch_armed(uint32_t now)
 {
     order.moved |= events_moved(&order.flicker);
-    if (!send_idle())
-        return;
     if (stop.open)
         disarm(DISARM_REASON_STOPPED);
     else if (now - order.since >= order.timeout)
@@ -504,6 +505,8 @@ static RARE void seldom(uint32_t now)
         watch_armed(now);
     else if (phase == PHASE_RECORDING)
         watch_recording(now);
+    if (untold && send_idle())
+        tell_disarmed();
     if (board_reference(&count)) {
         pulses++;
         pulse_tick = ticks_of(count);
@@ -519,14 +522,23 @@ void device_pass(void)
     else
         requested = receive_request(&request);
     if (requested && send_idle()) {
-        requested = false;
-        execute();
+        if (untold) { /* before the answer to what came too late */
+            tell_disarmed();
+        } else {
+            requested = false;
+            execute();
+        }
     }
     if (phase == PHASE_RECORDING) {
-        events_pass();
+        uint8_t n = BOARD_STEPS;
+        while (events_pass() && --n)
+            ;
         receive_pass();
         send_pass();
-        stream();
+        n = BOARD_STEPS;
+        do
+            stream();
+        while (--n && room);
     }
     send_pass();
     ticks_pass();
@@ -544,11 +556,13 @@ void device_pass(void)
 
 void device_start(uint8_t cause)
 {
+    static const uint8_t delimiter;
     ticks_start(0);
     release_reset();
     receive_reset();
     send_reset();
     requested = closing = aborted = false;
+    untold = 0;
     stop.open = board_stopped();
     stop.wavers = false;
     if (cause & POWER_ON || (restarts.check ^ restarts.causes) != 0xFF)
@@ -561,9 +575,8 @@ void device_start(uint8_t cause)
     board_watch(0);
     phase = drop_recover() ? PHASE_HOLDING : PHASE_IDLE;
     stir(ticks_now() ^ drop.fire_tick);
-    while (!board_send_ready())
+    while (!board_send(&delimiter, 1)) /* the reset may have cut a frame short */
         ;
-    board_send(0); /* the reset may have cut a frame short */
     send_begin(MSG_BOOT, 0);
     send8(cause);
     send_end();

@@ -101,7 +101,7 @@ static void rewind_entries(void)
     }
 }
 
-void events_pass(void)
+bool events_pass(void)
 {
     uint8_t *entry = at.entry;
     uint8_t port;
@@ -110,7 +110,7 @@ void events_pass(void)
     if (!board_has_entry(entry)) {
         /* What left no event has its memory back as soon as the gates are quiet. */
         rewind_entries();
-        return;
+        return false;
     }
     stamp = ticks_stamped(get16(entry), entry[2]);
     since = stamp - at.stamp;
@@ -125,6 +125,7 @@ void events_pass(void)
         at.most = at.lead;
     at.ports = ports;
     at.stamp = stamp;
+    return true;
 }
 
 bool events_settled(void)

@@ -29,8 +29,8 @@ extern struct events events;
 /* Begin anew, watching these gates. */
 void events_start(uint16_t gates);
 
-/* Turn one entry into an event, if there is an entry. */
-void events_pass(void);
+/* Turn one entry into an event, if there is an entry: whether there was. */
+bool events_pass(void);
 
 /* Whether every entry has been turned; exact once the gates are not watched any more. */
 bool events_settled(void);

@@ -25,20 +25,29 @@ bool send_idle(void)
     return out.size == 0;
 }
 
-static void stuff(uint8_t byte)
+void send_bytes(const uint8_t *bytes, uint8_t count)
 {
-    if (byte == 0) {
-        out.buffer[out.code_at] = (uint8_t)(out.size - out.code_at);
-        out.code_at = out.size;
+    uint16_t crc = out.crc;
+    uint8_t size = out.size, code_at = out.code_at; /* a write to the buffer may be one to `out` */
+    while (count--) {
+        uint8_t byte = *bytes++;
+        if (!BOARD_BYTES_WAIT)
+            receive_pass();
+        crc = crc16_add(crc, byte);
+        if (byte == 0) {
+            out.buffer[code_at] = (uint8_t)(size - code_at);
+            code_at = size;
+        }
+        out.buffer[size++] = byte; /* a zero's place is taken by the next block's code */
     }
-    out.buffer[out.size++] = byte; /* a zero's place is taken by the next block's code */
+    out.crc = crc;
+    out.size = size;
+    out.code_at = code_at;
 }
 
 void send8(uint8_t value)
 {
-    receive_pass();
-    out.crc = crc16_add(out.crc, value);
-    stuff(value);
+    send_bytes(&value, 1);
 }
 
 void send16(uint16_t value)
@@ -69,9 +78,7 @@ void send_begin(uint8_t type, uint8_t ack)
 
 void send_end(void)
 {
-    uint16_t crc = out.crc;
-    stuff((uint8_t)crc);
-    stuff((uint8_t)(crc >> 8));
+    send16(out.crc);
     out.buffer[out.code_at] = (uint8_t)(out.size - out.code_at);
     out.buffer[out.size++] = 0;
     out.ended = true;
@@ -81,9 +88,9 @@ void send_pass(void)
 {
     /* The block being written waits for its code; all before it may leave already. */
     uint8_t final = out.ended ? out.size : out.code_at;
-    if (out.sent == final || !board_send_ready())
+    if (out.sent == final)
         return;
-    board_send(out.buffer[out.sent++]);
-    if (out.ended && out.sent == out.size)
+    out.sent = (uint8_t)(out.sent + board_send(out.buffer + out.sent, (uint8_t)(final - out.sent)));
+    if (out.ended && out.sent == final)
         send_reset();
 }

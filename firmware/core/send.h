@@ -13,12 +13,13 @@ void send_reset(void);
 bool send_idle(void);
 
 void send_begin(uint8_t type, uint8_t ack);
+void send_bytes(const uint8_t *bytes, uint8_t count);
 void send8(uint8_t value);
 void send16(uint16_t value);
 void send32(uint32_t value);
 void send_end(void);
 
-/* Send a byte if there is one and the line takes it. */
+/* Send what the line takes of what there is. */
 void send_pass(void);
 
 #endif

@@ -193,12 +193,6 @@ bool board_receive(uint8_t *byte)
     return true;
 }
 
-bool board_send_ready(void)
-{
-    /* One byte in the shifter and one waiting. */
-    return to_host.free <= now + HOST_BYTE;
-}
-
 static bool line_put(struct line *line, uint64_t when, uint8_t byte)
 {
     if (line->end - line->first == LINE)
@@ -209,9 +203,10 @@ static bool line_put(struct line *line, uint64_t when, uint8_t byte)
     return true;
 }
 
-void board_send(uint8_t byte)
+uint8_t board_send(const uint8_t *bytes, uint8_t count)
 {
-    line_put(&to_host, now, byte);
+    /* One byte in the shifter and one waiting. */
+    return count && to_host.free <= now + HOST_BYTE && line_put(&to_host, now, *bytes);
 }
 
 void board_led(bool on)

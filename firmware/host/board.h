@@ -24,6 +24,7 @@
 #define BOARD_REACH 0xF800
 #define BOARD_SHORT (10 * (BOARD_HZ / 1000000u))
 #define BOARD_BYTES_WAIT 0
+#define BOARD_STEPS 1
 #define BOARD_FLASH
 #define BOARD_KEPT __attribute__((section("kept")))
 
@@ -80,8 +81,7 @@ bool board_reference(uint16_t *count);
 void board_sense_begin(void);
 bool board_sensed(uint16_t *count);
 bool board_receive(uint8_t *byte);
-bool board_send_ready(void);
-void board_send(uint8_t byte);
+uint8_t board_send(const uint8_t *bytes, uint8_t count);
 void board_led(bool on);
 void board_kick(void);
 void board_name(uint8_t record[]);

@@ -24,6 +24,7 @@
 #define BOARD_REACH UINT32_MAX
 #define BOARD_SHORT 1
 #define BOARD_BYTES_WAIT 1
+#define BOARD_STEPS 6
 #define BOARD_FLASH
 #define BOARD_KEPT __attribute__((section(".kept")))
 
@@ -100,8 +101,7 @@ bool board_sensed(uint16_t *count);
 uint16_t board_supply(void);
 uint16_t board_supply_mv(uint16_t measured);
 bool board_receive(uint8_t *byte);
-bool board_send_ready(void);
-void board_send(uint8_t byte);
+uint8_t board_send(const uint8_t *bytes, uint8_t count);
 void board_led(bool on);
 void board_kick(void);
 void board_name(uint8_t record[]);

@@ -10,8 +10,10 @@
 #define OTHERS 1u
 #define FIRST_OTHER 16u /* the pin that is bit 0 of what the second one stamps */
 
-#define GATES_RING_BITS 15 /* bytes, as a power of two: 4096 stamps */
+#define GATES_RING_BITS 15 /* bytes, as a power of two: DMA's largest, and 4096 stamps */
 #define OTHERS_RING_BITS 9
+#define GATES_ROOM (1u << GATES_RING_BITS >> 3) /* stamps */
+#define OTHERS_ROOM (1u << OTHERS_RING_BITS >> 3)
 
 #define SHIFT_LEFT_AND_JOIN (1u << 31) /* one FIFO of eight words, to the processor */
 #define DMA_ON (1u << 0)
@@ -22,20 +24,30 @@
 #define DMA_PACED_BY_RX(machine) ((4u + (machine)) << 15)
 #define DMA_SILENT (1u << 21)
 #define FOR_EVER 0xFFFFFFFFu
+#define WORN (FOR_EVER / 2)
 
 struct stamp {
     uint32_t states; /* before in the upper half, now in the lower */
     uint32_t count;  /* down from all ones */
 };
 
-static volatile struct stamp gates_ring[1u << GATES_RING_BITS >> 3]
+static volatile uint32_t gates_words[1u << GATES_RING_BITS >> 2]
     __attribute__((section(".ring"), aligned(1u << GATES_RING_BITS)));
-static volatile struct stamp others_ring[1u << OTHERS_RING_BITS >> 3]
+static volatile uint32_t others_words[1u << OTHERS_RING_BITS >> 2]
     __attribute__((aligned(1u << OTHERS_RING_BITS)));
 
-#define ROOM(ring) ((uint32_t)(sizeof(ring) / sizeof *(ring)))
+static struct ring {
+    volatile uint32_t *words;
+    uint32_t bits;    /* its bytes, as a power of two */
+    uint32_t last;    /* index of its last word */
+    uint32_t read;    /* words, since DMA began */
+    uint32_t written; /* at the latest look */
+    bool broken;      /* a word was lost: which half of a stamp comes next is not known */
+} rings[] = {
+    [GATES] = {gates_words, GATES_RING_BITS, 2 * GATES_ROOM - 1, 0, 0, false},
+    [OTHERS] = {others_words, OTHERS_RING_BITS, 2 * OTHERS_ROOM - 1, 0, 0, false},
+};
 
-static uint32_t gates_read, others_read; /* stamps, since the start */
 static uint16_t watched;
 static uint8_t *entry, *entries_stop;
 static uint16_t lost;
@@ -46,15 +58,71 @@ static struct {
     uint16_t count;
 } reference, sense, sync;
 
-static uint32_t stamps_written(uint32_t channel)
+/* -- the rings */
+
+static void ring_start(uint32_t machine)
 {
-    return ~REGISTER(DMA_COUNT(channel)) / 2;
+    struct ring *ring = &rings[machine];
+    REGISTER(DMA_READ(machine)) = PIO_RX(machine);
+    REGISTER(DMA_WRITE(machine)) = (uint32_t)ring->words;
+    REGISTER(DMA_COUNT(machine)) = FOR_EVER;
+    ring->read = ring->written = 0;
+    REGISTER(DMA_CTRL(machine)) = DMA_ON | DMA_FIRST | DMA_WORDS | DMA_TO_RING(ring->bits) |
+                                  DMA_CHAIN_TO(machine) | DMA_PACED_BY_RX(machine) | DMA_SILENT;
+}
+
+/* DMA's count of words has an end, after weeks of a gate that flickers: begin anew before it. */
+static void ring_renew(uint32_t machine)
+{
+    bool slipped;
+    REGISTER(DMA_ABORT) = 1u << machine;
+    while (REGISTER(DMA_ABORT) & 1u << machine)
+        ;
+    slipped = ~REGISTER(DMA_COUNT(machine)) != rings[machine].written;
+    ring_start(machine);
+    rings[machine].broken |= slipped;
+}
+
+/* How many stamps wait in a ring. Where DMA came too late for a FIFO of eight words, what was lost
+ * may be half a stamp: then nothing counts until the machine is seen at rest. */
+static uint32_t stamps_waiting(uint32_t machine)
+{
+    struct ring *ring = &rings[machine];
+    uint32_t lost_word = PIO_LOST_WORD << machine;
+    uint32_t written = ~REGISTER(DMA_COUNT(machine));
+    bool rests = written == ring->written && REGISTER(PIO_FSTAT) & PIO_RX_EMPTY << machine;
+    ring->written = written;
+    if (REGISTER(PIO_FDEBUG) & lost_word) {
+        REGISTER(PIO_FDEBUG) = lost_word;
+        ring->broken = true;
+        return 0;
+    }
+    if (ring->broken) {
+        ring->read = written;
+        ring->broken = !rests;
+    } else if (rests && written == ring->read && written >= WORN) {
+        ring_renew(machine);
+        return 0;
+    }
+    return (written - ring->read) / 2;
+}
+
+static uint32_t next_word(struct ring *ring)
+{
+    return ring->words[ring->read++ & ring->last];
+}
+
+static struct stamp next_stamp(uint32_t machine)
+{
+    struct stamp stamp;
+    stamp.states = next_word(&rings[machine]);
+    stamp.count = next_word(&rings[machine]);
+    return stamp;
 }
 
 /* -- the start */
 
-static void machine_start(uint32_t machine, uint32_t first_pin, volatile struct stamp *ring,
-                          uint32_t ring_bits)
+static void machine_start(uint32_t machine, uint32_t first_pin)
 {
     REGISTER(PIO_CLKDIV(machine)) = 1u << 16;
     REGISTER(PIO_EXECCTRL(machine)) = CAPTURE_WRAP << 12 | CAPTURE_START << 7;
@@ -65,12 +133,7 @@ static void machine_start(uint32_t machine, uint32_t first_pin, volatile struct 
     REGISTER(PIO_INSTR(machine)) = PIO_IN(PINS, 16);
     REGISTER(PIO_INSTR(machine)) = PIO_MOV(X, ISR);
     REGISTER(PIO_INSTR(machine)) = PIO_JMP(CAPTURE_START);
-
-    REGISTER(DMA_READ(machine)) = PIO_RX(machine);
-    REGISTER(DMA_WRITE(machine)) = (uint32_t)ring;
-    REGISTER(DMA_COUNT(machine)) = FOR_EVER;
-    REGISTER(DMA_CTRL(machine)) = DMA_ON | DMA_FIRST | DMA_WORDS | DMA_TO_RING(ring_bits) |
-                                  DMA_CHAIN_TO(machine) | DMA_PACED_BY_RX(machine) | DMA_SILENT;
+    ring_start(machine);
 }
 
 void capture_start(void)
@@ -78,8 +141,9 @@ void capture_start(void)
     uint32_t n;
     for (n = 0; n < PROGRAM_WORDS; n++)
         REGISTER(PIO_MEMORY(n)) = programs[n];
-    machine_start(GATES, 0, gates_ring, GATES_RING_BITS);
-    machine_start(OTHERS, FIRST_OTHER, others_ring, OTHERS_RING_BITS);
+    REGISTER(BUS_PRIORITY) = BUS_DMA_READS | BUS_DMA_WRITES; /* it waits for nobody */
+    machine_start(GATES, 0);
+    machine_start(OTHERS, FIRST_OTHER);
     release_machine_start();
     started = REGISTER(TIMER_RAW_LOW);
     while (REGISTER(TIMER_RAW_LOW) == started)
@@ -129,19 +193,19 @@ static void write_entry(uint16_t changed, uint16_t gates, uint32_t tick)
 /* Turn what DMA has written into entries. */
 static void gates_pass(void)
 {
-    uint32_t end = stamps_written(GATES);
-    if (end - gates_read >= ROOM(gates_ring)) {
-        /* The ring went round before it was read: no stamp in it can be trusted. */
+    uint32_t waiting = stamps_waiting(GATES);
+    if (waiting >= GATES_ROOM || rings[GATES].broken) {
+        /* The ring went round before it was read, or words were lost: no stamp can be trusted. */
         if (watched)
             lost = UINT16_MAX;
-        gates_read = end;
+        rings[GATES].read += 2 * waiting;
+        return;
     }
-    for (; gates_read != end; gates_read++) {
-        volatile struct stamp *stamp = &gates_ring[gates_read % ROOM(gates_ring)];
-        uint32_t states = stamp->states;
-        uint16_t changed = (uint16_t)((states ^ states >> 16) & watched);
+    while (waiting--) {
+        struct stamp stamp = next_stamp(GATES);
+        uint16_t changed = (uint16_t)((stamp.states ^ stamp.states >> 16) & watched);
         if (changed)
-            write_entry(changed, (uint16_t)states, ~stamp->count);
+            write_entry(changed, (uint16_t)stamp.states, ~stamp.count);
     }
 }
 
@@ -171,7 +235,7 @@ uint8_t *board_entries_end(void)
 
 bool board_has_entry(const uint8_t *at)
 {
-    return board_entries_end() != at;
+    return entry != at || board_entries_end() != at;
 }
 
 bool board_entries_rewind(const uint8_t *from, uint8_t *to)
@@ -196,13 +260,15 @@ static bool has(uint32_t states, uint32_t pin)
 
 void capture_pass(void)
 {
-    uint32_t end = stamps_written(OTHERS);
-    if (end - others_read >= ROOM(others_ring))
-        others_read = end; /* contacts that bounce for so long tell nothing */
-    for (; others_read != end; others_read++) {
-        volatile struct stamp *stamp = &others_ring[others_read % ROOM(others_ring)];
-        uint32_t states = stamp->states, changed = states ^ states >> 16;
-        uint16_t count = (uint16_t)(~stamp->count - BOARD_LATENCY);
+    uint32_t waiting = stamps_waiting(OTHERS);
+    if (waiting >= OTHERS_ROOM) { /* contacts that bounce for so long tell nothing */
+        rings[OTHERS].read += 2 * waiting;
+        return;
+    }
+    while (waiting--) {
+        struct stamp stamp = next_stamp(OTHERS);
+        uint32_t states = stamp.states, changed = states ^ states >> 16;
+        uint16_t count = (uint16_t)(~stamp.count - BOARD_LATENCY);
         if (has(changed & states, REFERENCE)) {
             reference.changed = true;
             reference.count = count;
@@ -246,10 +312,12 @@ bool board_sensed(uint16_t *count)
 uint16_t board_fire(uint8_t release, uint32_t ticks)
 {
     uint32_t began = REGISTER(TIMER_RAW_LOW);
+    uint16_t ordered;
     capture_pass();
     sync.changed = false;
     release_machine_fire(release, ticks ? ticks : 1);
+    ordered = board_count(); /* for a sync output that is held down: right to a microsecond */
     while (!sync.changed && REGISTER(TIMER_RAW_LOW) - began < 5)
         capture_pass();
-    return sync.changed ? sync.count : board_count();
+    return sync.changed ? sync.count : ordered;
 }

@@ -16,7 +16,6 @@
 #define WATCHDOG_ON (1u << 30)
 #define ALL_BUT_CLOCKS 0x1FFFCu /* what a watchdog resets */
 #define NAP_US 40u              /* between two turns of the loop with nothing to do */
-#define HURRY 32                /* bytes of a frame in one turn */
 
 #define BOOT_POWER 1
 #define BOOT_PIN 2
@@ -142,10 +141,10 @@ static void nap(void)
 
 int main(void)
 {
-    uint8_t why = cause(), n;
+    uint8_t why = cause();
     clocks_start();
     start_pins();
-    blocks_start(RESET_PIO0 | RESET_DMA);
+    blocks_start(RESET_PIO0 | RESET_DMA | RESET_BUSCTRL);
     start_supply();
     flash_number(record + 2);
     name_seal(record);
@@ -157,11 +156,8 @@ int main(void)
     device_start(why);
     for (;;) {
         device_pass();
-        if (!send_idle())
-            for (n = 0; n < HURRY; n++)
-                send_pass();
         usb_pass(send_idle());
-        if (send_idle() && receive_idle() && events_settled())
+        if (events.sent == events.count && send_idle() && receive_idle() && events_settled())
             nap();
     }
 }

@@ -13,6 +13,7 @@
 #define RESETS_RESET 0x4000C000u
 #define RESETS_DONE 0x4000C008u
 #define RESET_ADC (1u << 0)
+#define RESET_BUSCTRL (1u << 1)
 #define RESET_DMA (1u << 2)
 #define RESET_IO_BANK0 (1u << 5)
 #define RESET_PADS_BANK0 (1u << 8)
@@ -27,6 +28,11 @@
 #define CHIP_RESET 0x40064008u
 #define CHIP_RESET_POWER (1u << 8)
 #define CHIP_RESET_PIN (1u << 16)
+
+/* 2.1.5 the bus: whose turn it is when several meet */
+#define BUS_PRIORITY 0x40030000u
+#define BUS_DMA_READS (1u << 8)
+#define BUS_DMA_WRITES (1u << 12)
 
 /* 2.15 clocks, 2.16 crystal, 2.18 PLL */
 #define CLK_REF_CTRL 0x40008030u
@@ -64,10 +70,14 @@
 #define DMA_WRITE(channel) (0x50000004u + 0x40u * (channel))
 #define DMA_COUNT(channel) (0x50000008u + 0x40u * (channel))
 #define DMA_CTRL(channel) (0x5000000Cu + 0x40u * (channel))
+#define DMA_ABORT 0x50000444u
 
 /* 3 PIO */
 #define PIO_CTRL 0x50200000u
 #define PIO_FSTAT 0x50200004u
+#define PIO_RX_EMPTY (1u << 8) /* of machine 0, as the next */
+#define PIO_FDEBUG 0x50200008u
+#define PIO_LOST_WORD (1u << 0) /* a push found no room; writing it clears it */
 #define PIO_TX(machine) (0x50200010u + 4u * (machine))
 #define PIO_RX(machine) (0x50200020u + 4u * (machine))
 #define PIO_MEMORY(at) (0x50200048u + 4u * (at))

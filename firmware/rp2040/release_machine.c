@@ -7,7 +7,7 @@
 
 #define ALL_LOW PIO_MOV(PINS, NOTHING)
 #define SHIFT_OUT_RIGHT (1u << 19)
-#define RX_EMPTY (1u << (8 + RELEASE_MACHINE))
+#define RX_EMPTY (PIO_RX_EMPTY << RELEASE_MACHINE)
 #define OUTPUTS 3u /* OUT moves both releases and sync, SET the releases only */
 #define PINS_OF(set) (OUTPUTS << 20 | (set) << 26 | RELEASE_0 << 5 | RELEASE_0)
 #define WHOLE 0xFFFFFFFFu

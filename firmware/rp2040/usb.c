@@ -11,7 +11,7 @@
 #define AT_CONTROL 0x100u
 #define AT_NOTICES 0x180u
 #define AT_OUT 0x200u
-#define AT_IN 0x240u
+#define AT_IN(n) (0x240u + 0x40u * (n))
 #define MEMORY(at) ((volatile uint8_t *)(USB_MEMORY + (at)))
 
 #define BUFFER_FULL (1u << 15)
@@ -19,6 +19,7 @@
 #define BUFFER_STALL (1u << 11)
 #define BUFFER_AVAILABLE (1u << 10)
 #define BUFFER_SIZE 0x3FFu
+#define FULL (PACKET - 1u) /* a short packet always: the host need not wait for more */
 
 #define ENDPOINT_ON (1u << 31 | 1u << 29)
 #define ENDPOINT_BULK (2u << 26)
@@ -67,7 +68,15 @@ static struct {
 
 static bool out_data1, in_data1, in_flight;
 static uint8_t out_at, out_size; /* of the packet being read */
-static uint8_t waiting[PACKET - 1], waiting_size; /* a short packet always: the host need not wait for more */
+
+/* Packets to the host: the line takes the first one while others are filled. */
+#define PACKETS 4u
+static struct {
+    uint8_t size[PACKETS];
+    uint8_t first, closed; /* the one that goes next, or is on its way; how many take no more bytes */
+    volatile uint8_t *at;  /* for the next byte, of so many that fit into the packet which is open */
+    uint8_t room;
+} packets;
 
 /* Hand a buffer over. The controller runs on another clock, so the last bit is set a little later
  * than the others (data sheet, 4.1.2.5.1). */
@@ -131,12 +140,41 @@ static void bytes_expect(void)
     hand_over(USB_OUT(BYTES), toggled(&out_data1) | PACKET);
 }
 
+static uint8_t open_packet(void)
+{
+    return (uint8_t)((packets.first + packets.closed) % PACKETS);
+}
+
+static void packet_open(void)
+{
+    packets.at = MEMORY(AT_IN(open_packet()));
+    packets.room = packets.closed < PACKETS ? FULL : 0;
+}
+
+static void packet_close(void)
+{
+    packets.size[open_packet()] = (uint8_t)(FULL - packets.room);
+    packets.closed++;
+    packet_open();
+}
+
+static void packet_sent(void)
+{
+    in_flight = false;
+    packets.first = (uint8_t)((packets.first + 1u) % PACKETS);
+    packets.closed--;
+    if (!packets.room)
+        packet_open();
+}
+
 /* The host's end of the line is open or not. What nobody has read is lost when it closes; what was
  * sent before it ever opened, BOOT, waits. */
 static void listen(bool open)
 {
-    if (listening && !open)
-        waiting_size = 0;
+    if (listening && !open) {
+        packets.closed = in_flight;
+        packet_open();
+    }
     listening = open;
 }
 
@@ -146,9 +184,11 @@ static void configure(uint8_t value)
     if (!value)
         return;
     REGISTER(USB_IN_CTRL(NOTICES)) = ENDPOINT_ON | ENDPOINT_INTERRUPT | AT_NOTICES;
-    REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN;
+    REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN(0);
     REGISTER(USB_OUT_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_OUT;
-    out_data1 = in_data1 = in_flight = false;
+    out_data1 = in_data1 = false;
+    if (in_flight) /* on a bus that is no more */
+        packet_sent();
     bytes_expect();
 }
 
@@ -253,25 +293,27 @@ bool board_receive(uint8_t *byte)
 }
 
 /* While nobody listens, what comes first stays (it is BOOT), and the rest is lost. */
-bool board_send_ready(void)
+uint8_t board_send(const uint8_t *bytes, uint8_t count)
 {
-    return !listening || waiting_size < sizeof waiting;
+    const uint8_t *end = bytes + count, *next = bytes;
+    while (next != end && packets.room) {
+        uint8_t left = (uint8_t)(end - next), n = left < packets.room ? left : packets.room;
+        volatile uint8_t *at = packets.at;
+        packets.room = (uint8_t)(packets.room - n);
+        packets.at += n;
+        while (n--)
+            *at++ = *next++;
+        if (!packets.room)
+            packet_close();
+    }
+    return listening ? (uint8_t)(next - bytes) : count;
 }
 
-void board_send(uint8_t byte)
+static void packet_send(void)
 {
-    if (waiting_size < sizeof waiting)
-        waiting[waiting_size++] = byte;
-}
-
-static void bytes_send(void)
-{
-    uint8_t n;
-    for (n = 0; n < waiting_size; n++)
-        MEMORY(AT_IN)[n] = waiting[n];
-    hand_over(USB_IN(BYTES), BUFFER_FULL | toggled(&in_data1) | waiting_size);
+    REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN(packets.first);
+    hand_over(USB_IN(BYTES), BUFFER_FULL | toggled(&in_data1) | packets.size[packets.first]);
     in_flight = true;
-    waiting_size = 0;
 }
 
 /* -- the bus */
@@ -302,22 +344,26 @@ void usb_pass(uint8_t whole)
         setup();
     }
     if (done & DONE_IN(BYTES))
-        in_flight = false;
+        packet_sent();
     if (done & DONE_OUT(BYTES)) {
         out_at = 0;
         out_size = (uint8_t)(REGISTER(USB_OUT(BYTES)) & BUFFER_SIZE);
         if (!out_size)
             bytes_expect();
     }
-    if (configured && listening && !in_flight && waiting_size &&
-        (whole || waiting_size == sizeof waiting))
-        bytes_send();
+    if (!configured || !listening || in_flight)
+        return;
+    if (whole && !packets.closed && packets.room < FULL)
+        packet_close();
+    if (packets.closed)
+        packet_send();
 }
 
 void usb_start(const uint8_t own[8])
 {
     uint32_t at;
     number = own;
+    packet_open();
     blocks_start(RESET_USB);
     for (at = 0; at < 0x180; at += 4)
         REGISTER(USB_MEMORY + at) = 0;

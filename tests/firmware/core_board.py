@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import _ctypes
 import ctypes
+import shutil
+import tempfile
+import weakref
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
@@ -11,7 +16,6 @@ from tests.firmware.toolchain import FIRMWARE, make
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
     from sim.lab_interface import Lab
 
@@ -26,6 +30,12 @@ def build(streams: bool = False) -> Path:
     name = "core-streams.so" if streams else "core.so"
     make(f"build/host/{name}")
     return FIRMWARE / "build/host" / name
+
+
+def load(library: Path) -> ctypes.CDLL:
+    """Load it with a memory of its own: a firmware has but one, and no test may find another's."""
+    with tempfile.TemporaryDirectory() as folder:
+        return ctypes.CDLL(str(shutil.copy(library, folder)))
 
 
 def to_ticks(ns: int) -> int:
@@ -60,11 +70,12 @@ class Line:
 
 
 class CoreBoard:
-    """The core behind gates; one at a time, since a firmware has only one memory."""
+    """The core behind gates."""
 
     def __init__(self, lab: Lab, *, streams: bool = False, start_tick: int = 0) -> None:
         self.lab = lab
-        self.core = ctypes.CDLL(str(build(streams)))
+        self.core = load(build(streams))
+        weakref.finalize(self, _ctypes.dlclose, self.core._handle)
         for name in ("host_run", "host_fired", "host_next_byte"):
             getattr(self.core, name).restype = ctypes.c_uint64
         self.line = Line(self)

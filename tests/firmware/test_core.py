@@ -6,6 +6,7 @@ import pytest
 
 from rig.link import messages as wire
 from tests.firmware.core_board import BROWN_OUT, CoreBoard
+from tests.link.bench import ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import Wire
 from tests.link.virtual import VirtualBench
@@ -40,3 +41,13 @@ class TestCore(DeviceConformance):
 class TestStreamingCore(DeviceConformance):
     def make(self, lab):
         return CoreBench(lab, CoreBoard(lab, streams=True))
+
+
+def test_each_begins_anew_whatever_another_did():
+    """Its random numbers too, which come of all that it was ever asked."""
+
+    def spoken() -> list[object]:
+        line = Wire(CoreBench(lab := ScriptedLab(changes=falling_rods()), CoreBoard(lab)))
+        return [line.ask(wire.Identify(), 1), line.drop(), line.ask(wire.Status(), 9)]
+
+    assert spoken() == spoken()

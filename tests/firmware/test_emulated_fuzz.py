@@ -8,26 +8,39 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.link import messages as wire
 from rig_emulator.controller import Change
 from rig_emulator.fuzz import Fuzz, Judge
-from rig_emulator.wiring import BOARDS, firmware_for
+from rig_emulator.wiring import BOARDS, PICO, firmware_for
+from tests.firmware.pico import build
 from tests.firmware.toolchain import make
 
 ORDER = wire.Arm(1, 1, 0b01, 1000, 200, 50)
 LIMIT = 16_000  # cycles
 
 
-@pytest.mark.parametrize("name", BOARDS)
-def test_every_pulse_was_armed_and_fired(name):
-    make("all")
-    fuzz = Fuzz(BOARDS[name], firmware_for(BOARDS[name]), seed=3)
-    for _ in range(250):
+def judge_pulses(wiring, steps: int, least: int) -> None:
+    fuzz = Fuzz(wiring, firmware_for(wiring), seed=3)
+    for _ in range(steps):
         fuzz.step()
     assert fuzz.judge.faults == []
-    assert fuzz.judge.pulses["ordered"] >= 5, "or else this would show nothing"
+    assert fuzz.judge.pulses["ordered"] >= least, "or else this would show nothing"
     assert fuzz.avr.watchdog_resets == 0
 
 
+@pytest.mark.parametrize("name", BOARDS)
+def test_every_pulse_was_armed_and_fired(name):
+    make("all")
+    judge_pulses(BOARDS[name], steps=250, least=5)
+
+
+@pytest.mark.parametrize(
+    ("steps", "least"), [(25, 1), pytest.param(1000, 20, marks=pytest.mark.slow)]
+)
+def test_every_pulse_of_a_pico_was_too(steps, least):
+    build()
+    judge_pulses(PICO, steps, least)
+
+
 def judged(*said, until=1000 + LIMIT, pin="PE3"):
-    judge = Judge(("PE3", "PE5"))
+    judge = Judge(("PE3", "PE5"), us=16)
     for what in said:
         what(judge)
     judge.change(Change(1000, pin, True))

@@ -31,6 +31,9 @@ _EDGES = 900
 _BURST = 250
 _PULSES_NS = (*range(10, 200, 10), *range(200, 5000, 100))
 _TIMES = 16
+_RODS_EDGES = 3200
+"""Of 100 rods at 16 gates."""
+_FALL_S = 0.5
 
 
 class Bench:
@@ -47,10 +50,8 @@ class Bench:
         yield "stamp, standard deviation", f"{1e3 * seen.sd / self.us:.0f} ns"
         yield "stamp, 99 % within", f"{1e3 * seen.p99 / self.us:.0f} ns"
         yield "stamp, worst", f"{1e3 * seen.worst / self.us:.0f} ns"
-        yield (
-            f"{_EDGES} edges of all gates by chance, a second",
-            f"{self._fastest(_RATES, self._sustained):,.0f}",
-        )
+        sustained = self._fastest(_RATES, self._sustained)
+        yield f"{_EDGES} edges of all gates by chance, a second", f"{sustained:,.0f}"
         yield f"{_BURST} edges of one gate, a second", f"{self._fastest(_BURSTS, self._burst):,.0f}"
         one, two = self._closest(0), self._closest(len(self.wiring.gates) - 1)
         yield "shortest pulse that is always two edges", f"{one} ns"
@@ -59,6 +60,11 @@ class Bench:
         yield "from sending FIRE to the release, the line included", f"{fired:.0f} µs"
         yield "between both releases", f"{skew:.0f} ns"
         yield f"from the end of a drop of {_EDGES} edges to its certificate", f"{told:.1f} ms"
+        line = self._line(sustained)
+        yield "bytes a second on the line, a burst to its certificate", f"{line:,.0f}"
+        kept, told = self._rods()
+        yield f"100 rods at 16 gates in {_FALL_S} s: edges kept of {_RODS_EDGES:,}", f"{kept:,}"
+        yield "the same: from the end of the recording to the certificate", f"{told:.1f} ms"
         yield "from reset to BOOT, without a boot loader", f"{self._boot():.1f} ms"
         said = next(b for b in SAID.values() if b.name == self.stand.identity.board)
         yield "edges kept of a drop", f"{said.events:,}"
@@ -135,6 +141,23 @@ class Bench:
             1e3 * (max(on.values()) - first) / self.us,
             (stand.certified - stand.fired - low.cycle) / self.us / 1e3,
         )
+
+    def _line(self, rate: float) -> float:
+        """Say how many bytes a second come of edges that come faster than they can be sent."""
+        count = min(_RODS_EDGES, self.stand.identity.capacity - 24)
+        flips, before = self._train(rate, count), self.stand.heard
+        self._recorded(flips)
+        seconds = (self.stand.certified - self.stand.fired - flips[0].cycle) / self.us / 1e6
+        return round((self.stand.heard - before) / seconds, -3)
+
+    def _rods(self) -> tuple[int, float]:
+        """Count the edges kept of a long drop, and wait for its certificate, in ms."""
+        flips = self._train(_RODS_EDGES / _FALL_S, _RODS_EDGES)
+        record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
+        recording = self.stand.record(flips, record_ms)
+        low = next(c for c in recording.outputs if c.pin == self.wiring.sync and not c.high)
+        wait = self.stand.certified - self.stand.fired - low.cycle
+        return recording.certificate.events, wait / self.us / 1e3
 
     def _boot(self) -> float:
         chip = self.stand.avr

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A long time of anything at all before both boards: ``python -m rig_emulator.fuzz``.
+"""A long time of anything at all before each board: ``python -m rig_emulator.fuzz``.
 
 Requests right, wrong, repeated and garbled, noise, edges, the emergency stop, resets and brown-outs
-come in random order. Every pulse of the release is judged by what was said before it.
+come in random order; on USB the host also closes its port, stops reading and resets the bus. Every
+pulse of the release is judged by what was said before it.
 """
 
 from __future__ import annotations
@@ -15,9 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
-from rig_emulator.avr import Avr
-from rig_emulator.name import NAME_AT, name_record
-from rig_emulator.wiring import BOARDS, firmware_for
+from rig_emulator.stand import powered
+from rig_emulator.wiring import BOARDS, PICO, firmware_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,9 +26,8 @@ if TYPE_CHECKING:
     from rig_emulator.controller import Change
     from rig_emulator.wiring import Wiring
 
-_US = 16  # cycles
-_MS = 1000 * _US
-_SPARE = 30 * _US  # by which the shortest pulses may be longer than ordered
+_SPARE_US = 30  # by which the shortest pulses may be longer than ordered
+_SLOWER = 100  # times is the Pico's emulator
 _LABELS = (1, 2, 0x10001)
 _PULSES_US = (0, 5, 100, 4_000, 20_000)
 
@@ -48,6 +47,8 @@ class Judge:
     ----------
     releases
         The pins of the outputs.
+    us
+        Cycles in a microsecond.
 
     Attributes
     ----------
@@ -57,7 +58,8 @@ class Judge:
         How many there were, by what ended them: "ordered" or "cut".
     """
 
-    def __init__(self, releases: tuple[str, ...]) -> None:
+    def __init__(self, releases: tuple[str, ...], us: int) -> None:
+        self._us, self._spare = us, _SPARE_US * us
         self.faults: list[str] = []
         self.pulses: Counter[str] = Counter()
         self._releases = releases
@@ -86,8 +88,8 @@ class Judge:
         if not change.high:
             if pulse := self._on.pop(change.pin, None):
                 length = change.cycle - pulse.since
-                self.pulses["ordered" if abs(length - pulse.limit) <= _SPARE else "cut"] += 1
-                if length > pulse.limit + _SPARE:
+                self.pulses["ordered" if abs(length - pulse.limit) <= self._spare else "cut"] += 1
+                if length > pulse.limit + self._spare:
                     self.faults.append(f"{pulse.pin} was on for {length} cycles at {pulse.since}")
             return
         limit = self._allowed(change)
@@ -105,7 +107,7 @@ class Judge:
         if self._used is not None and self._used[0] == token and self._used[1] != change.cycle:
             return None  # one token, one drop: all its outputs go on together
         self._used = token, change.cycle
-        return order.pulse_us * _US
+        return order.pulse_us * self._us
 
 
 class Fuzz:
@@ -128,9 +130,10 @@ class Fuzz:
 
     def __init__(self, wiring: Wiring, program: Path, seed: int) -> None:
         self.wiring = wiring
-        self.avr = Avr(program, wiring.mcu)
-        self.avr.eeprom_write(NAME_AT, name_record(b"any name"))
-        self.judge = Judge(wiring.releases)
+        self.avr = powered(wiring, program, 500_000, b"any name")
+        self._us = wiring.clock_hz // 1_000_000
+        self._ms = 1000 * self._us
+        self.judge = Judge(wiring.releases, self._us)
         self.happened: Counter[str] = Counter()
         self._chance = random.Random(f"fuzz {wiring.mcu} {seed}")  # noqa: S311 - no secrets
         self._decoder = Decoder()
@@ -140,7 +143,7 @@ class Fuzz:
         self._held = wire.Acknowledge(1, 0)
         self._last = b""
         self._settle()
-        self.run(50 * _MS)
+        self.run(50 * self._ms)
 
     def step(self) -> None:
         """Let one thing happen."""
@@ -159,10 +162,16 @@ class Fuzz:
             "reset": (0.15, self._reset),
             "brown-out": (0.15, self._brown_out),
         }
+        if self.wiring is PICO:
+            doings |= {
+                "port": (0.3, self._close_and_open),
+                "unread": (0.5, self._stop_reading),
+                "bus reset": (0.15, self._reset_bus),
+            }
         (what,) = self._chance.choices(list(doings), [weight for weight, _ in doings.values()])
         self.happened[what] += 1
         doings[what][1]()
-        self.run(round(_MS * self._chance.choice((0.2, 1, 3, 10, 40, 100))))
+        self.run(round(self._ms * self._chance.choice((0.2, 1, 3, 10, 40, 100))))
 
     def run(self, cycles: int) -> None:
         """Let it work, and hear and see what it does."""
@@ -216,7 +225,7 @@ class Fuzz:
         self._settle()
         for message in (self._held, self._any_arm()):
             self._say(message)
-            self.run(3 * _MS)
+            self.run(3 * self._ms)
         self._say(wire.Fire(self._token))
 
     def _fire(self) -> None:
@@ -240,13 +249,13 @@ class Fuzz:
     def _edges(self) -> None:
         at = self.avr.cycle
         for _ in range(self._chance.randrange(1, 200)):
-            at += self._chance.randrange(10, 20_000)
+            at += self._chance.randrange(10, 1250 * self._us)
             gate = self._chance.choice(self.wiring.gates)
             self.avr.edge(at, gate, self._chance.random() < 0.5)
 
     def _stop(self) -> None:
         self.avr.edge(0, self.wiring.stop, True)
-        closed = self.avr.cycle + round(_MS * self._chance.choice((0.05, 0.5, 5)))
+        closed = self.avr.cycle + round(self._ms * self._chance.choice((0.05, 0.5, 5)))
         self.avr.edge(closed, self.wiring.stop, False)
 
     def _settle(self) -> None:
@@ -260,8 +269,27 @@ class Fuzz:
     def _brown_out(self) -> None:
         self._restart(self.avr.brown_out)
 
+    def _close_and_open(self) -> None:
+        self.avr.open(False)
+        self._wait_a_while()
+        self.avr.open(True)
+
+    def _stop_reading(self) -> None:
+        self.avr.reads(False)
+        for _ in range(self._chance.randrange(40)):
+            self._chance.choice((self._request, self._fire))()
+        self._wait_a_while()
+        self.avr.reads(True)
+
+    def _reset_bus(self) -> None:
+        self._wait_a_while()
+        self.avr.reset_bus()
+
+    def _wait_a_while(self) -> None:
+        self.run(self._chance.randrange(1, 400 * self._ms))
+
     def _restart(self, how: Callable[[], None]) -> None:
-        self.run(self._chance.randrange(1, 3 * _MS))
+        self.run(self._chance.randrange(1, 3 * self._ms))
         how()
         self._decoder = Decoder()
         for change in self.avr.take_changes():
@@ -276,14 +304,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     code = 0
-    for name, wiring in BOARDS.items():
+    for name, wiring in {**BOARDS, "pico": PICO}.items():
         fuzz = Fuzz(wiring, firmware_for(wiring), options.seed)
-        for _ in range(options.steps):
+        for _ in range(options.steps // (_SLOWER if wiring is PICO else 1)):
             fuzz.step()
-        print(f"{name}: {fuzz.avr.cycle / fuzz.avr.frequency:.0f} s of the board's time")
+        print(f"{name}: {fuzz.avr.cycle / wiring.clock_hz:.0f} s of the board's time")
         print(f"  pulses: {fuzz.judge.pulses.total()} {dict(fuzz.judge.pulses)}")
         print(f"  happened: {dict(fuzz.happened)}")
-        print(f"  watchdog: {fuzz.avr.watchdog_resets}, bytes overrun: {fuzz.avr.overruns}")
+        print(f"  watchdog: {fuzz.avr.watchdog_resets}")
         for fault in fuzz.judge.faults:
             print(f"  {fault}")
             code = 1

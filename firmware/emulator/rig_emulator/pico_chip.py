@@ -138,6 +138,28 @@ class PicoChip:
         taken, self._sent = self._sent, []
         return taken
 
+    def reads(self, on: bool) -> None:
+        """Let the program that has opened its port stop reading, or go on."""
+        self._order(reads=on)
+
+    def rate(self, baud: int) -> None:
+        """Tell it a baud rate."""
+        self._order(rate=baud)
+
+    def reset_bus(self) -> None:
+        """Let the bus go, as a hub may, and ask it anew who it is."""
+        self._order(resetBus=True)
+
+    # -- DMA, for tests
+
+    def dma_late(self, cycle: int) -> None:
+        """Let DMA take no word before a cycle."""
+        self._order(dmaLate=cycle)
+
+    def wear(self, machine: int, left: int) -> None:
+        """Let DMA have moved all but so many words of a state machine's."""
+        self._order(wear=(machine, left))
+
     # -- memory, for tests
 
     def peek(self, address: int, size: int) -> bytes:

@@ -27,6 +27,23 @@ _TRIES = 5
 _LABEL = wire.pack_label(1, 1)
 
 
+def powered(wiring: Wiring, program: Path, baudrate: int, named: bytes) -> Any:
+    """Power a controller up, with its program, its name and its line; tests know which one.
+
+    Parameters
+    ----------
+    wiring, program, baudrate, named
+        See `Stand`.
+    """
+    if wiring is PICO:
+        chip = PicoChip(program, named)
+        chip.open()
+        return chip
+    avr = Avr(program, wiring.mcu, baudrate=baudrate)
+    avr.eeprom_write(NAME_AT, name_record(named) if named else bytes(16))
+    return avr
+
+
 class Flip(NamedTuple):
     """A gate that changes, so many cycles after FIRE."""
 
@@ -143,6 +160,8 @@ class Stand:
     fire_sent, fired, certified
         Cycles at which the latest FIRE began to be sent, it acted, and its drop's certificate was
         there.
+    heard
+        How many bytes it has sent.
     """
 
     def __init__(
@@ -154,11 +173,11 @@ class Stand:
         waits: int = 0,
     ) -> None:
         self.wiring = wiring
-        self.avr = self._controller(program, baudrate, named)
+        self.avr = powered(wiring, program, baudrate, named)
         self._decoder = Decoder()
         self._seq = 0
         self._ahead = 0  # of the board's ticks before its cycles
-        self.fire_sent = self.fired = self.certified = self._latest = 0
+        self.fire_sent = self.fired = self.certified = self.heard = self._latest = 0
         for pin in (*wiring.gates, wiring.stop):
             self.avr.edge(0, pin, False)
         self.hear(self._scaled(_BOOT_CYCLES) + waits)
@@ -166,16 +185,6 @@ class Stand:
         if not isinstance(identity, wire.Identity):
             raise DeviceError(f"the board answers IDENTIFY with {identity}")
         self.identity = identity
-
-    def _controller(self, program: Path, baudrate: int, named: bytes) -> Any:
-        """Give it a controller with its program, its name and its line; tests know which one."""
-        if self.wiring is PICO:
-            chip = PicoChip(program, named)
-            chip.open()
-            return chip
-        avr = Avr(program, self.wiring.mcu, baudrate=baudrate)
-        avr.eeprom_write(NAME_AT, name_record(named) if named else bytes(16))
-        return avr
 
     def _scaled(self, avr_cycles: int) -> int:
         return avr_cycles * self.wiring.clock_hz // 16_000_000
@@ -186,6 +195,7 @@ class Stand:
         while self.avr.run(end):
             pass
         sent = self.avr.take_sent()
+        self.heard += len(sent)
         if sent:
             self._latest = sent[-1].cycle
         data = bytes(one.value for one in sent)

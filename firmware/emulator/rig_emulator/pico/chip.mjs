@@ -18,6 +18,7 @@ const INPUT_ENABLE = 0x40, PULL_UP = 0x08;
 const PIO0 = 6;
 const LED = 25;
 const DREQ_RX = 4;
+const DMA_ABORT = 0x444;
 
 // A block of registers that only keeps what is written.
 class Registers {
@@ -89,11 +90,13 @@ export class Chip {
     this.restart = null;
     this.supply = 5000;
     this.pio = null;
+    this.dmaFrom = 0; // the cycle before which DMA takes nothing
     this.power({ chip: 0x100, watchdog: 0 }, null);
   }
 
   // Start, with the reasons that the chip's registers tell; memory stays as it was.
   power(reasons, memory) {
+    if (this.pio) this.catchUp(); // what its outputs did until now
     const began = this.cycle, old = this.pio;
     this.began = began;
     const rp2040 = (this.rp2040 = new RP2040());
@@ -105,12 +108,14 @@ export class Chip {
     const { peripherals } = rp2040;
     peripherals[0x18000] = new Flash(this.number);
     peripherals[0x40018] = new Registers();
+    peripherals[0x40030] = new Registers(); // the bus has no queue here
     peripherals[0x40064] = new Registers({ 0x08: reasons.chip });
     const watchdog = peripherals[0x40058];
     watchdog.reason = reasons.watchdog;
     watchdog.onWatchdogTrigger = () => {
       this.restart = { chip: reasons.chip, watchdog: 1 };
       this.watchdogs++;
+      watchdog.timer.enable = false; // or it would bite again, without end, in this very moment
     };
     rp2040.adc.channelValues[SUPPLY_ADC] = Math.round(((this.supply / 3) * 4096) / REGULATED);
     this.connectPio(old);
@@ -159,7 +164,7 @@ export class Chip {
     const { dma } = rp2040, read = dma.readUint32.bind(dma);
     dma.readUint32 = (offset) => {
       this.catchUp();
-      return read(offset);
+      return offset === DMA_ABORT ? 0 : read(offset); // it is done at once
     };
   }
 
@@ -193,6 +198,7 @@ export class Chip {
 
   // DMA takes a word as soon as it is there; rp2040js knows when a channel would be told.
   transfer(machine) {
+    if (this.pio.clock < this.dmaFrom) return;
     for (const channel of this.rp2040.dma.channels) {
       if (channel.active && channel.treq === DREQ_RX + machine.index) {
         while (machine.rx.length) {
@@ -234,6 +240,10 @@ export class Chip {
   }
 
   catchUp() {
+    if (this.pio.clock < this.dmaFrom && this.cycle > this.dmaFrom) {
+      this.pio.catchUp(this.dmaFrom);
+      for (const machine of this.pio.machines) this.transfer(machine);
+    }
     if (this.pio.clock < this.cycle) this.pio.catchUp(this.cycle);
   }
 
@@ -269,6 +279,11 @@ export class Chip {
   // The reset pin, or the supply for a moment.
   reset(reason) {
     this.power({ chip: reason, watchdog: 0 }, this.rp2040.sram);
+  }
+
+  // DMA has moved so many words of a state machine's that only `left` are to come.
+  wear(machine, left) {
+    this.rp2040.dma.channels.find((c) => c.active && c.treq === DREQ_RX + machine).transCount = left;
   }
 
   setOpen(open) {

@@ -25,6 +25,9 @@ export class Host {
     this.transfer = null;
     this.out = []; // bytes for the device
     this.asks = false; // the device has a buffer for them
+    this.reads = true; // somebody takes what it sends
+    this.untaken = []; // packets that nobody has taken
+    this.waits = false; // the device, until its latest packet is taken
     this.bulkIn = this.bulkOut = -1;
     const { usb } = this, { clock } = rp2040;
     usb.readDelayMicroseconds = usb.writeDelayMicroseconds = PACKET_US;
@@ -32,6 +35,7 @@ export class Host {
     const alarms = Array.from({ length: 16 }, (_, n) => clock.createAlarm(() => tellNow(n, false)));
     usb.indicateBufferReady = (endpoint, out) => {
       if (out) tellNow(endpoint, out);
+      else if (endpoint === this.bulkIn && !this.reads) this.waits = true;
       else alarms[endpoint].schedule(READY_US * 1000);
     };
     this.nextTransfer = clock.createAlarm(() => this.begin());
@@ -100,6 +104,30 @@ export class Host {
     if (!this.transfer) this.begin();
   }
 
+  // The program that has opened the port goes on reading, or does not.
+  setReads(reads) {
+    this.reads = reads;
+    if (!reads) return;
+    for (const data of this.untaken.splice(0)) this.onBytes(data);
+    if (this.waits) this.usb.indicateBufferReady(this.bulkIn, false);
+    this.waits = false;
+  }
+
+  // A hub lets the bus go, and begins anew.
+  resetBus() {
+    this.plan = [];
+    this.transfer = null;
+    this.ready = this.asks = false;
+    this.bulkIn = this.bulkOut = -1;
+    this.texts = [];
+    this.usb.resetDevice();
+  }
+
+  setRate(baud) {
+    this.write(0x21, 0x20, 0, 0, [baud & 255, (baud >> 8) & 255, (baud >> 16) & 255, 0, 0, 0, 8]);
+    if (!this.transfer) this.begin();
+  }
+
   begin() {
     this.transfer = this.plan.shift() ?? null;
     if (this.transfer) this.usb.sendSetupPacket(this.transfer.setup);
@@ -129,7 +157,8 @@ export class Host {
       this.thank();
     } else if (endpoint === this.bulkIn) {
       if (data.length === PACKET) this.onFault('a full packet: the host would wait for more');
-      this.onBytes(data);
+      if (this.reads) this.onBytes(data);
+      else this.untaken.push(data);
     }
   }
 

@@ -11,7 +11,7 @@ const LOOP = 6; // clocks of the loops that are taken at one go; any other loop 
 const STATE = 5; // numbers that a machine's history keeps of each clock: four registers
 const PLACE = 4; // and where in its program it is
 
-const FSTAT = 0x04, TXF = 0x10, RXF = 0x20, MEMORY = 0x48, MACHINE = 0xc8;
+const FSTAT = 0x04, FDEBUG = 0x08, TXF = 0x10, RXF = 0x20, MEMORY = 0x48, MACHINE = 0xc8;
 
 class Machine {
   constructor(pio, index) {
@@ -24,6 +24,7 @@ class Machine {
     this.tx = [];
     this.rx = [];
     this.stalled = false;
+    this.lostWord = false; // a push found no room
     this.wrapTop = 31;
     this.wrapBottom = 0;
     this.jmpPin = 0;
@@ -124,6 +125,8 @@ class Machine {
             this.pio.onReceived(this);
           } else if (word & 0x20) {
             return false;
+          } else {
+            this.lostWord = true;
           }
           this.isr = 0;
         }
@@ -331,6 +334,7 @@ export class Pio {
       }
       return status >>> 0;
     }
+    if (offset === FDEBUG) return this.machines.reduce((mask, m) => mask | (m.lostWord ? 1 << m.index : 0), 0);
     if (offset >= RXF && offset < RXF + 16) {
       const machine = this.machines[(offset - RXF) >> 2];
       machine.forget();
@@ -346,6 +350,8 @@ export class Pio {
         m.enabled = !!((value >>> m.index) & 1);
         m.forget();
       }
+    } else if (offset === FDEBUG) {
+      for (const m of this.machines) if ((value >>> m.index) & 1) m.lostWord = false;
     } else if (offset >= TXF && offset < TXF + 16) {
       const machine = this.machines[(offset - TXF) >> 2];
       if (machine.tx.length < 4) machine.tx.push(value);

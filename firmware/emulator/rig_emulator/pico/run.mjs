@@ -15,6 +15,11 @@ function obey(order) {
   if (order.quick !== undefined) chip.pio.quick = order.quick;
   if (order.watched !== undefined) chip.watched = order.watched;
   if (order.open !== undefined) chip.setOpen(order.open);
+  if (order.reads !== undefined) chip.host.setReads(order.reads);
+  if (order.rate !== undefined) chip.host.setRate(order.rate);
+  if (order.resetBus) chip.host.resetBus();
+  if (order.dmaLate !== undefined) chip.dmaFrom = order.dmaLate;
+  if (order.wear) chip.wear(...order.wear);
   for (const pin of order.clear ?? []) chip.pio.clearEdges(pin);
   for (const [cycle, pin, level] of order.edges ?? []) chip.pio.edge(cycle, pin, level);
   if (order.reset !== undefined) chip.reset(order.reset);
