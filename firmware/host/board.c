@@ -391,7 +391,7 @@ void host_reset(uint8_t cause)
 
 void host_forget(uint8_t byte)
 {
-    memset(__start_kept, byte, (size_t)(__stop_kept - __start_kept));
+    memset(__start_kept, byte, (uintptr_t)__stop_kept - (uintptr_t)__start_kept);
 }
 
 void host_power(uint32_t tick)
