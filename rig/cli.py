@@ -79,7 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         _say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
         return BAD_INPUT
     except OSError as error:
-        _say(f"rig: {error}")
+        words = error.strerror and error.filename and f"{error.filename}: {error.strerror}"
+        _say(f"rig: {words or error}")
         _silence_stdout()
         return BAD_INPUT
     return code

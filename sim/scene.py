@@ -149,7 +149,6 @@ def _check_writable(scheme: str, path: Path) -> None:
 
 
 def _number(scheme: str, name: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise InputError(f"{scheme}://: {name}: {text!r} is not a whole number") from None
+    if not text.isdecimal():
+        raise InputError(f"{scheme}://: {name}: {text!r} is not a whole number from 0 on")
+    return int(text)

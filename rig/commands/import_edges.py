@@ -31,6 +31,11 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Make a session from an edge file."""
+    source = Path(arguments.events)
+    if source.exists() and not source.is_file():
+        raise InputError(
+            f"{source} is no file", "it is read more than once: write what it gives into one first"
+        )
     protocol = reader.read(arguments.protocol)
     timer: dict[str, object] = {
         "source": "imported edges",

@@ -118,7 +118,8 @@ def reach(path: Path) -> tuple[socket.socket, str]:
     except (OSError, ValueError) as error:
         if line is not None:
             line.close()
-        raise DeviceError(f"no daemon at {path}: {error}", "start one: rig daemon") from error
+        why = getattr(error, "strerror", None) or error
+        raise DeviceError(f"no daemon at {path}: {why}", "start one: rig daemon") from error
     if peer_uid(line) not in {None, os.getuid()}:
         line.close()
         raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")

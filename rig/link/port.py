@@ -35,6 +35,7 @@ _CAUSES = {
     errno.EBUSY: _TAKEN,
     errno.EAGAIN: _TAKEN,
     errno.ENOTTY: ("it is no serial port", _LOOK),
+    errno.EISDIR: ("it is a folder", _LOOK),
 }
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
 _REACH = (

@@ -355,3 +355,9 @@ def test_an_interrupt_while_a_class_is_made_from_text_is_one_like_any_other(tmp_
     )
     assert done.returncode == 130
     assert done.stderr == "rig: interrupted\n"
+
+
+def test_what_only_the_system_refuses_is_said_without_numbers():
+    session = 300 * "x"
+    done = rig("run", PROTOCOLS / "picket-fence.yaml", "--port", "sim://", "--session", session)
+    assert (done.returncode, done.stderr) == (2, f"rig: {session}: File name too long\n")

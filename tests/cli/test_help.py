@@ -33,6 +33,9 @@ def test_examples_are_commands(line):
         assert _parser().parse(words).module
 
 
+RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -42,6 +45,9 @@ def test_examples_are_commands(line):
         (["predict", "nothere.yaml", "--figure", "3"], "leave nothere.yaml out"),
         (["predict", "--figure", "3", "-o", "x.doc"], "x.doc: a figure is written as .svg, .png"),
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
+        (["selftest", "--port", "/dev"], "/dev: it is a folder"),
+        (["import", "/dev/zero", "--protocol", "p", "--session", "s"], "/dev/zero is no file"),
+        ([*RUN, "--session", "s", "--port", "sim://?pace=-1"], "'-1' is not a whole number from 0"),
     ],
 )
 def test_a_mistake_is_named(call, words, said):
