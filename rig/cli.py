@@ -79,8 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         _say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
         return BAD_INPUT
     except OSError as error:
-        words = error.strerror and error.filename and f"{error.filename}: {error.strerror}"
-        _say(f"rig: {words or error}")
+        named = error.strerror and error.filename
+        _say(f"rig: {error.filename}: {error.strerror}" if named else f"rig: {error}")
         _silence_stdout()
         return BAD_INPUT
     return code
