@@ -164,6 +164,7 @@ def print_results(
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
         from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 
-        show(summary_table(found.analysis.summary).splitlines())
+        if not found.blind:
+            show(summary_table(found.analysis.summary).splitlines())
         show([*void_lines(found.analysis), *remarks(found)])
     return VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.commands.narration import narrator
 from rig.commands.output import goes_on, print_results, say
 from rig.recorder.interrupts import Interrupts
-from rig.report.finding import finding
+from rig.report.finding import counted, finding, raised
 from rig.runner import run_protocol
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def main(arguments: Namespace) -> int:
         )
         code = print_results(found, as_json=arguments.json)
     say(f"session: {arguments.session}")
-    say(finding(found.analysis))
+    say(f"{raised(counted(found.analysis))}." if found.blind else finding(found.analysis))
     return code
 
 

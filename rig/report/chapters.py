@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rig.analysis.result import DropResult
+    from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
     from rig.report.attachments import Attachment
@@ -92,15 +93,16 @@ def _figures(context: ReportContext, place: str) -> str:
 
 
 def _results(context: ReportContext) -> str:
-    summary = context.sections.make(
-        "The table of results", lambda: _summary(context.analysis.summary)
-    )
+    summary = context.sections.make("The table of results", lambda: _summary(context.analysis))
     return _figures(context, "results") + (summary or "")
 
 
-def _summary(lines: Sequence[Incline]) -> str:
+def _summary(analysis: Analysis) -> str:
+    lines = analysis.summary
     if not lines:
-        return paragraphs(["No accepted runs, so no summary."], "")
+        good = any(one.verdict in GOOD for one in analysis.runs)
+        said = "No mean can be given." if good else "No accepted runs, so no summary."
+        return paragraphs([said], "")
     html = ""
     for row in averaged():
         those = [line for line in lines if row.name in line.means]

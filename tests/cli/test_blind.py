@@ -19,6 +19,8 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(tmp_path)
     for said in (ran.stdout, ran.stderr, rig("analyze", session).stdout):
         assert "V " not in said
         assert "Δz" not in said
+        assert "No accepted runs" not in said, "there are four, only kept back"
+        assert "No mean" not in said
     found = json.loads(rig("analyze", session, "--json").stdout)
     assert found["blind"] is True
     assert found["summary"] == []
@@ -31,6 +33,7 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(tmp_path)
     assert not door.open(session).analyze().runs[0].quantities.keys() - {"release_skew_s"}
     report = rig("report", session, "-o", page)
     assert report.returncode == 0, report.stderr
+    assert "No accepted runs" not in page.read_text("utf-8")
     for refused in (("estimate", session), ("analyze", session, "--budget", "1")):
         done = rig(*refused)
         assert done.returncode != 0
