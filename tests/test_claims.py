@@ -33,11 +33,14 @@ GIVEN = {
         "1300 ppm": "sim/dials.py", "0.1 ppm": "docs/priors.md",
     },
     "docs/boards.md": {
-        "6 m/s": "a speed to compare at", "0.4 µm": "69 ns of it", "0.08 µm": "14 ns of it",
+        "6 m/s": "a speed to compare at", "0.4 µm": "71 ns of it", "0.08 µm": "14 ns of it",
         "1 mm": "firmware/README.md", "0.1 mm": "a reading", "±30 ppm": "as sold",
         "0.5 s": "a fall", "0.09 mm": "30 ppm of it", "±0.5 %": "as sold", "15 mm": "0.5 % of it",
         "4 ms": "firmware/README.md", "±10 %": "data sheet", "50 ns": "a tick of 20 MHz",
         "215 s": "2^32 ticks of it",
+        "32 KB": "the largest ring of DMA", "0.15 µs": "18 clocks", "0.48 ms": "3,200 times that",
+        "25 KB": "tests/firmware/test_pico_worst.py", "120 ms": "firmware/PROTOCOL.md",
+        "0.3 ms": "firmware/README.md", "50 µs": "firmware/emulator/rig_emulator/pico/run.mjs",
     },
     "docs/daemon.md": {"300 s": "rig/tui", "250 ms": "firmware/PROTOCOL.md"},
     "docs/method.md": {
