@@ -28,7 +28,14 @@ _NEW_BLOCK = re.compile(
 )
 _CLOCK = re.compile(r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> ")
 """What Arduino's serial monitor writes before a line."""
-_KEYED = re.compile(r"([A-Za-z_]\w*)\s*[=:]\s*([^\s,;=:]+)")
+_KEYED = re.compile(r"([A-Za-z_]\w*)\"?\s*[=:]\s*\"?([^\s,;=:\"{}]+)")
+"""A name with its value: ``gate=1``, ``gate: 1`` or, of JSON, ``"gate": 1``."""
+_SENTENCE = re.compile(
+    r"(?:gate|pin|sensor|channel|beam)[\s#_-]*([0-9]+)\b.*?\b(un|not )?(block|clear|dark)\w*"
+    r".*?([0-9]+(?:[.,][0-9]+)?)\s*(us|µs|ms|s|micros|millis|microseconds|milliseconds|seconds)\b",
+    re.IGNORECASE,
+)
+"""What a board may say to whoever reads along: ``Gate 1 blocked at 402345 us``."""
 _REMARK = re.compile(r'^\s*"?(?:#|%|//)|^;\s+[^;]+$')
 NAME_AND_NUMBER = re.compile(r"[A-Za-z_]+[ _-]?[0-9]+")
 
@@ -160,13 +167,29 @@ def _unkeyed(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     """Take the names out of lines such as ``gate=1 t=402345`` where all have the same."""
     parts = [_KEYED.findall(line) for line in lines]
     names = next(([name for name, _ in one] for one in parts if len(one) > 1), None)
-    rows = [one for one in parts if [name for name, _ in one] == names]
-    if names is None or len(rows) * 2 <= sum(bool(line.strip()) for line in lines):
+    like = [[name for name, _ in one] == names for one in parts]
+    if names is None or sum(like) * 2 <= sum(bool(line.strip()) for line in lines):
+        return _unspoken(lines)
+    return [
+        "\t".join(value for _, value in one) if same else f"# {line}"
+        for line, one, same in zip(lines, parts, like, strict=True)
+    ], names
+
+
+def _unspoken(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
+    """Take gate, state and time out of sentences where most lines are such, with one unit."""
+    told = [_SENTENCE.search(line) for line in lines]
+    units = {one[5] for one in told if one}
+    if len(units) != 1 or sum(map(bool, told)) * 2 <= sum(bool(line.strip()) for line in lines):
         return lines, []
     return [
-        "\t".join(value for _, value in one) if one in rows else f"# {line}"
-        for line, one in zip(lines, parts, strict=True)
-    ], names
+        f"# {line}" if one is None else f"{one[1]}\t{one[4]}\t{_blocked(one)}"
+        for line, one in zip(lines, told, strict=True)
+    ], ["gate", f"time ({units.pop()})", "state"]
+
+
+def _blocked(told: re.Match[str]) -> int:
+    return int((told[3].lower() != "clear") is not bool(told[2]))
 
 
 def is_data(row: Row, separator: str) -> bool:

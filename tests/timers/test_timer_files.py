@@ -393,6 +393,13 @@ def _row(times, separator=","):
         ("10:01:02.345 -> gate=1 t_us=240000 state=1\n10:01:02.390 -> gate=1 t_us=290000 state=0\n"
          "10:01:02.500 -> gate=2 t_us=410000 state=1\n10:01:02.520 -> gate=2 t_us=440000 state=0\n",
          {"1": FALL[:2], "2": FALL[2:]}),
+        ("ready\n10:01:02.345 -> Gate 1 blocked at 240000 us\nGate 1 unblocked at 290000 us\n"
+         "Gate 2 blocked at 410000 us\nGate 2 cleared at 440000 us\n",
+         {"1": FALL[:2], "2": FALL[2:]}),
+        ("".join(f'{{"t_us": {us}, "gate": {gate}, "state": "{state}"}}\n' for us, gate, state in
+                 ((240000, 1, "blocked"), (290000, 1, "clear"),
+                  (410000, 2, "blocked"), (440000, 2, "clear"))),
+         {"1": FALL[:2], "2": FALL[2:]}),
     ],
 )  # fmt: skip
 def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
@@ -404,6 +411,9 @@ def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, t
     for one in run:
         found.setdefault(one.label, []).append((one.tick - origin) / TICK_HZ)
     assert {label: pytest.approx(times) for label, times in passed.items()} == found
+    for label, times in passed.items():
+        said = [one.blocked for one in run if one.label == label]
+        assert said in ([None] * len(times), [True, False] * (len(times) // 2))
 
 
 @pytest.mark.parametrize(
