@@ -16,7 +16,7 @@ from rig.link.messages import pack_label
 from rig.protocol import reader
 from rig_emulator import rivals, trials
 from rig_emulator.stand import Flip, Stand
-from rig_emulator.wiring import BOARDS, firmware_for
+from rig_emulator.wiring import BOARDS, PICO, firmware_for
 from sim.dials import read_dials
 from sim.lab import ChainLab
 
@@ -31,19 +31,19 @@ _RATES = range(3000, 9001, 500)
 _US = 16.0
 
 
-def _row(name: str, seen: Spread, lost: int) -> str:
-    """One line of the table, in µs."""
-    trusted = f"{seen.worst_trusted / _US:9.3f}" if seen.doubtful else "        –"
+def _row(name: str, seen: Spread, lost: int, us: float = _US) -> str:
+    """One line of the table, in µs of so many cycles."""
+    trusted = f"{seen.worst_trusted / us:9.3f}" if seen.doubtful else "        –"
     return (
-        f"{name:28}{seen.count:7}{lost:6}{seen.mean / _US:9.3f}{seen.sd / _US:9.3f}"
-        f"{seen.p99 / _US:9.3f}{seen.worst / _US:9.3f}{seen.doubtful:9}{trusted}"
+        f"{name:28}{seen.count:7}{lost:6}{seen.mean / us:9.3f}{seen.sd / us:9.3f}"
+        f"{seen.p99 / us:9.3f}{seen.worst / us:9.3f}{seen.doubtful:9}{trusted}"
     )
 
 
 def _drops(wiring: Wiring, lab: ChainLab) -> list[list[Flip]]:
     return [
         [
-            Flip(round(seconds * trials.HZ), channel, blocked)
+            Flip(round(seconds * wiring.clock_hz), channel, blocked)
             for seconds, channel, blocked in lab.drop(pack_label(run, 1))
             if channel < len(wiring.gates)
         ]
@@ -51,18 +51,35 @@ def _drops(wiring: Wiring, lab: ChainLab) -> list[list[Flip]]:
     ]
 
 
-def _stamps(wiring: Wiring, lab: ChainLab, folder: Path) -> None:
-    drops = _drops(wiring, lab)
+def _own(wiring: Wiring, drops: list[list[Flip]]) -> None:
+    """Begin a table with this firmware."""
     print(f"\n{wiring.mcu}: {_DROPS} drops of both chains; stamp less edge, in µs")
     heads = ("edges", "lost", "mean", "sd", "p99", "worst", "doubtful", "trusted")
     print(" " * 28 + f"{heads[0]:>7}{heads[1]:>6}" + "".join(f"{h:>9}" for h in heads[2:]))
     stand = Stand(wiring, firmware_for(wiring))
+    ms = wiring.clock_hz // 1000
     stamps = [
         stamp
         for flips in drops
-        for stamp in stand.record(flips, flips[-1].cycle // 16_000 + 5).stamps(flips)
+        for stamp in stand.record(flips, flips[-1].cycle // ms + 5).stamps(flips)
     ]
-    print(_row("the rig's firmware", trials.spread(stamps), 0))
+    print(_row("the rig's firmware", trials.spread(stamps), 0, wiring.clock_hz / 1e6))
+
+
+def _pico(lab: ChainLab, folder: Path) -> None:
+    """Print the Pico's table; `./run bench boards` has its limits."""
+    drops = _drops(PICO, lab)
+    _own(PICO, drops)
+    program = rivals.compile_for_pico(folder)
+    accounts = [rivals.drop_of_pico(program, flips) for flips in drops]
+    stamps = [stamp for account in accounts for stamp in account.stamps]
+    lost = sum(account.lost for account in accounts)
+    print(_row("polling its timer", trials.spread(stamps), lost, PICO.clock_hz / 1e6))
+
+
+def _stamps(wiring: Wiring, lab: ChainLab, folder: Path) -> None:
+    drops = _drops(wiring, lab)
+    _own(wiring, drops)
     for name in rivals.SKETCHES:
         program = rivals.compile_sketch(name, wiring.mcu, folder)
         accounts = [rivals.drop(wiring, program, flips) for flips in drops]
@@ -95,6 +112,7 @@ def main() -> int:
         for wiring in BOARDS.values():
             _stamps(wiring, lab, Path(folder))
             _limits(wiring)
+        _pico(lab, Path(folder))
     return 0
 
 

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import weakref
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 from typing import IO, Any
@@ -72,6 +73,7 @@ class PicoChip:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
+            start_new_session=True,  # Ctrl-C is for the program that asks it
         )
         self.close = weakref.finalize(self, _end, self._node)
         self._order(quick=quick, open=False)
@@ -216,7 +218,6 @@ def _number(pin: str) -> int:
 
 
 def _end(node: subprocess.Popen[str]) -> None:
-    """End node: it stops with its input."""
-    with node:
-        if node.stdin is not None:
-            node.stdin.close()
+    """End node: it stops with its input, if something else has not ended it."""
+    with suppress(BrokenPipeError), node:
+        pass

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
 from rig_emulator.avr import Avr
+from rig_emulator.pico_chip import PicoChip
 from rig_emulator.stand import Stamp
+from rig_emulator.wiring import PICO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +21,9 @@ if TYPE_CHECKING:
     from rig_emulator.wiring import Wiring
 
 _CYCLES_PER_US = 16
+_PICO = "pico_polling.c"
+_PICO_START_US = 30_000
+_NM = "arm-none-eabi-nm"
 _WARM_UP = 200_000
 _LATEST = 320_000  # cycles after a flip at which an event can still be its own
 SOURCES = Path(__file__).parents[1] / "rivals"
@@ -74,6 +80,57 @@ def drop(wiring: Wiring, program: Path, flips: Sequence[Flip]) -> Account:
     times = _numbers(avr.peek("times"), 4)[:count]
     states = _numbers(avr.peek("states"), 2)[:count]
     return _account(flips, [(t - fired) * _CYCLES_PER_US for t in times], states)
+
+
+def compile_for_pico(folder: Path) -> Path:
+    """Compile the loop of a Pico, with the start-up of the rig's own firmware: a UF2 file.
+
+    Raises
+    ------
+    DeviceError
+        When the compiler is not there or does not like it.
+    """
+    own = SOURCES.parents[1] / "rp2040"
+    elf, flash, image = (folder / f"pico.{kind}" for kind in ("elf", "bin", "uf2"))
+    sources = [SOURCES / _PICO, own / "clocks.c", own / "boot2.S", own / "start.S"]
+    options = ["-O2", "-std=gnu11", "-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", "-nostdlib"]
+    places = [f"-I{own}", f"-T{own}/image.ld", "-o", str(elf)]
+    commands = (
+        ["arm-none-eabi-gcc", *options, *places, *map(str, sources), "-lgcc"],
+        ["arm-none-eabi-objcopy", "-O", "binary", str(elf), str(flash)],
+        [sys.executable, str(own / "image.py"), str(flash), str(image)],
+    )
+    try:
+        for command in commands:
+            subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 - our own
+    except (OSError, subprocess.CalledProcessError) as error:
+        hint = "apt-get install gcc-arm-none-eabi"
+        raise DeviceError(f"cannot compile {_PICO}: {error}", hint) from None
+    return image
+
+
+def drop_of_pico(image: Path, flips: Sequence[Flip]) -> Account:
+    """Let gates change before that loop, and read its memory afterwards.
+
+    Its time begins anywhere, so it is set by its first stamp.
+    """
+    listed = subprocess.run(  # noqa: S603 - a tool beside the compiler, and our own file
+        [_NM, image.with_suffix(".elf")], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    at = {name: int(address, 16) for address, _, name in map(str.split, listed)}
+    chip = PicoChip(image, bytes(8))
+    for pin in PICO.gates:
+        chip.edge(0, pin, False)
+    us = PICO.clock_hz // 1_000_000
+    chip.run(start := _PICO_START_US * us)
+    for flip in flips:
+        chip.edge(start + flip.cycle, PICO.gates[flip.gate], flip.blocked)
+    chip.run(start + flips[-1].cycle + us * 1000)
+    (count,) = _numbers(chip.peek(at["count"], 4), 4)
+    times = _numbers(chip.peek(at["times"], 4 * count), 4)
+    states = _numbers(chip.peek(at["states"], 2 * count), 2)
+    chip.close()
+    return _account(flips, [(t - times[0]) * us + flips[0].cycle for t in times], states)
 
 
 def _account(flips: Sequence[Flip], ticks: Sequence[int], states: Sequence[int]) -> Account:
