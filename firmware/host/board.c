@@ -38,7 +38,7 @@ static uint64_t interrupt_free, flagged;
 static uint8_t *tail, *stop;
 static uint8_t half;
 static uint8_t outputs;
-static bool stopped, fired;
+static bool stopped, fired, lamp;
 static uint64_t fire_at, sense_after, release_end;
 static uint64_t references[REFERENCES];
 static uint8_t reference_first, reference_end;
@@ -211,7 +211,7 @@ uint8_t board_send(const uint8_t *bytes, uint8_t count)
 
 void board_led(bool on)
 {
-    (void)on;
+    lamp = on;
 }
 
 void board_kick(void)
@@ -387,6 +387,11 @@ void host_reset(uint8_t cause)
     to_host.free = to_device.free = now;
     changes.first = changes.end;
     device_start(cause);
+}
+
+bool host_lamp(void)
+{
+    return lamp;
 }
 
 void host_forget(uint8_t byte)

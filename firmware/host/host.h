@@ -47,5 +47,6 @@ void host_sense(uint64_t after_fire);
 void host_stop(bool open);
 uint8_t host_outputs(void);
 bool host_recording(void); /* the sync output */
+bool host_lamp(void);
 
 #endif

@@ -9,9 +9,10 @@ from itertools import combinations
 
 import pytest
 
+from rig.analysis import explanations
 from rig.analysis.diagnoses import diagnose
 from rig.analysis.drop import fit_drop
-from rig.analysis.faults import upside_down
+from rig.analysis.faults import faults, upside_down
 from rig.analysis.result import GOOD
 from rig.bench.diagnoses import judged
 from rig.bench.layout_catalogue import KINDS, STANDARD, Kind, graded, under
@@ -200,3 +201,18 @@ def test_a_wrong_clock_and_wrong_gravity_cannot_be_told_apart_and_both_are_said(
     told = reason.split(": ", 1)[1].split("; or ")
     assert any("clock is" in why for why in told[:2])
     assert any("gravity is" in why for why in told[:2])
+
+
+def test_a_post_of_two_gates_may_stand_wrong_and_of_one_it_is_the_gate():
+    of = {gate.channel: gate for gate in UNIFORM.gates.on("free")}
+    for count in (1, 2):
+        gates = (*UNIFORM.gates.on("impact"), *[*of.values()][:count])
+        few = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=gates))
+        words = [fault.words(0.01, 0.001) for fault in faults(few, runs(few)[0], ())]
+        assert any("the impact side's post" in one for one in words)
+        assert any("the free side's post" in one for one in words) == (count > 1)
+
+
+def test_odds_are_numbers_up_to_what_nobody_reads_any_more():
+    assert explanations._odds(math.log(9_000.0)) == "9000"
+    assert explanations._odds(math.log(15_000.0)) == "more than 10000"

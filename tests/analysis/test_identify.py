@@ -14,6 +14,7 @@ from rig.analysis import identify
 from rig.analysis.deciding import deciding_gate
 from rig.analysis.fit import CLOSE, settle
 from rig.analysis.identify import MISSED, STRAYS
+from rig.analysis.pattern import Guess
 from rig.analysis.verdict import LEAD, pattern_faults
 from rig.errors import InputError
 from rig.protocol import reader
@@ -336,3 +337,12 @@ def test_no_fall_is_adjusted_twice_and_both_sides_begin_where_each_ended(monkeyp
     assert [*map(len, (roles for roles, *_ in settled))] == [1, 1, 1, 2]
     _, begun, both = settled[-1]
     assert both.estimate.beyond(begun) < CLOSE
+
+
+def test_releases_are_as_likely_apart_as_a_cauchy_of_the_accepted_skew_says():
+    skew = UNIFORM.accept.release_skew
+    apart = [
+        identify._simultaneous(UNIFORM, [Guess(0.1, 0.2, 0.0), Guess(0.1 + times * skew, 0.2, 0.0)])
+        for times in (0, 1, 3)
+    ]
+    assert apart == pytest.approx([0.0, -math.log(2.0), -math.log(10.0)])

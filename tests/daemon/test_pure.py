@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.client_protocol import Replica
 from rig.daemon.lease import LEASE_S, ControlError, Lease
@@ -24,6 +25,7 @@ from rig.errors import (
 )
 from rig.link.messages import DisarmReason, Reason
 from rig.link.refusals import DeviceRefusedError
+from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 
@@ -207,3 +209,12 @@ def test_stop_is_sent_five_times_unless_the_worker_takes_over(worker_comes, time
     stopper.ask()
     stopper._run()
     assert len(sent) == times
+
+
+def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
+    protocol, session = tmp_path / "g.yaml", tmp_path / "session"
+    before, _, after = FENCE.partition("gates:")
+    protocol.write_text(before + after[after.index("release:") :].replace("RUNS", "1"), "utf-8")
+    with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
+        Controller("sim://").open_session(str(protocol), str(session))
+    assert not session.exists()

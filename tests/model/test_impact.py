@@ -255,3 +255,7 @@ def test_equation_s20_solves_the_equations_of_motion(restitution, inertia):
 def test_the_papers_value_of_lift_off():
     assert alpha_liftoff() == pytest.approx(1 / 6, rel=1e-15)
     assert f"{alpha_liftoff():.2f}" == "0.17"
+
+
+def test_a_surface_of_which_no_friction_is_said_has_none():
+    assert Surface(Quantity(0.2)) == Surface(Quantity(0.2), Quantity(0.0))
