@@ -466,6 +466,18 @@ def _parser() -> Parser:
         help="seconds that one Monte Carlo setting may take (default 120)",
     )
     _json(every)
+    other = benches.add_parser("coverage", help="how often intervals hold, in both worlds")
+    other.set_defaults(module="bench_coverage")
+    other.add_argument(
+        "-o", "--output", required=True, metavar="DIR", help="folder for page, CSV and JSON"
+    )
+    other.add_argument(
+        "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
+    )
+    other.add_argument("--rigs", type=_count, metavar="N", help="of each case")
+    other.add_argument("--only", metavar="TEXT", help="cases with this in their names")
+    other.add_argument("--jobs", type=_count, metavar="N", help="processes at a time")
+    _json(other)
     other = benches.add_parser("resolved", help="sessions whose chains fall by no model")
     other.set_defaults(module="bench_resolved")
     other.add_argument(

@@ -11,12 +11,16 @@ from rig.errors import InputError
 from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    from rig.protocol.protocol import Protocol
 
 
 @dataclass(frozen=True, slots=True)
 class Dials:
     """Sizes of all disturbances; every ``_sd`` is a standard deviation.
+
+    Those of `Dials.stated` may be not-a-number, which takes what the protocol says of the same.
 
     Attributes
     ----------
@@ -26,6 +30,8 @@ class Dials:
         From the fire stamp to the impact chain's release, s.
     hang_sd
         Scatter of each hanging height from run to run, m.
+    side_sd
+        How much lower one side hangs than the other, in every run, m.
     drop_error
         How far the drop is off its stated value, in its own standard uncertainties; one draw a
         session, this is its standard deviation.
@@ -39,6 +45,11 @@ class Dials:
         Zero of each post off the contact point, m: all gates of a side share it in every run.
     beam_sd
         Beams off the rods' middle, m: shifts edges by x·tan(tilt), up and down rod by rod.
+    contact_sd
+        How far above the contact level rods touch that the last one does not count among, m; one
+        draw an incline. Of the model's world, as the next one is: resolved rods touch as they do.
+    strike_sd
+        How far above that the last one strikes, on what lies there, m.
     impulse_sd
         Relative scatter of single impulses about Eq. 9.
     jitter_sd
@@ -76,12 +87,15 @@ class Dials:
     delay: float = 20e-3
     delay_sd: float = 1e-3
     hang_sd: float = 0.1e-3
+    side_sd: float = 0.0
     drop_error: float = 0.5
     rod_sd: float = 0.3e-3
     width_sd: float = 0.1e-3
     gate_sd: float = 0.2e-3
     datum_sd: float = 0.2e-3
     beam_sd: float = 0.5e-3
+    contact_sd: float = 0.0
+    strike_sd: float = 0.0
     impulse_sd: float = 0.02
     jitter_sd: float = 2e-6
     missed: float = 0.01
@@ -106,21 +120,60 @@ class Dials:
         """All disturbances off: the model itself, on a perfect rig."""
         return cls(**{name: 0.0 for name in _NAMES if name not in _KEPT})
 
+    @classmethod
+    def stated(cls) -> Dials:
+        """A rig that is off by as much as its protocol says, wherever it says it."""
+        return cls(**dict.fromkeys(_STATED, math.nan), drop_error=1.0)
+
+    def on(self, protocol: Protocol, share: Callable[[str], float] = lambda _: 1.0) -> Dials:
+        """Take what is not-a-number from a protocol, but for what differs from chain to chain.
+
+        Parameters
+        ----------
+        share
+            How large each size really is of what is stated where nobody has measured it.
+        """
+        gates, priors, contact = protocol.gates, protocol.priors, protocol.contact
+        said = {
+            "hang_sd": priors.hang * share("hang"),
+            "side_sd": priors.side * share("side"),
+            "gate_sd": gates.height_u if gates else 0.0,
+            "datum_sd": gates.datum_u if gates else 0.0,
+            "beam_sd": priors.beam_offset * share("beam"),
+            "contact_sd": contact.level.u * share("contact"),
+            "strike_sd": contact.strike.u * share("strike"),
+            "jitter_sd": priors.jitter,
+        }
+        return replace(self, **{name: known(getattr(self, name), u) for name, u in said.items()})
+
 
 _NAMES = tuple(field.name for field in fields(Dials))
 _KEPT = {"delay", "restitution", "friction", "reference", "stall"}
+_STATED = (
+    "hang_sd", "side_sd", "gate_sd", "datum_sd", "beam_sd", "contact_sd", "strike_sd", "jitter_sd",
+    "rod_sd", "width_sd",
+)  # fmt: skip
 _TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall"}
-_LENGTHS = {"hang_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd"}
+_LENGTHS = {
+    "hang_sd", "side_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd", "contact_sd",
+    "strike_sd",
+}  # fmt: skip
 _SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled"}
 _SIGNED = {"clock", "drift", "reference", "restitution"}
 _RATES = {"clock", "reference"}
 _OF_THE_URL = ("dynamics", "pace", "seed", "truth")  # no disturbances, and read by the scene
 
 
+def known(dial: float, stated: float) -> float:
+    """Return a dial, or what is stated where it is not-a-number."""
+    return stated if math.isnan(dial) else dial
+
+
 def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
     """Dials from a URL's query, for example ``skew_sd=2ms&clock=-1300 ppm``.
 
-    ``quiet=1`` starts from `Dials.quiet` instead of the defaults; `scheme` is the URL's.
+    ``quiet=1`` starts from `Dials.quiet` instead of the defaults, ``stated=1`` from `Dials.stated`;
+    `scheme` is the URL's.
 
     Raises
     ------
@@ -128,18 +181,24 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
         An unknown dial or a value that is not a quantity of its dimension.
     """
     rest = dict(settings)
-    quiet = rest.pop("quiet", "0")
-    if quiet not in {"0", "1"}:
-        raise InputError(f"{scheme}://: quiet: {quiet!r} is neither 0 nor 1")
-    dials = Dials.quiet() if quiet == "1" else Dials()
+    begins = {"quiet": Dials.quiet, "stated": Dials.stated}
+    chosen = []
+    for name in begins:
+        text = rest.pop(name, "0")
+        if text not in {"0", "1"}:
+            raise InputError(f"{scheme}://: {name}: {text!r} is neither 0 nor 1")
+        chosen += [name] if text == "1" else []
+    if len(chosen) > 1:
+        raise InputError(f"{scheme}://: quiet and stated are two rigs", "set one of them")
+    dials = begins[chosen[0]]() if chosen else Dials()
     changes: dict[str, float] = {}
     for name, text in rest.items():
         if name not in _NAMES:
-            known = ("quiet", *_OF_THE_URL, *_NAMES)
-            close = get_close_matches(name, known, 1)
+            accepted = (*begins, *_OF_THE_URL, *_NAMES)
+            close = get_close_matches(name, accepted, 1)
             raise InputError(
                 f"{scheme}://: unknown dial {name!r}",
-                f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(known)}",
+                f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(accepted)}",
             )
         dimension = (
             Dimension.TIME

@@ -18,9 +18,11 @@ from rig.model.impact import impact_on
 from rig.protocol.contact import contact_level, higher_contacts
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
+from rig.protocol.protocol import GUESSED
 from sim.air import air
 from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
+from sim.dials import known
 from sim.path import Path
 from sim.truth import Truth
 
@@ -99,14 +101,15 @@ class ChainLab:
     ) -> None:
         check_measurable(protocol)
         self.protocol = protocol
-        self.dials = dials
         self.seed = seed
+        self.dials = dials = dials.on(protocol, self._share)
         self.tell = tell
         self.filmed = False
         self.runs = {run.number: run for run in runs(protocol)}
         self.gates = protocol.gates.gates if protocol.gates else ()
         rig = self._rng("rig")
         self.hang_height = protocol.drop.value + protocol.drop.u * dials.drop_error * rig.normal()
+        self.side = dials.side_sd * float(self._rng("side").normal())
         self.air = air(protocol, dials.drag)
         self.bodies = {name: self._body(spec) for name, spec in protocol.chains.items()}
         self.heights = {
@@ -126,6 +129,10 @@ class ChainLab:
             return 0.0
         return contact_level(self.protocol, run.incline_deg, run.impact).value
 
+    def _share(self, name: str) -> float:
+        """Draw how large something is of what is guessed: to a quarter of that, see `GUESSED`."""
+        return math.sqrt(GUESSED / self._rng("size", name).chisquare(GUESSED))
+
     def _rng(self, *what: object) -> np.random.Generator:
         """Give each thing that is drawn a stream of its own."""
         digest = hashlib.sha256(repr((self.seed, *what)).encode()).digest()
@@ -136,8 +143,8 @@ class ChainLab:
         places = np.array(spec.chain.heights)
         return Body(
             spec,
-            places + self.dials.rod_sd * rng.normal(size=places.size),
-            np.array(spec.widths) + self.dials.width_sd * rng.normal(),
+            places + known(self.dials.rod_sd, spec.position_u) * rng.normal(size=places.size),
+            np.array(spec.widths) + known(self.dials.width_sd, spec.width_u) * rng.normal(),
         )
 
     def _run(self, label: int) -> tuple[Run, int]:
@@ -177,7 +184,7 @@ class ChainLab:
             body = self.bodies[run.impact]
             start = self.hang_height - level + hung.hang[0]
             paths["impact"] = (
-                body, self._impact_path(body, run.incline_deg, hung.release_s, start, rng),
+                body, self._impact_path(body, run, hung.release_s, start, rng),
             )  # fmt: skip
         if run.free is not None:
             start = self.hang_height - level + hung.hang[1]
@@ -206,18 +213,18 @@ class ChainLab:
         # A chain that falls alone has nothing to be late against.
         late = skew if run.impact is not None else 0.0
         hang = dials.hang_sd * rng.normal(size=2)
-        return Hung(release, late, (float(hang[0]), float(hang[1])), rng)
+        return Hung(release, late, (float(hang[0]), float(hang[1]) + self.side), rng)
 
     def make_ahead(self, labels: Sequence[int]) -> None:
         """Make drops before they are asked for: these need no time worth saving."""
 
     def _impact_path(
-        self, body: Body, incline: float, release: float, start: float, rng: np.random.Generator
+        self, body: Body, run: Run, release: float, start: float, rng: np.random.Generator
     ) -> Path:
         """Compute the fall of the impact chain by the model, with its own rods and impulses."""
         surface = self.protocol.surface
         assert surface is not None
-        dials, chain = self.dials, body.spec.chain
+        dials, chain, incline = self.dials, body.spec.chain, run.incline_deg
         impact = impact_on(
             surface,
             chain,
@@ -228,6 +235,7 @@ class ChainLab:
         alphas = impact.alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
         # What touches the board higher hangs as much lower, as far as its strike goes.
         strikes = body.offsets - np.array(higher_contacts(self.protocol, incline, body.spec))
+        strikes[:-1] -= self._contact(run)  # the last one is judged at the level
         bottom = float(strikes[0])
         actual = Chain(chain.masses, tuple((strikes - bottom).tolist()), chain.inertia)
         gains = kicks(actual, alphas.tolist(), impact.gamma)
@@ -235,6 +243,11 @@ class ChainLab:
         air = self.air[body.spec.name]
         events = drag_hits(actual, gains, air or [0.0] * chain.rods, start + bottom, gravity)
         return Path(release, start, gravity, events, tuple((-strikes).tolist()), air)
+
+    def _contact(self, run: Run) -> float:
+        """How far above the contact level rods touch, m."""
+        draw = self._rng("contact", *self.protocol.condition(run)).normal()
+        return self.dials.contact_sd * float(draw)
 
     def _shift(self, body: Body, gate: Gate) -> np.ndarray:
         """How far each rod's crossing is shifted because the beam is off its middle, m."""
@@ -293,9 +306,12 @@ class ChainLab:
             return truth
         body, path = paths["impact"]
         hit_s = path.release_s + path.hits[-1].time_s
-        # In the model's world a rod strikes at the contact level.
-        truth.speed_m_s = truth.speed_strike_m_s = path.hits[-1].speed_before
+        truth.speed_m_s = path.hits[-1].speed_before
         truth.fall_time_s = path.hits[-1].time_s
+        # The top rod falls on, from where it passes the level or not so far.
+        above = self.protocol.contact.strike.value + self._contact(run)
+        above += self.dials.strike_sd * float(self._rng("strike", run.number, attempt).normal())
+        late, truth.speed_strike_m_s = path.last_at(above)
         if "free" not in paths:
             return truth
         other, fallen = paths["free"]
@@ -303,7 +319,8 @@ class ChainLab:
         skew = fallen.release_s - path.release_s
         truth.release_skew_s = skew
         truth.separation_raw_m = fallen.height_at(hit_s) + top
-        truth.separation_m = truth.separation_strike_m = fallen.height_at(hit_s + skew) + top
+        truth.separation_m = fallen.height_at(hit_s + skew) + top
+        truth.separation_strike_m = fallen.height_at(hit_s + late + skew) + top - above
         truth.camera_separation_m, truth.camera_speed_m_s = camera_reading(
             lambda t: path.height_at(t) + float(body.offsets[-1]),
             lambda t: fallen.height_at(t) + top,

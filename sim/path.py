@@ -75,5 +75,23 @@ class Path:
             return top - fallen(since, self.gravity, self._kappa(done), speed)
         return top - (speed + 0.5 * self.gravity * since) * since
 
+    def last_at(self, above: float) -> tuple[float, float]:
+        """When, and how fast, what hits last is so far above its hit, had it fallen freely there.
+
+        Returns
+        -------
+        late_s, speed
+            After the hit, s, so that it is negative above; m/s.
+        """
+        speed = self.hits[-1].speed_before
+        kappa = self._kappa(len(self.hits) - 1) if self.kappas else 0.0
+        # g − κv² falls by e^(−2κd) on the way down d.
+        pull = self.gravity - kappa * speed**2
+        rise = math.expm1(2.0 * kappa * above) / kappa if kappa else 2.0 * above
+        there = math.sqrt(max(0.0, speed**2 - pull * rise))
+        start = there if above > 0.0 else speed
+        _, late = drag_leg(abs(above), start, self.gravity, kappa)
+        return math.copysign(late, -above), there
+
     def _kappa(self, done: int) -> float:
         return self.kappas[min(done, len(self.kappas) - 1)]

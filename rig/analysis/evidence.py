@@ -2,14 +2,17 @@
 
 A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has determined
 γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
-largest (MacKay 1992). What was stated counts as one more member, so that where nothing is
-determined, s stays as stated, and the less is, the nearer it stays. Where several components make
-up one variance, each is multiplied by the share of Σx² that it explains (an EM step), which keeps
-all of them positive. Nothing becomes less than a share of what was stated.
+largest (MacKay 1992). What was stated, S, is the scale of a half-Cauchy prior of s (Gelman 2006),
+by an EM step: one more member, whose square is the harmonic mean of S² and s². Where nothing is
+determined, s stays as stated, and the less is, the nearer it stays; but what is stated much too
+large draws no scatter up that many members tell. Where several components make up one variance,
+each is multiplied by the share of Σx² that it explains (an EM step too), which keeps all of them
+positive. Nothing becomes less than a share of what was stated.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -122,7 +125,7 @@ class Evidence:
             weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
             told = weight + self._determined[kind]
             self.degrees[kind] = max(STATED_WEIGHT, told)
-            share = (weight * stated + found) / told
+            share = _settled(stated, found / told, weight / told)
             least = LEAST_SHARE * getattr(self.stated, kind)
             new[kind] = max(getattr(old, kind) * share**0.5, least)
         if self._impulses:
@@ -173,19 +176,23 @@ class Evidence:
         maximum of the χ² likelihood above the least a, by multiplicative steps.
         """
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
+        found = np.array([getattr(self.components, name) ** 2 for name in names])
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
-        squares, counts = squares + share * (stated @ kinds), counts + share
-        found = np.array([getattr(self.components, name) ** 2 for name in names])
-        least = LEAST_SHARE**2 * stated
+        counts, least = counts + share, LEAST_SHARE**2 * stated
         for _ in range(_INNER):
+            whole = squares + share * (2.0 * stated * found / (stated + found) @ kinds)
             for n, sizes in enumerate(kinds):
-                found[n] = max(
-                    found[n] * _explained(squares, counts, found @ kinds, sizes), least[n]
-                )
+                found[n] = max(found[n] * _explained(whole, counts, found @ kinds, sizes), least[n])
         for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
+
+
+def _settled(stated: float, found: float, weight: float) -> float:
+    """Solve x = found + weight · 2x·stated/(x + stated): a variance with its stated member."""
+    half = 0.5 * (found - (1.0 - 2.0 * weight) * stated)
+    return half + math.sqrt(half**2 + found * stated)
 
 
 def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:

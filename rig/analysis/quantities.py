@@ -12,6 +12,7 @@ import numpy as np
 from rig.analysis.adjust import uncertainty
 from rig.analysis.result import Measured
 from rig.analysis.swing import lever
+from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     Value = tuple[float, Array]
 
 
-GUESSED = 8.0
-"""Degrees of freedom of a scale that is known to a quarter of itself (GUM G.4.2, E.4.3)."""
 SCALES = frozenset(
     {
         "hanging height",

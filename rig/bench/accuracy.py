@@ -61,6 +61,13 @@ class Errors:
         if bound is not None:
             self.bounds.append(bound)
 
+    def join(self, other: Errors) -> None:
+        """Count the measurements of others as well."""
+        self.errors += other.errors
+        self.expanded += other.expanded
+        self.rigs += other.rigs
+        self.bounds += other.bounds
+
     def json(self) -> dict[str, float | int]:
         """Rms, bias, largest error, mean U95, and the share of intervals that hold the truth.
 

@@ -76,7 +76,7 @@ def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
     scene = reader.read(protocol)
     tally = AccuracyTally()
     source = with_setting(url, "protocol", str(Path(protocol).resolve()))
-    asked = Asked(source, range(1, rigs + 1), _sessions(scene, rigs))
+    asked = Asked(source, range(1, rigs + 1), blocks(scene, rigs))
     for seed, told in groupby(falls([asked]), key=attrgetter("seed")):
         begin = time.perf_counter()
         _session(scene, seed, told, tally)
@@ -84,7 +84,7 @@ def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
     return tally.json()
 
 
-def _sessions(protocol: Protocol, rigs: int) -> list[list[int]]:
+def blocks(protocol: Protocol, rigs: int) -> list[list[int]]:
     """Choose the runs of each rig: a whole block, and over the rigs all of the plan's alike."""
     by_incline: dict[float, list[int]] = {}
     for run in runs(protocol):

@@ -168,11 +168,7 @@ def _priors(protocol: Protocol) -> list[str]:
         return []
     from rig.protocol.priors import PRIORS  # noqa: PLC0415 - only where something is measured
 
-    usual = Priors()
-    unused = set() if protocol.two_chains else {"side"}
-    unused |= _STRUCK if protocol.surface is None else set()
-    unused |= set() if protocol.drag is None else {"drag"}
-    lines = []
+    usual, unused, lines = Priors(), _unused(protocol), list[str]()
     for name, row in PRIORS.items():
         if name in unused:
             continue
@@ -187,6 +183,18 @@ def _priors(protocol: Protocol) -> list[str]:
         lines += _touching(protocol, level)
         lines.append(f"the top rod strikes {strike} above that, on rods that lie there")
     return lines
+
+
+def _unused(protocol: Protocol) -> set[str]:
+    """Name the priors that nothing in a scene depends on."""
+    chains = protocol.chains.values()
+    needed = {
+        "side": protocol.two_chains,
+        "drag": protocol.drag is None,
+        "beam_offset": any(one.tilt_deg for one in chains),
+        "swing": protocol.surface is not None and any(one.chain.rods > 1 for one in chains),
+    } | dict.fromkeys(_STRUCK, protocol.surface is not None)
+    return {name for name, is_needed in needed.items() if not is_needed}
 
 
 def _touching(protocol: Protocol, level: str) -> list[str]:

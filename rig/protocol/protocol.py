@@ -218,6 +218,10 @@ class Accept:
     missed_edges: float = 0.05
 
 
+GUESSED = 8.0
+"""Degrees of freedom of a scale that is known to a quarter of itself (GUM G.4.2, E.4.3)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Priors:
     """What is known beforehand of what nobody measures, as standard deviations in SI units.

@@ -13,7 +13,7 @@ from rig.bench.falls import Asked, falls
 from rig.bench.fast_accuracy import (
     DOUBLED,
     STACK,
-    _sessions,
+    blocks,
     doubled,
     fast_accuracy,
     with_setting,
@@ -82,7 +82,7 @@ def test_a_simulation_that_gives_up_is_said(capfd):
 
 
 def test_every_planned_run_has_its_turn():
-    sessions = _sessions(UNIFORM, 27)
+    sessions = blocks(UNIFORM, 27)
     planned = {run.number: run for run in runs(UNIFORM)}
     assert sorted(number for one in sessions for number in one) == sorted(planned)
     for one in sessions:

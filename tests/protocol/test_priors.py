@@ -14,7 +14,7 @@ from rig.protocol.priors import PRIORS
 from rig.protocol.protocol import Priors
 from rig.protocol.reader import parse
 from rig.units import Quantity, format_quantity
-from tests.analysis.drops import UNIFORM, case
+from tests.analysis.drops import FENCE, UNIFORM, case
 
 PAGE = (Path(__file__).parents[2] / "docs/priors.md").read_text("utf-8")
 
@@ -54,6 +54,12 @@ def test_rig_check_lists_them_all_and_marks_those_of_the_protocol():
         (line,) = [one for one in lines if one.split()[:1] == [name]]
         assert line.endswith(row.words)
         assert ("(stated)" in line) == (name == "hang")
+
+
+def test_rig_check_lists_none_that_nothing_depends_on():
+    """A fence falls freely, and its cards are level."""
+    listed = {line.split()[0] for line in describe(FENCE).splitlines() if line.startswith("  ")}
+    assert listed & {*PRIORS} == {"edge_floor", "jitter", "hang", "drag"}
 
 
 def test_the_page_has_the_same_table():

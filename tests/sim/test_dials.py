@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 
 import pint
 import pytest
@@ -11,10 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
+from rig.protocol.protocol import Contact
+from rig.units import Quantity
 from sim.dials import Dials, read_dials
+from tests.sim.falls import UNIFORM
 
 TIMES = ("skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall")
-LENGTHS = ("hang_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd")
+LENGTHS = (
+    "hang_sd", "side_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd", "contact_sd",
+    "strike_sd",
+)  # fmt: skip
 SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled")
 FACTORS = (
     "drop_error", "impulse_sd", "friction", "restitution", "clock", "drift", "wander", "reference",
@@ -98,10 +104,30 @@ def test_quiet_with_one_dial_is_that_dial_alone():
     assert (dials.skew_sd, dials.rod_sd, dials.missed) == (0.004, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("name", ["quiet", "stated"])
 @pytest.mark.parametrize("text", ["yes", "true", "", "2"])
-def test_quiet_is_0_or_1(text):
-    with pytest.raises(InputError, match="quiet"):
-        read_dials({"quiet": text})
+def test_quiet_and_stated_are_0_or_1(name, text):
+    with pytest.raises(InputError, match=name):
+        read_dials({name: text})
+
+
+def test_quiet_and_stated_are_two_rigs():
+    with pytest.raises(InputError, match="two rigs"):
+        read_dials({"quiet": "1", "stated": "1"})
+
+
+def test_stated_dials_are_the_protocol_s_own_but_for_those_that_are_set():
+    u, gates = Quantity(0.0, 7e-3), replace(UNIFORM.gates, height_u=1e-3, datum_u=2e-3)
+    priors = replace(UNIFORM.priors, hang=3e-3, side=4e-3, beam_offset=5e-3, jitter=6e-6)
+    protocol = replace(UNIFORM, gates=gates, priors=priors, contact=Contact(u, Quantity(0.0, 8e-3)))
+    dials = read_dials({"stated": "1", "datum_sd": "9 mm"})
+    assert (dials.drop_error, dials.skew_sd) == (1.0, Dials().skew_sd)
+    found = dials.on(protocol)
+    assert (found.gate_sd, found.datum_sd, found.hang_sd, found.side_sd) == (1e-3, 9e-3, 3e-3, 4e-3)
+    assert (found.beam_sd, found.jitter_sd, found.contact_sd, found.strike_sd) == (
+        5e-3, 6e-6, 7e-3, 8e-3,
+    )  # fmt: skip
+    assert same(Dials().on(protocol), Dials())
 
 
 @pytest.mark.parametrize(
@@ -119,7 +145,7 @@ def test_what_resembles_nothing_is_answered_with_all_there_is():
     with pytest.raises(InputError) as caught:
         read_dials({"xyzzy": "1"})
     named = caught.value.hint.removeprefix("dials are ").split(", ")
-    assert set(named) == {"quiet", "dynamics", "pace", "seed", "truth", *asdict(Dials())}
+    assert set(named) == {"quiet", "stated", "dynamics", "pace", "seed", "truth", *asdict(Dials())}
 
 
 def test_an_unknown_dial_like_no_other_lists_them_all():

@@ -8,10 +8,14 @@ from dataclasses import replace
 import pytest
 
 from rig.model.chain import Chain
+from rig.model.fall import fall
 from sim.beam import NOT_A_ROD
 from sim.dials import Dials
+from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.sim.chance import (
+    A_STRIKES,
+    B_STRIKES,
     FEW_GATES,
     FREE,
     RUN_40,
@@ -67,6 +71,43 @@ def test_a_positive_skew_is_a_free_chain_that_leaves_later():
         assert truth.separation_m == pytest.approx(quiet.separation_m, rel=1e-12)
     assert pytest.approx(4.9e-3, rel=0.01) == G * fall * 1e-3  # 4.9 mm a millisecond
     assert_normal([t.release_skew_s for t in drops], 4e-3)
+
+
+def test_one_side_hangs_lower_in_every_run():
+    dials = with_dials(side_sd=1e-3)
+    assert_normal([ChainLab(FEW_GATES, dials, seed).side for seed in range(300)], 1e-3)
+    (quiet,), (one, other) = attempts(with_dials(), 1, FEW_GATES), attempts(dials, 2, FEW_GATES)
+    assert one.edges == other.edges
+    moved = {c: t - before for (t, c, *_), (before, *_) in zip(one.edges, quiet.edges, strict=True)}
+    assert {channel for channel, late in moved.items() if late} == FREE & moved.keys()
+
+
+def test_rods_touch_as_high_in_every_run_at_an_incline():
+    """The same as a chain whose top rod hangs so much higher, let go so much lower."""
+    lab = ChainLab(FEW_GATES, dials := with_dials(contact_sd=2e-3), 1)
+    above = lab._contact(lab.runs[A_STRIKES])
+    assert lab._contact(lab.runs[B_STRIKES]) == above != 0.0
+    draws = [ChainLab(FEW_GATES, dials, n)._contact(lab.runs[A_STRIKES]) for n in range(300)]
+    assert_normal(draws, 2e-3)
+    (truth,) = attempts(dials, 1, FEW_GATES)
+    places = tuple(1.165 * k / 24 + above * (k == 24) for k in range(25))
+    struck = fall(Chain((1.0,) * 25, places), alpha(40), 4 / 3, 0.18 - above, G)
+    assert truth.separation_m == pytest.approx(struck.separation_m, rel=1e-12)
+    assert truth.speed_m_s == pytest.approx(struck.speed_m_s, rel=1e-12)
+
+
+def test_the_top_rod_strikes_what_lies_there():
+    drops = attempts(with_dials(strike_sd=5e-3), 300, FEW_GATES)
+    above = []
+    for truth in drops:
+        end, strike = truth.speed_m_s, truth.speed_strike_m_s
+        above.append((end**2 - strike**2) / (2 * G))
+        # While the rod would fall on, the free chain comes nearer with the speed that it has then.
+        early = 2 * above[-1] / (end + strike)
+        free = G * (truth.fall_time_s - 0.5 * early)
+        higher = free * early - above[-1]
+        assert truth.separation_strike_m == pytest.approx(truth.separation_m + higher, rel=1e-9)
+    assert_normal(above, 5e-3)
 
 
 def test_jitter_scatters_single_edges():

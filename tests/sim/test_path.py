@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.model.chain import Chain
-from rig.model.drag import drag_hits
+from rig.model.drag import drag_hits, drag_leg
 from rig.model.fall import hits, kicks
 from sim.path import Path
 
@@ -126,3 +126,13 @@ def test_before_the_first_hit_impacts_change_nothing():
 
 def test_a_height_above_the_start_is_passed_at_release():
     assert Path(0.3, 0.1, 9.81).time_at(0.2) == 0.3
+
+
+@given(paths(), st.floats(1e-3, 0.05))
+def test_the_last_rod_above_and_below_its_hit_falls_freely(path, way):
+    speed, kappa = path.hits[-1].speed_before, [0.0, *path.kappas][-1]
+    late, there = path.last_at(way)
+    if there:  # it once was so high
+        assert drag_leg(way, there, path.gravity, kappa) == pytest.approx((speed, -late))
+    late, there = path.last_at(-way)
+    assert (there, late) == pytest.approx(drag_leg(way, speed, path.gravity, kappa))

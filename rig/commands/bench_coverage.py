@@ -1,0 +1,137 @@
+"""``rig bench coverage``."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from rig.bench.coverage import CASES, held, merged, misfits
+from rig.commands.output import leave_study, say
+from rig.errors import InputError
+from rig.files import make_folder, write_atomic
+from rig.measurands import MEASURANDS
+from rig.text_table import csv_text, text_table
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator, Mapping
+
+    from rig.bench.coverage import CoverageCase, Held
+
+    Record = Mapping[str, Any]
+
+RIGS = {False: 260, True: 32}
+"""Of each case, in the model's world and in the resolved one: a thousand drops of the first case of
+either, and of all resolved ones together."""
+MISFIT_RIGS = 12
+_CHUNK = 8  # rigs at a time
+_SHOWN = 20
+_HEAD = """\
+# Do intervals hold?
+
+Written by `rig bench coverage`: many rigs, each off by as much as its protocol says (each post's
+zero, each beam, each rod, how chains hang), with a few drops on each. 95 % of the intervals should
+hold the truth that the simulation hides. In the *model*'s world chains fall by Eqs. 8 to 13, in the
+*resolved* one rods, strings and a board do as they do. Void shares leave out drops whose chains
+truly left further apart than the protocol accepts. ± of a share is from rig to rig, since drops on
+one rig share errors; × bound is the rms error over the u that the edges allow (Cramér and Rao)."""
+_OTHER = {
+    "drag_per_m": ("κ", "1/km", 1e3),
+    "restitution": ("β", "", 1.0),
+    "friction": ("μ", "", 1.0),
+}
+
+
+def main(arguments: Namespace) -> int:
+    """Let rigs of every case drop their chains; keep the table as it grows, and print it."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
+    wanted = arguments.only or ""
+    chosen = [one for one in CASES if wanted in one.name]
+    if not chosen:
+        names = ", ".join(one.name for one in CASES)
+        raise InputError(f"no case has {wanted!r} in its name", f"there are {names}")
+    folder = make_folder(arguments.output)
+    found: dict[str, Record] = {}
+    wrong: dict[str, Record] = {}
+    with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as pool:
+        for case in chosen:
+            rigs = arguments.rigs or RIGS["dynamics" in case.settings]
+            found[case.name] = _case(pool, arguments.protocols, case, rigs).json()
+            say(f"{case.name}: {found[case.name]['drops']} drops")
+            write_atomic(folder / "coverage.csv", _csv(found))  # what is there when it is stopped
+    if not wanted:
+        with TemporaryDirectory() as scratch:
+            for name, one in misfits(scratch, min(arguments.rigs or MISFIT_RIGS, MISFIT_RIGS)):
+                wrong[name] = one.json()
+                say(f"{name}: {wrong[name]['drops']} drops")
+    leave_study(
+        folder, "coverage", _HEAD, [*_lines(found, wrong)], {"cases": found, "misfits": wrong},
+        _csv(found), as_json=arguments.json,
+    )  # fmt: skip
+    return 0
+
+
+def _case(pool: ProcessPoolExecutor, folder: str, case: CoverageCase, rigs: int) -> Held:
+    """Share a case's rigs among processes."""
+    seeds = range(1, rigs + 1)
+    parts = [seeds[n : n + _CHUNK] for n in range(0, rigs, _CHUNK)]
+    return merged(pool.map(held, [folder] * len(parts), [case] * len(parts), parts))
+
+
+def _lines(found: Mapping[str, Record], wrong: Mapping[str, Record]) -> Iterator[str]:
+    """One table of drops, one of quantities a case, one of wrong rigs, and reasons."""
+    rows = [["", "drops", "void", "marginal", "edges to a wrong rod"]]
+    rows += [
+        [name, str(one["drops"]), f"{one['void_share']:.1%}", f"{one['marginal_share']:.1%}",
+         str(one["wrong"])]
+        for name, one in found.items()
+    ]  # fmt: skip
+    yield from text_table(rows, left={0}, rule=True)
+    for name, one in found.items():
+        rows = [[name, "n", "rms", "bias", "mean U95", "in U95", "", "× bound"]]
+        rows += [_row(key, errors) for key, errors in one["quantities"].items() if "°" not in key]
+        yield ""
+        yield from text_table(rows, left={0, 6}, rule=True)
+    if wrong:
+        rows = [["wrong in", "drops", "void", "marginal", "no word: U holds", "U does not hold"]]
+        rows += [
+            [name, str(one["drops"]), f"{one['void_share']:.0%}", f"{one['marginal_share']:.0%}",
+             f"{one['quiet_and_held']}", f"{one['quiet'] - one['quiet_and_held']}"]
+            for name, one in wrong.items()
+        ]  # fmt: skip
+        yield ""
+        yield from text_table(rows, left={0}, rule=True)
+    reasons = [(n, name, why) for name, one in found.items() for why, n in one["reasons"].items()]
+    if reasons:
+        yield from ("", "why drops within the limit of skew were not accepted:")
+        yield from (
+            f"{n:5}  {name}: {why}" for n, name, why in sorted(reasons, reverse=True)[:_SHOWN]
+        )
+
+
+def _row(key: str, errors: Record) -> list[str]:
+    mean = "mean " if key.startswith("mean ") else ""
+    name = key.removeprefix("mean ")
+    if name in MEASURANDS:
+        row = MEASURANDS[name]
+        symbol, unit, scale = row.label, row.fine, row.fine_scale
+    else:
+        symbol, unit, scale = _OTHER.get(name, (name, "", 1.0))
+    sizes = [f"{errors[one] * scale:.3f}" for one in ("rms", "bias", "mean_U95")]
+    chance = f"± {errors['coverage_se']:.1%}" if "coverage_se" in errors else ""
+    held = f"{errors['coverage']:.1%}"
+    label = f"{mean}{symbol} ({unit})" if unit else f"{mean}{symbol}"
+    return [label, str(errors["n"]), *sizes, held, chance, f"{errors['times_bound']:.2f}"]
+
+
+def _csv(found: Mapping[str, Record]) -> str:
+    """One line a case and quantity, of all drops and of each incline."""
+    rows = [
+        {"case": name, "quantity": key} | errors
+        for name, one in found.items()
+        for key, errors in one["quantities"].items()
+    ]
+    return csv_text(dict.fromkeys(key for row in rows for key in row), rows)
