@@ -236,10 +236,11 @@ def test_a_post_off_its_height_moves_a_mean_by_what_the_budget_allows_for():
 
 def test_few_drops_teach_nothing():
     drops = cases(FOUR)
-    few = analysis(drops[: FEWEST - 1])
+    some = drops[: FEWEST - 1]
+    few = analysis(some)
     assert few.joint is None
     assert not any(result.learned for result in few.runs)
-    assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in drops[: FEWEST - 1]]
+    assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in some]
     assert "learned" not in few.json()
 
 
@@ -338,7 +339,7 @@ def test_two_rods_have_too_few_impulses_to_learn_their_scatter_from():
     alpha = impact_on(scene.surface, both["A"].chain, 40.0).alpha
     scatter = STATED.impulses(alpha, above(2))[0]
     assert 0.0 < told < 8 * scatter**2
-    # Of a half-Cauchy prior and nothing else a share of a member takes just that share of the scale.
+    # From the scale of a half-Cauchy prior a share of a member takes just that share.
     found_scatter = found.joint.components.impulses(alpha, above(2))[0]
     assert found_scatter == pytest.approx(scatter, rel=told)
     assert all(result.learned for result in found.runs)
