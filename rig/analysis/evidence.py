@@ -12,9 +12,8 @@ positive. Nothing becomes less than a share of what was stated.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -32,6 +31,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
+
+Size = TypeVar("Size", float, "Array")
 
 STATED_WEIGHT = 1.0
 """Members that a stated uncertainty counts for."""
@@ -121,11 +122,11 @@ class Evidence:
         old = self.components
         new: dict[str, float] = {}
         for kind, found in self._squares.items():
-            stated = (getattr(self.stated, kind) / getattr(old, kind)) ** 2
+            stated = _member((getattr(self.stated, kind) / getattr(old, kind)) ** 2, 1.0)
             weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
             told = weight + self._determined[kind]
             self.degrees[kind] = max(STATED_WEIGHT, told)
-            share = _settled(stated, found / told, weight / told)
+            share = (weight * stated + found) / told
             least = LEAST_SHARE * getattr(self.stated, kind)
             new[kind] = max(getattr(old, kind) * share**0.5, least)
         if self._impulses:
@@ -179,20 +180,21 @@ class Evidence:
         found = np.array([getattr(self.components, name) ** 2 for name in names])
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
-        counts, least = counts + share, LEAST_SHARE**2 * stated
+        squares, counts = squares + share * (_member(stated, found) @ kinds), counts + share
+        least = LEAST_SHARE**2 * stated
         for _ in range(_INNER):
-            whole = squares + share * (2.0 * stated * found / (stated + found) @ kinds)
             for n, sizes in enumerate(kinds):
-                found[n] = max(found[n] * _explained(whole, counts, found @ kinds, sizes), least[n])
+                found[n] = max(
+                    found[n] * _explained(squares, counts, found @ kinds, sizes), least[n]
+                )
         for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
 
 
-def _settled(stated: float, found: float, weight: float) -> float:
-    """Solve x = found + weight · 2x·stated/(x + stated): a variance with its stated member."""
-    half = 0.5 * (found - (1.0 - 2.0 * weight) * stated)
-    return half + math.sqrt(half**2 + found * stated)
+def _member(stated: Size, found: Size) -> Size:
+    """Square of the member that a stated variance counts for, where so large a one was found."""
+    return 2.0 * stated * found / (stated + found)
 
 
 def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
     Matches = dict[str, list[Index]]
 
-FEWEST = 2
+FEWEST = 4
 """Drops that a session must have for a joint fit: one block of A, B, B, A."""
 IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""

@@ -106,7 +106,7 @@ def test_trials_of_a_session_are_said_run_by_run():
 def test_too_little_for_trials_is_bad_input():
     drops = cases(FOUR, MILD, 1)
     with pytest.raises(InputError, match="too few good runs"):
-        session_trials(analysis(drops[:1]), 10)
+        session_trials(analysis(drops[:3]), 10)
     with pytest.raises(InputError, match="1 trials tell no uncertainty"):
         session_trials(analysis(drops), 1)
 
