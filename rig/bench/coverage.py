@@ -62,6 +62,8 @@ class CoverageCase:
         Which of the ready ones.
     settings
         Of the simulation's URL.
+    rigs
+        How many, by default.
     inclines
         Each rig's session is one drop at each; a block of A, B, B, A at one if not given.
     coefficients
@@ -71,20 +73,17 @@ class CoverageCase:
     name: str
     protocol: str = UNIFORM
     settings: Mapping[str, str] = field(default_factory=dict)
+    rigs: int = 20
     inclines: tuple[float, ...] | None = None
     coefficients: bool = False
 
 
-def _resolved(name: str, protocol: str = UNIFORM, **settings: str) -> CoverageCase:
-    inclines = STEEP if protocol == UNIFORM else None
-    return CoverageCase(name, protocol, {"dynamics": "resolved"} | settings, inclines)
+def _resolved(name: str, **settings: str) -> CoverageCase:
+    return CoverageCase(name, settings={"dynamics": "resolved"} | settings, inclines=STEEP)
 
 
 CASES = (
-    CoverageCase("model"),
-    CoverageCase("model, air", settings={"drag": "0.03"}),
-    CoverageCase("model, all inclines", inclines=EVERY, coefficients=True),
-    CoverageCase("model, graded", GRADED),
+    CoverageCase("model", rigs=260),
     _resolved("resolved, damped strings"),
     _resolved("resolved, dead strings", string_restitution="0.1"),
     _resolved("resolved, lively strings", string_restitution="0.7"),
@@ -95,7 +94,11 @@ CASES = (
     _resolved("resolved, slippery board", friction="0.05"),
     _resolved("resolved, stiff strings", string_strain="2 %"),
     _resolved("resolved, off centre", off_centre_sd="3 mm"),
+    CoverageCase("model, air", settings={"drag": "0.03"}),
+    CoverageCase("model, graded", GRADED),
+    CoverageCase("model, all inclines", inclines=EVERY, coefficients=True),
 )
+"""A thousand drops of the model's world, and as many of the resolved one."""
 
 
 def _rod(scene: dict[str, Any], mm: float) -> bool:

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-RIGS = {False: 260, True: 32}
-"""Of each case, in the model's world and in the resolved one: a thousand drops of the first case of
-either, and of all resolved ones together."""
 MISFIT_RIGS = 12
 _CHUNK = 8  # rigs at a time
 _SHOWN = 20
@@ -58,8 +55,8 @@ def main(arguments: Namespace) -> int:
     wrong: dict[str, Record] = {}
     with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as pool:
         for case in chosen:
-            rigs = arguments.rigs or RIGS["dynamics" in case.settings]
-            found[case.name] = _case(pool, arguments.protocols, case, rigs).json()
+            one = _case(pool, arguments.protocols, case, arguments.rigs or case.rigs)
+            found[case.name] = one.json()
             say(f"{case.name}: {found[case.name]['drops']} drops")
             write_atomic(folder / "coverage.csv", _csv(found))  # what is there when it is stopped
     if not wanted:
