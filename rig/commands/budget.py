@@ -146,7 +146,7 @@ def _table(found: Mapping[str, Any]) -> list[str]:
             f"trials (seed {drawn['seed']}) {_written(row, trial['u'])} {row.fine}",
             f"  95 % of trials in {low} … {high} {row.unit}: "
             + ("both agree" if trial["agrees"] else "they do not agree")
-            + ("" if trial["decided"] else " (too near to call with so many trials)"),
+            + ("" if trial["decided"] else " (too few to tell)"),
         ]
     return lines
 
