@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import random
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
+from rig.analysis.verdict import _SURE, _pushed
 from rig.errors import InputError
 from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
@@ -353,3 +356,13 @@ def test_a_session_of_void_drops_has_no_summary():
     assert found.summary == ()
     assert analyze(SINGLE, [], scale).json() == {"runs": [], "summary": []}
     assert first_run(SINGLE, None) == 1
+
+
+@pytest.mark.parametrize(("share", "pushed"), [(0.9, False), (1.1, True)])
+def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
+    u = 0.5 * 4.0  # of the unknown in its own units, and one of these
+    fit = SimpleNamespace(
+        model=SimpleNamespace(unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * _SURE * u),
+        estimate=SimpleNamespace(x=None, covariance=np.array([[0.25]]), sd=np.array([4.0])),
+    )
+    assert bool(_pushed(fit)) == pushed

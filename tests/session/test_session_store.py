@@ -245,6 +245,26 @@ def test_a_full_disk_costs_nothing_once_there_is_room(path: Path) -> None:
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
 
 
+def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path: Path) -> None:
+    session = make(path)
+    connection = session._connection
+    assert connection is not None
+    session.add_drop(DEVICE_DROP)
+    session.commit()
+    (pages,) = connection.execute("PRAGMA page_count").fetchone()
+    connection.execute(f"PRAGMA max_page_count = {pages}")
+    with pytest.raises(SessionError, match="disk is full"):
+        session.log_bytes("rx", 1, bytes(100_000))
+    session.add_drop(DEVICE_DROP)  # which is there
+    session.add_drop(IMPORTED)
+    connection.execute("PRAGMA max_page_count = 100000")
+    with pytest.raises(SessionError, match="never altered"):
+        session.commit()
+    session.close()
+    with Session.open(path) as session:
+        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+
+
 def test_readers_beside_a_writer_see_what_is_committed(path: Path) -> None:
     with make(path) as writer, Session.open(path, readonly=True) as reader:
         writer.log_bytes("rx", 1, b"x")
