@@ -139,3 +139,11 @@ def test_the_emulator_stamps_as_the_model_does(words):
         *((0, pin, True) for pin in (*PICO.releases, PICO.sync)),
         *((120_000, pin, False) for pin in PICO.releases),
     ]
+
+
+def test_half_an_order_moves_nothing(words):
+    """A program that hangs between its two words."""
+    machine = Machine(words, RELEASE, jmp_pin=STOP)
+    machine.tx = [1000]
+    machine.run(50_000)
+    assert machine.moved == []
