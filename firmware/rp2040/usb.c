@@ -187,8 +187,10 @@ static void configure(uint8_t value)
     REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN(0);
     REGISTER(USB_OUT_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_OUT;
     out_data1 = in_data1 = false;
-    if (in_flight) /* on a bus that is no more */
+    if (in_flight) { /* on a bus that is no more */
+        REGISTER(USB_IN(BYTES)) = 0;
         packet_sent();
+    }
     bytes_expect();
 }
 
