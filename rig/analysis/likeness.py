@@ -15,6 +15,7 @@ ENOUGH = 20.0
 """Degrees of freedom from which on a scatter that was found means something."""
 LIKE_IMPULSES = 0.1
 """Scatter of single impulses, relative to α, that is remarked: a tenth of what is explained."""
+_SEEN = 0.005  # mm: less than that would be written as nothing
 
 
 class Likeness(NamedTuple):
@@ -39,9 +40,11 @@ class Likeness(NamedTuple):
     @property
     def sentence(self) -> str:
         """It in words."""
-        sizes = (
-            f"once rods have struck, others are {self.departure * 1e3:.2f} mm from where the "
-            "equations have them"
+        size = self.departure * 1e3
+        sizes = "once some rods have struck, the others are " + (
+            f"off the places that the model has them at by {size:.2f} mm (one standard deviation)"
+            if size >= _SEEN
+            else "where the model has them, to a hundredth of a millimetre"
         )
         if self.impulses is not None:
             sizes += f", and single impulses scatter by {self.impulses:.0%}"

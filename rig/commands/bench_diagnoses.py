@@ -27,11 +27,12 @@ _HEADINGS = (
 _HEAD = """\
 # Which faults of a rig are named rightly
 
-Written by `rig bench diagnoses`: falls of the simulated rig with its default disturbances, each of
-a rig that is wrong in one thing, by a size, and of rigs that are wrong in nothing. What the
-protocol's own uncertainties allow is rightly not noticed, and the air is an unknown of every drop;
-what no edge tells from another fault is among the likeliest. Figures by layout, and what was said
-instead, are in `diagnoses.csv` and `diagnoses.json`."""
+Written by `rig bench diagnoses --drops {drops} --clean {clean}`: falls of the simulated rig with
+its default disturbances, on each layout {drops} of a rig that is wrong in one thing, by a size, and
+{clean} of rigs that are wrong in nothing. What the protocol's own uncertainties allow is rightly
+not noticed, and the air is an unknown of every drop; what no edge tells from another fault is among
+the likeliest. Figures by layout, and what was said instead, are in `diagnoses.csv` and
+`diagnoses.json`."""
 
 
 def main(arguments: Namespace) -> int:
@@ -40,12 +41,13 @@ def main(arguments: Namespace) -> int:
     folder = make_folder(arguments.output)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
     clean = CLEAN if arguments.clean is None else arguments.clean
-    found = study(layouts, arguments.drops or DROPS, clean, arguments.jobs, say)
+    drops = arguments.drops or DROPS
+    found = study(layouts, drops, clean, arguments.jobs, say)
     records = [cell.json() for cell in found]
     table = csv_text([name for name in records[0] if name != "said"], records)
     leave_study(
-        folder, "diagnoses", _HEAD, _lines(records), {"diagnoses": records}, table,
-        as_json=arguments.json,
+        folder, "diagnoses", _HEAD.format(drops=drops, clean=clean), _lines(records),
+        {"diagnoses": records}, table, as_json=arguments.json,
     )  # fmt: skip
     return 0
 

@@ -24,10 +24,10 @@ _SHOWN_REASONS = 8
 _HEAD = """\
 # On which layouts of gates drops are read
 
-Written by `rig bench layouts`: falls of the simulated rig without disturbances, with
-the default ones, and with all of them doubled. Every drop is on a rig of its own and
-judged against the hidden truth; drops that truly miss more edges than the protocol
-accepts are left out. Every number is in `layouts.csv` and `layouts.json`.
+Written by `rig bench layouts --drops {drops}`: falls of the simulated rig without disturbances,
+with the default ones, and with all of them doubled, {drops} on each layout with each. Every drop
+is on a rig of its own and judged against the hidden truth; drops that truly miss more edges than
+the protocol accepts are left out. Every number is in `layouts.csv` and `layouts.json`.
 
 ![Map of layouts](layouts.svg)"""
 
@@ -37,12 +37,13 @@ def main(arguments: Namespace) -> int:
     layouts = chosen(LAYOUTS, arguments.only)
     folder = make_folder(arguments.output)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
-    found = study(layouts, arguments.drops or DROPS, arguments.jobs, say)
+    drops = arguments.drops or DROPS
+    found = study(layouts, drops, arguments.jobs, say)
     whole = as_json(found)
     cells = whole["layouts"]
     leave_study(
-        folder, "layouts", _HEAD, _lines(whole), whole, _csv(cells), layouts_figure(cells),
-        as_json=arguments.json,
+        folder, "layouts", _HEAD.format(drops=drops), _lines(whole), whole, _csv(cells),
+        layouts_figure(cells), as_json=arguments.json,
     )  # fmt: skip
     return 0
 

@@ -109,7 +109,9 @@ def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
     rows = list(csv.DictReader((tmp_path / "layouts.csv").read_text("utf-8").splitlines()))
     assert [row["chain"] for row in rows] == ["3 rods"] * 3
     assert "SIMULATED" in (tmp_path / "layouts.svg").read_text("utf-8")
-    assert "36, 117 + 32.4, 108" in (tmp_path / "layouts.md").read_text("utf-8")
+    page = (tmp_path / "layouts.md").read_text("utf-8")
+    assert "36, 117 + 32.4, 108" in page
+    assert "`rig bench layouts --drops 3`" in page
 
 
 def test_an_unknown_layout_is_told_with_those_there_are(tmp_path, capsys):
