@@ -39,7 +39,7 @@ GIVEN = {
         "4 ms": "firmware/README.md", "±10 %": "data sheet", "50 ns": "a tick of 20 MHz",
         "215 s": "2^32 ticks of it",
         "32 KB": "the largest ring of DMA", "0.15 µs": "18 clocks", "0.48 ms": "3,200 times that",
-        "25 KB": "tests/firmware/test_pico_worst.py", "120 ms": "firmware/PROTOCOL.md",
+        "5 KB": "tests/firmware/test_pico_worst.py", "120 ms": "firmware/PROTOCOL.md",
         "0.3 ms": "firmware/README.md", "50 µs": "firmware/emulator/rig_emulator/pico/run.mjs",
     },
     "docs/daemon.md": {"300 s": "rig/tui", "250 ms": "firmware/PROTOCOL.md"},
