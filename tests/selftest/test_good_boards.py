@@ -54,6 +54,13 @@ def test_a_good_board_passes(ppm, streams):
     assert list(found) == [check.name for check in CHECKS]
 
 
+def test_a_busy_computer_blames_no_board(monkeypatch):
+    monkeypatch.setattr("rig.selftest.line_checks._ASK_S", 0.3)
+    found = outcomes(port_of(LoopedBoard(Wire())))
+    assert failed(found) == []
+    assert "too busy" in found["arming times out"].why
+
+
 def test_without_leave_no_release_is_driven():
     board = Watched(Wire())
     found = outcomes(port_of(board), release=False)
