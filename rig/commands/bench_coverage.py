@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.coverage import CASES, held, merged, misfits
-from rig.commands.output import leave_study, say
+from rig.commands.output import leave_study, say, write_page
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
@@ -59,6 +59,7 @@ def main(arguments: Namespace) -> int:
             found[case.name] = one.json()
             say(f"{case.name}: {found[case.name]['drops']} drops")
             write_atomic(folder / "coverage.csv", _csv(found))  # what is there when it is stopped
+            write_page(folder, "coverage", _HEAD, _lines(found, wrong))
     if not wanted:
         with TemporaryDirectory() as scratch:
             for name, one in misfits(scratch, min(arguments.rigs or MISFIT_RIGS, MISFIT_RIGS)):
