@@ -69,7 +69,9 @@ def diagnose(fit: Fit) -> Diagnosis:
     void: list[str] = []
     doubts = silent(model.protocol, model.records.values())
     alive = [one for one in gates if one.train.times.size]
-    under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
+    under: list[_Seen] = []
+    if not any(one.strange for one in alive if one.role == "free"):  # where nothing piles up
+        under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
     if under:
         return Diagnosis((_pile(model.protocol, under),), tuple(doubts), pile=True)
     for gate in alive:

@@ -141,7 +141,7 @@ class Explainer:
             ]
             stated = sum(one.evidence for one in sides if one is not None)
             stated = self._absolute(self.setting, stated)
-            others = self.faults
+            others, well = self.faults, False
         else:
             reading = weighed(fit)
             stated = self._absolute(self.setting, reading.evidence)
@@ -153,6 +153,10 @@ class Explainer:
             found += [self._sought(self.steady[n], 0.0, reading, stated) for n in ranked]
             others = [one for one in self.faults if one.shift is None or not well]
         found += [self._afresh(one, size, stated) for one, size in self._voted(others)]
+        if well and any(one is not None and one.log_odds > 0.0 for one in found):
+            # A rod at one end too many looks like a chain that hangs a rod's distance higher, which
+            # no score tells that begins a rod off.
+            found += [self._afresh(one, size, stated) for one, size in self._voted(self.steady)]
         likelier = [one for one in found if one is not None and one.log_odds > 0.0]
         # What was found in both ways counts once.
         best = {id(one.fault): one for one in sorted(likelier, key=lambda one: one.log_odds)}

@@ -61,6 +61,30 @@ def test_exchanged_gates_are_void_and_named(a, b):
         assert "wrong way round" in text
 
 
+def test_gates_of_both_sides_exchanged_are_no_pile():
+    """The lowest ones, nearly as high as each other: each sees nearly what the other should."""
+    one = case(parse(under(STANDARD, (0.12, 0.2, 0.4, 0.7), (0.11, 0.3, 0.6)).protocol()), MILD)
+    result = exchanged(one, 0, 8).analyze()
+    assert result.verdict == "void"
+    text = "\n".join(result.reasons)
+    assert "pile" not in text
+    assert "channel 0 " in text
+    assert "channel 8 " in text
+    assert "wrong way round (odds" in text
+
+
+def test_a_chain_that_hangs_a_rod_s_distance_higher_has_no_rod_too_many():
+    layout = under(STANDARD, (0.12, 0.3, 0.6), (0.11, 0.4, 0.7))
+    stated = parse(layout.protocol())
+    pitch = stated.chains["A"].chain.heights[1]
+    true = replace(stated, drop=Quantity(stated.drop.value + pitch))
+    result = replace(case(true, MILD, incline=40.0), protocol=stated).analyze()
+    assert result.verdict == "void"
+    assert "has 26 rods" not in "; ".join(result.reasons)
+    (named,) = (one for one in result.reasons if "odds" in one)
+    assert re.search(r"the chains hang 4[5-9]\.\d ± .* higher", named)
+
+
 def with_rods(protocol: Protocol, rods: int) -> Protocol:
     """The same chains with rods added or taken off at the top."""
     chains = {}
