@@ -21,6 +21,7 @@ from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
+from rig.link.restarts import Restart
 from rig.link.transcript import Received, Transcript
 from rig.records import ClockSample, Drop
 from tests.link.strategies import MESSAGES
@@ -533,3 +534,15 @@ def test_the_link_alone_loads_neither_numpy_nor_sim():
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(run.stdout.split())
     assert not loaded & {"numpy", "sim", "yaml", "rig.model"}
+
+
+@pytest.mark.parametrize(
+    ("start_up_s", "when"),
+    [
+        (None, "within 900 ms of FIRE"),
+        (1.5, "within 900 ms of FIRE"),
+        (0.7, "about 200 ms after FIRE"),
+    ],
+)
+def test_when_a_board_restarted_is_said_as_well_as_it_is_known(start_up_s, when):
+    assert Restart(0, 1, label=1, back_s=0.9, start_up_s=start_up_s).when == when

@@ -303,6 +303,18 @@ def test_reader_in_a_write_protected_folder(path: Path) -> None:
         path.parent.chmod(0o700)
 
 
+@pytest.mark.parametrize("closed", ["file", "folder"])
+def test_where_either_cannot_be_written_nothing_is_put_beside_a_session(
+    path: Path, closed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make(path).close()
+    protected = path if closed == "file" else path.parent
+    monkeypatch.setattr(os, "access", lambda where, _mode: where != protected)  # root may all
+    with Session.open(path, readonly=True) as session:
+        assert session.protocol_text == TEXT
+        assert {one.name for one in path.parent.iterdir()} <= {path.name, f"{path.name}.lock"}
+
+
 def test_closed_session_says_so(path: Path) -> None:
     session = make(path)
     session.close()
