@@ -12,6 +12,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -297,6 +298,32 @@ def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch)
         assert done.count("subscribe") < len(many)
         for _, writer in lines:
             writer.close()
+
+    door(test)
+
+
+def test_the_oldest_of_whom_nothing_is_known_makes_room():
+    turned_away = []
+    door = admission.Admission()
+    for number in range(admission.STRANGERS + 2):
+        door.arrived(Mock(turn_away=lambda _why, n=number: turned_away.append(n)))
+    assert turned_away == [0, 1]
+    while door.make_room():
+        pass
+    assert turned_away == [*range(admission.STRANGERS + 2)]
+
+
+def test_of_a_client_that_goes_nothing_stays(door):
+    async def test(server, path, _):
+        reader, writer = await asyncio.open_unix_connection(path)
+        writer.write(HELLO)
+        await reader.readline()
+        writer.close()
+        while server._serving:
+            await asyncio.sleep(0)
+        await asyncio.sleep(0)  # what is cancelled ends in the next turn
+        running = [task.get_coro().__qualname__ for task in asyncio.all_tasks()]
+        assert not [name for name in running if name.startswith("Connection.")]
 
     door(test)
 

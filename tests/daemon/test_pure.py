@@ -218,3 +218,14 @@ def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
     with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
         Controller("sim://").open_session(str(protocol), str(session))
     assert not session.exists()
+
+
+def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):
+    protocol = tmp_path / "fence.yaml"
+    protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
+    rig = Controller("sim://")
+    rig.open_session(str(protocol), str(tmp_path / "session"))
+    assert rig.published.get("session")["path"] == str(tmp_path / "session")
+    rig.close()
+    assert rig.published.get("session") is None
+    assert rig.published.get("link")["state"] == "closed"

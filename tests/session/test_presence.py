@@ -88,6 +88,17 @@ def test_a_drop_that_fell_meanwhile_is_saved_before_it_is_acknowledged(rig, lose
         assert [(one.run, one.attempt) for one in found.drops()] == [*DROPS]
 
 
+def test_what_is_not_committed_yet_is_saved_too_and_once(rig):
+    made, _, session = rig
+    made.session.log_bytes("rx", 7, b"once")
+    session.unlink()
+    with pytest.raises(SessionError, match="while it was in use") as caught:
+        made.session.require_presence()
+    assert "but for" not in caught.value.message
+    with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
+        assert [chunk.data for chunk in found.byte_log()].count(b"once") == 1
+
+
 def test_a_session_that_was_cut_is_noticed(rig):
     made, _, session = rig
     os.truncate(session, 4096)
