@@ -286,6 +286,7 @@ export class Pio {
   ahead(turns) {
     for (const machine of this.machines.slice(0, 2)) {
       machine.osr = (machine.osr - turns) >>> 0;
+      if (machine.pc === 4 || machine.pc === 5) machine.y = (machine.y - turns) >>> 0; // in between
       machine.forget();
     }
   }
