@@ -70,10 +70,6 @@ _WHY: dict[tuple[str, str, str], str] = {
     ): "the same once read: JSON may write a letter as its number",
     ("rig/link/port.py", "check_name(url)", "pass"): "the simulation looks at its own name again",
     ("rig/link/client.py", "6.0", "12.0"): "a patience: longer than the 5 s that it is for",
-    ("rig/session/lock.py", "os.close(handle)", "pass"): "the process ends with the error, or has "
-    "one descriptor less: no test yet",
-    ("rig/daemon/socket_path.py", "raise", "pass"): "a client that waits for ever for a door that "
-    "nobody opens: no test yet",
 }
 
 

@@ -17,7 +17,7 @@ from unittest.mock import Mock
 import pytest
 
 from bench.process_fixture import FENCE
-from rig.daemon import admission, rpc
+from rig.daemon import admission, rpc, socket_path
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
 from rig.daemon.server import Server
@@ -80,6 +80,18 @@ def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
     for client in clients:
         client.close()
     assert started.poll() is None
+
+
+def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr(socket_path, "_REACH_S", 0.2)
+    path = tmp_path / "rig.sock"
+    with contextlib.ExitStack() as stack:
+        deaf = stack.enter_context(socket.socket(socket.AF_UNIX))
+        deaf.bind(str(path))
+        deaf.listen(0)
+        with pytest.raises(rpc.BusyError, match="it took no new client"):
+            while True:
+                stack.enter_context(socket_path.reach(path)[0])
 
 
 @pytest.fixture

@@ -21,6 +21,10 @@ from rig.session.store import Session
 DROPS = ((1, 1), (2, 1))
 
 
+def open_files():
+    return sorted(os.listdir("/proc/self/fd"))
+
+
 def moved(path):
     path.rename(path.with_name("elsewhere"))
 
@@ -156,8 +160,19 @@ def test_a_disk_that_knows_no_locks_is_said_to(tmp_path, monkeypatch):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", none)
+    held = open_files()
     with pytest.raises(SessionError, match="knows no locks"):
         Session.open(session)
+    assert open_files() == held
+
+
+def test_a_session_that_another_writes_costs_no_descriptor(tmp_path):
+    session = make_session(tmp_path)
+    with Session.open(session):
+        held = open_files()
+        with pytest.raises(SessionError, match="is being written by process"):
+            Session.open(session)
+        assert open_files() == held
 
 
 def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
