@@ -7,6 +7,7 @@ import errno
 import fcntl
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -22,7 +23,7 @@ DROPS = ((1, 1), (2, 1))
 
 
 def open_files():
-    return sorted(os.listdir("/proc/self/fd"))
+    return sorted(path.name for path in Path("/proc/self/fd").iterdir())
 
 
 def moved(path):
