@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,10 @@ from rig.errors import DeviceError, RigError
 from rig.tui.state import DaemonState, typed
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Mapping
     from pathlib import Path
+
+    from rig.daemon.client_protocol import Replica
 
 _AGAIN_S = 0.5
 _BEAT_S = 0.15  # between two signs of life
@@ -49,6 +52,8 @@ class ReconnectingClient:
         How long the daemon's disk has been at one write; 0 for none.
     patience_s
         How long the daemon may take to answer a sign of life.
+    lost
+        Why the port was lost last, for who says so when it is back, which may be a moment later.
     """
 
     def __init__(
@@ -59,6 +64,7 @@ class ReconnectingClient:
         self.name = f"rig tui {os.getpid()}"
         self.silence = "looking for it"
         self.changed = True
+        self.lost: Mapping[str, Any] = {}
         self.disk_s = 0.0
         self.patience_s = _SILENT_S
         self._hangs = False
@@ -153,7 +159,7 @@ class ReconnectingClient:
         reached = None
         try:
             await self._check(client)
-            client.changed = self._note
+            client.changed = partial(self._note, client.replica)
             await client.subscribe()
             self._client, self.silence = client, ""
             if self._wants_control and client.replica.state.get("control") is None:
@@ -233,5 +239,8 @@ class ReconnectingClient:
             )
         self.silence = "started one, waiting for it"
 
-    def _note(self) -> None:
+    def _note(self, replica: Replica) -> None:
         self.changed = True
+        error, link = replica.state.get("error"), replica.state.get("link")
+        if error and link and link["state"] != "up":
+            self.lost = error

@@ -78,7 +78,6 @@ class Follower:
         self._reading = self._fitting = False
         self._wanted: object = None
         self._read: object = None
-        self._lost: Mapping[str, Any] = {}  # why the port was
         self._counted: tuple[Job | None, int] = (None, 0)
 
     @property
@@ -117,7 +116,7 @@ class Follower:
         self._look_at_gates(state, now)
         if not client.up:
             return [Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
-        events: list[Event] = [*self._back(state), *_broken(stage, state)]
+        events: list[Event] = [*_back(client, state), *_broken(stage, state)]
         session = state.section("session")
         if session:
             self._look_at_session(session, state, now)
@@ -133,15 +132,6 @@ class Follower:
         if missed and missed not in self.judged and client.driving:
             events.append(Found(missed))
         return events
-
-    def _back(self, state: DaemonState) -> Iterator[Event]:
-        """Say what was wrong with a port that is back: it may have been too short to be read."""
-        if state.section("error"):
-            self._lost = state.section("error") if state.link != "up" else {}
-        elif self._lost and state.link == "up":
-            yield Warned(f"the port was lost and is back: {self._lost['message']}\n"
-                         f"{self._lost['hint']}")  # fmt: skip
-            self._lost = {}
 
     def _look_at_gates(self, state: DaemonState, now: float) -> None:
         if self.view and not self.indicators.gates:
@@ -225,6 +215,15 @@ def _opened(path: Path) -> LiveAnalysis:
     from rig.results.live import LiveAnalysis  # noqa: PLC0415 - the analysis is not needed to paint
 
     return LiveAnalysis(path)
+
+
+def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
+    """Say what was wrong with a port that is back: it may have been too short to be seen."""
+    if state.link != "up":
+        return
+    lost, client.lost = client.lost, {}
+    if lost and not state.section("error"):
+        yield Warned(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
 
 
 def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:

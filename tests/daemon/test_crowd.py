@@ -275,7 +275,7 @@ def test_a_stop_is_read_behind_any_number_of_requests(door):
         await reader.readline()
         writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
         told = {}
-        while 1000 not in told:
+        while not {299, 1000} <= told.keys():  # the stop may overtake
             answer = json.loads(await reader.readline())
             told[answer["id"]] = answer
         assert told[1000]["result"] == {}

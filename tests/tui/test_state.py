@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import copy
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
 from rig.daemon.client_protocol import Replica
+from rig.tui.client import ReconnectingClient
+from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model, alarm
 from rig.tui.state import DaemonState, typed
@@ -90,6 +93,24 @@ def test_what_is_wrong_is_said_with_what_to_do():
     assert "cable" in lost.hint
     failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
     assert failed == ("disk full", "make room")
+
+
+def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
+    """Changes come in between two looks: a board restarts in less than a tenth of a second."""
+
+    async def connected():
+        return
+
+    line, replica = ReconnectingClient("sim://", Path("rig.sock"), connected), Replica()
+    error = {"message": "the board restarted", "hint": "check its supply"}
+    replica.snapshot({"n": 1, "state": {"link": {"state": "down"}, "error": error, "edges": []}})
+    line._note(replica)
+    replica.change({"n": 2, "set": {"link": {"state": "up"}, "error": None}})
+    line._note(replica)
+    back = typed(replica.n, replica.state)
+    (said,) = _back(line, back)
+    assert said.trouble == "the port was lost and is back: the board restarted\ncheck its supply"
+    assert not [*_back(line, back)]
 
 
 def test_a_watcher_sees_where_the_drop_is():
