@@ -24,10 +24,10 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
 
 from bench.link import cpu_s
-from rig.commands.output import print_json, say
+from rig.commands.output import print_json, say, write_page
 from rig.daemon.client import Client
 from rig.daemon.server import Server
-from rig.files import write_atomic
+from rig.files import make_folder
 from rig.link.messages import Fired
 from rig.link.transcript import Received
 from rig.recorder.feed import StateFeed
@@ -39,6 +39,11 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Sequence
 
+_HEAD = """\
+# What the terminal costs
+
+Written by `./run bench tui`: the real program in a real terminal, from its first paint to chains
+that fall on its screen. Times are of the machine and its load of that day."""
 RATE = 5000.0
 """Edges a second."""
 SIZE = (120, 36)
@@ -237,12 +242,10 @@ def main(arguments: Namespace) -> int:
     if arguments.json:
         print_json(found)
         return 0
-    rows = _rows(found)
-    print("\n".join(text_table(rows, left={0, 1})))
-    if arguments.output:
-        Path(arguments.output).mkdir(parents=True, exist_ok=True)
-        lines = ["| the terminal | |", "|---|---|", *(f"| {a} | {b} |" for a, b in rows)]
-        write_atomic(Path(arguments.output) / "terminal.md", "\n".join(lines) + "\n")
+    lines = text_table(_rows(found), left={0, 1})
+    print("\n".join(lines))
+    if arguments.output is not None:
+        write_page(make_folder(arguments.output), "terminal", _HEAD, lines)
     return 0
 
 
@@ -259,4 +262,5 @@ def _rows(found: dict[str, Any]) -> list[list[str]]:
         ["frames a second", f"{found['frames_per_s']:.1f}"],
         ["one frame", f"{found['cpu_per_frame_s'] * 1e3:.1f} ms computing"],
         ["lag, median and p99", f"{lag['median'] * 1e3:.0f} ms, {lag['p99'] * 1e3:.0f} ms"],
+        ["load of the machine", f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"],
     ]

@@ -219,10 +219,10 @@ def _opened(path: Path) -> LiveAnalysis:
 
 def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
     """Say what was wrong with a port that is back: it may have been too short to be seen."""
-    if state.link != "up":
+    if state.link != "up" or state.section("error"):  # it is back, and being looked through
         return
     lost, client.lost = client.lost, {}
-    if lost and not state.section("error"):
+    if lost:
         yield Warned(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
 
 

@@ -105,7 +105,10 @@ def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
     error = {"message": "the board restarted", "hint": "check its supply"}
     replica.snapshot({"n": 1, "state": {"link": {"state": "down"}, "error": error, "edges": []}})
     line._note(replica)
-    replica.change({"n": 2, "set": {"link": {"state": "up"}, "error": None}})
+    replica.change({"n": 2, "set": {"link": {"state": "up"}}})
+    line._note(replica)
+    assert not [*_back(line, typed(replica.n, replica.state))]  # not all is well yet
+    replica.change({"n": 3, "set": {"error": None}})
     line._note(replica)
     back = typed(replica.n, replica.state)
     (said,) = _back(line, back)
