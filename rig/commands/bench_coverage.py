@@ -9,8 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.coverage import CASES, held, merged, misfits
-from rig.commands.output import leave_study, say, write_page
-from rig.errors import InputError
+from rig.commands.output import leave_study, named, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.text_table import csv_text, text_table
@@ -46,10 +45,7 @@ def main(arguments: Namespace) -> int:
     """Let rigs of every case drop their chains; keep the table as it grows, and print it."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
     wanted = arguments.only or ""
-    chosen = [one for one in CASES if wanted in one.name]
-    if not chosen:
-        names = ", ".join(one.name for one in CASES)
-        raise InputError(f"no case has {wanted!r} in its name", f"there are {names}")
+    chosen = named(CASES, wanted)
     folder = make_folder(arguments.output)
     found: dict[str, Record] = {}
     wrong: dict[str, Record] = {}

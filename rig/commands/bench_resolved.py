@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.bench.figures import resolved_figure, work_figure
 from rig.bench.resolved import CASES, DROPS, as_json, film, published, study, work
-from rig.commands.output import leave_study, print_json, say, write_page
-from rig.errors import InputError
+from rig.commands.output import leave_study, named, print_json, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.measurands import told
 from rig.report.film import film_figure
@@ -56,11 +55,7 @@ def main(arguments: Namespace) -> int:
         write_atomic(folder / "resolved-fall.svg", drawn)
         say(f"{folder / 'resolved-fall.svg'}")
         return 0
-    wanted = arguments.only or ""
-    chosen = [one for one in CASES if wanted in one.name]
-    if not chosen:
-        names = ", ".join(one.name for one in CASES)
-        raise InputError(f"no case has {wanted!r} in its name", f"there are {names}")
+    chosen = named(CASES, arguments.only or "")
     folder = make_folder(arguments.output)
     found = study(arguments.protocols, arguments.drops or DROPS, chosen, say)
     whole = as_json(found)

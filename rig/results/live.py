@@ -256,7 +256,7 @@ class LiveAnalysis:
         self, protocol: Protocol, run: Run, job: Job, drop: Drop, scale: TimeScale
     ) -> None:
         known = self._known.get(job)
-        if known is None or abs(known.hz / scale.hz - 1.0) > _SAME_SCALE:
+        if known is None or not _as_good(known.hz, scale):
             result, fit = self._alone(protocol, run, job, drop, scale)
             falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
@@ -269,9 +269,14 @@ class LiveAnalysis:
         """Say what a drop says by itself; what was kept of that needs no fit until a joint one."""
         one = self.identified.get(job)
         kept = one.alone if one else None
-        if kept and kept.result.run == run and abs(kept.hz / scale.hz - 1.0) <= _SAME_SCALE:
+        if kept and kept.result.run == run and _as_good(kept.hz, scale):
             return kept.result, None
         return fit_drop(protocol, run, drop, scale, known=self.identified)
+
+
+def _as_good(hz: float, scale: TimeScale) -> bool:
+    """Whether what was found at one tick rate is still good at another."""
+    return abs(hz / scale.hz - 1.0) <= _SAME_SCALE
 
 
 def _veiled_view(view: SessionView) -> SessionView:
