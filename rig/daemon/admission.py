@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 HELLO_S = 2.0
 """A client that has not said hello for so long is sent away."""
 STRANGERS = 64
-"""Connections that have not said hello; the oldest makes room for the next."""
+"""Connections that have not been let in; the oldest that says nothing makes room for the next."""
 CLIENTS = 128
 RESERVE = 8
 """Connections beyond those, for `stop` alone, and no longer than `HELLO_S`."""
@@ -40,7 +40,8 @@ class Admission:
 
     def make_room(self) -> bool:
         """Send the oldest away that has said nothing; `False` when there is none."""
-        oldest = next(iter(self._strangers), None)
+        # Who said hello and waits for the answer has done what there is to do.
+        oldest = next((one for one in self._strangers if not one.spoke), None)
         if oldest is not None:
             del self._strangers[oldest]
             oldest.turn_away(_busy("the daemon has too many connections that say nothing"))

@@ -52,6 +52,8 @@ class Connection:
         Whether it wants changes.
     behind
         Whether it was too slow for them.
+    spoke
+        Whether a line has come from it.
     """
 
     def __init__(
@@ -63,7 +65,7 @@ class Connection:
         turns: Turns,
     ) -> None:
         self.name = ""
-        self.subscribed = self.behind = False
+        self.subscribed = self.behind = self.spoke = False
         self._reader = reader
         self._writer = writer
         self._do = do
@@ -108,6 +110,7 @@ class Connection:
 
     async def _read(self, waiting: asyncio.Queue[_Asked]) -> None:
         while line := await self._reader.readline():
+            self.spoke = True
             self._heard(self)
             if self.waiting() > rpc.UNREAD_LIMIT:
                 await self._writer.drain()
