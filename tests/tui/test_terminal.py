@@ -82,6 +82,18 @@ class Terminal:
 
         until(gone)
 
+    def drops(self, number: int) -> None:
+        """Arm until chains fall: on a busy machine a board that is not heard of disarms itself."""
+
+        def fell() -> bool:
+            screen = self.screen()
+            if "nothing fell" in screen and "Enter arm" in screen:
+                self.enters("Enter arm")
+            return all(text in screen for text in (f"run {number}, attempt ", "release skew"))
+
+        self.enters("Enter arm")
+        until(fell, lambda: self.tmux("capture-pane", "-p"))
+
     def sees(self, *texts: str) -> None:
         until(
             lambda: all(text in self.screen() for text in texts),
@@ -112,8 +124,8 @@ def test_an_abba_session_by_keys_alone(terminal, url):
             terminal.press("-l", "hm u\r\r\r")
             terminal.sees("not armed: Enter came too soon after another key")
             terminal.sees("RUN 2 of 4", "Enter arm")
-        terminal.enters("Enter arm")
-        terminal.sees(f"run {number}, attempt 1", "release skew", "Enter next run")
+        terminal.drops(number)
+        terminal.sees("Enter next run")
         terminal.press("Enter")
     terminal.sees("4 of 4 runs", "✓✓✓✓")
     pid = _daemon_of(terminal.folder)
@@ -163,8 +175,7 @@ def test_nothing_is_armed_by_hands_on_a_real_keyboard(terminal):
     until(prepared, terminal.screen)
     with Session.open(session, readonly=True) as found:
         assert {entry.state for entry in found.states()} <= {RunState.PLANNED}
-    terminal.enters("Enter arm")  # and by the deliberate step it is
-    terminal.sees("run 1, attempt 1", "release skew")
+    terminal.drops(1)  # and by the deliberate step it is
 
 
 def _daemon_of(folder: Path) -> int:
