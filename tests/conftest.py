@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import signal
+from pathlib import Path
 
+import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
@@ -14,6 +16,15 @@ settings.register_profile("same", derandomize=True, database=None, deadline=None
 settings.register_profile("search", max_examples=2000, deadline=None)
 settings.load_profile("same")
 
+_BY_THE_CLOCK = tuple(
+    Path(__file__).parent / name
+    for name in (
+        "daemon", "doctor", "flash", "selftest", "tui", "cli/test_ctrl_c.py", "cli/test_errors.py",
+        "cli/test_resume.py", "cli/test_run.py", "cli/test_unfired.py",
+    )
+)  # fmt: skip
+"""Tests of what goes by a clock of its own."""
+
 
 def pytest_configure() -> None:
     # A shell has what runs in its background ignore Ctrl-C, and so would all that tests start.
@@ -22,3 +33,24 @@ def pytest_configure() -> None:
     # they are depends on which tests ran before in this process.
     if settings().derandomize:
         providers._get_local_constants = providers.Constants
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Have every worker begin with what goes by the clock, and only then compute.
+
+    A board that is not heard of for a fifth of a second disarms itself, as it should: beside tests
+    that need all processors that is no rare event. Those that wait are good neighbours.
+    """
+    workers = getattr(config, "workerinput", {}).get("workercount", 1)
+    waiting: list[pytest.Item] = []
+    computing: list[pytest.Item] = []
+    for one in items:
+        clocked = any(one.path.is_relative_to(at) for at in _BY_THE_CLOCK)
+        (waiting if clocked else computing).append(one)
+
+    def share(of: list[pytest.Item], number: int) -> list[pytest.Item]:
+        return of[len(of) * number // workers : len(of) * (number + 1) // workers]
+
+    items[:] = [
+        one for number in range(workers) for of in (waiting, computing) for one in share(of, number)
+    ]
