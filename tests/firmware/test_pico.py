@@ -143,7 +143,7 @@ class TestPico(DeviceConformance):
 @pytest.mark.slow
 def test_the_table_of_figures_is_up_to_date():
     written = (FIRMWARE.parent / "docs" / "results" / "boards.md").read_text()
-    assert boards_bench.table() == written, "./run bench boards -o docs/results"
+    assert boards_bench.page() == written, "./run bench boards -o docs/results"
 
 
 def test_chains_fall_before_it_by_its_url(tmp_path):

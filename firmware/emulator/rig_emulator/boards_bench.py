@@ -34,6 +34,13 @@ _TIMES = 16
 _RODS_EDGES = 3200
 """Of 100 rods at 16 gates."""
 _FALL_S = 0.5
+_HEAD = """\
+# Both boards in their emulators
+
+Written by `./run bench boards`: times are of the emulated clocks, and so the same everywhere.
+[What boards do](../boards.md) says what follows, and what no emulator shows.
+
+"""
 
 
 class Bench:
@@ -183,24 +190,24 @@ class Bench:
         return sum(sizes.get(name, 0) for name in flash), sum(sizes.get(n, 0) for n in memory)
 
 
-def table() -> str:
+def page() -> str:
     """Measure both boards and write the table."""
     columns = {name: dict(Bench(wiring).rows()) for name, wiring in _COMPARED.items()}
     names = list(next(iter(columns.values())))
-    lines = [f"| in the emulator | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
+    lines = [f"| | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
     for (mega, pico), name in zip(
         zip(*(column.values() for column in columns.values()), strict=True), names, strict=True
     ):
         lines.append(f"| {name} | {mega} | {pico} |")
-    return "\n".join(lines) + "\n"
+    return _HEAD + "\n".join(lines) + "\n"
 
 
 def main() -> int:
-    """Print the table, or write it into a folder."""
+    """Print the page, or write it into a folder."""
     parser = argparse.ArgumentParser(prog="rig_emulator.boards_bench")
     parser.add_argument("-o", "--output", metavar="DIR")
     folder = parser.parse_args().output
-    text = table()
+    text = page()
     if folder is None:
         print(text, end="")
     else:
