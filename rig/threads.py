@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -12,16 +13,49 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
+class _Bound:
+    """Holds until nobody works within it any more, in whatever thread.
+
+    How many threads multiply is one number for the whole process in most builds of BLAS: whoever
+    set it back to what he had found would set it back for others too.
+    """
+
+    def __init__(self) -> None:
+        self._guard = threading.Lock()
+        self._inside = 0
+        self._first: Any = None  # knows how it was before anybody came
+
+    def __enter__(self) -> None:
+        with self._guard:
+            _disown()
+            limited = libraries().limit(limits=1, user_api="blas")  # some builds count by thread
+            if not self._inside:
+                self._first = limited
+            self._inside += 1
+
+    def __exit__(self, *_exc: object) -> None:
+        with self._guard:
+            self._inside -= 1
+            if not self._inside:
+                _disown()
+                self._first.restore_original_limits()
+                _disown()
+
+
+_BOUND = _Bound()
+
+
 def one_thread(work: Callable[P, T]) -> Callable[P, T]:
     """Have a function's matrices multiplied by one thread, whoever calls it.
 
     With several, a sum's last digits depend on how busy the machine is, and on two cores the same
-    work costs twice the processor time. Others' matrices are theirs: the bound ends with the call.
+    work costs twice the processor time. Others' matrices are theirs: the bound ends with the last
+    of all calls that are under way, in whatever threads.
     """
 
     @wraps(work)
     def bounded(*args: P.args, **kwargs: P.kwargs) -> T:
-        with libraries().limit(limits=1, user_api="blas"):
+        with _BOUND:
             return work(*args, **kwargs)
 
     return bounded
@@ -37,3 +71,10 @@ def libraries() -> Any:
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - only with numpy
 
     return ThreadpoolController()
+
+
+def _disown() -> None:
+    """Let any thread set the number: threadpoolctl 3.8 obeys only the one that did so before."""
+    for library in libraries().lib_controllers:
+        if hasattr(library, "clear_controlling_thread"):
+            library.clear_controlling_thread(force=True)

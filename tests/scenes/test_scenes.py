@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 
     from tests.scenes.draw import Scene
 
-FEW = 32
+SOME = (0, 1, 4, 6, 7, 8, 9, 10, 12, 13, 14, 15, 16, 20, 21, 22, 25, 27, 28, 30)
+"""Of the first 32 seeds those that reach what no other of them reaches, or cost next to nothing."""
+VOID = 17
+"""A scene in which every drop is void, and each command seeks the causes anew: with few drops."""
 MANY = 240
-LONG = 24
-"""A scene in which every drop is void, and each command seeks the causes anew."""
 
 
 def _assert_sound(drawn: Scene, folder: Path) -> None:
@@ -25,12 +26,16 @@ def _assert_sound(drawn: Scene, folder: Path) -> None:
     assert not found, "\n".join([drawn.port, drawn.text, *found])
 
 
-@pytest.mark.parametrize("seed", [seed for seed in range(FEW) if seed != LONG])
+@pytest.mark.parametrize("seed", SOME)
 def test_a_scene_goes_through_every_command(seed, tmp_path):
     _assert_sound(scene(seed), tmp_path)
 
 
+def test_so_does_one_in_which_every_drop_is_void(tmp_path):
+    _assert_sound(scene(VOID, drops=2), tmp_path)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [LONG, *range(FEW, MANY)])
+@pytest.mark.parametrize("seed", [seed for seed in range(MANY) if seed not in SOME])
 def test_many_more_scenes_go_through_every_command(seed, tmp_path):
     _assert_sound(scene(seed, drops=12), tmp_path)

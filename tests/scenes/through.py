@@ -253,8 +253,8 @@ class _Journey:
         if done.code != DONE:
             return
         html = page.read_text("utf-8")
-        for failed in re.findall(r"[^<>]*(?:could|Could) not be (?:made|worked out)[^<]*", html):
-            self.fault("report", failed)
+        for failed in re.findall(r"[Cc]ould not be (?:made|worked out)[^<]*", html):
+            self.fault("report", f"something {failed}")
         said = re.sub(r"<(style|pre|title|h1|svg|dl)\b.*?</\1>", "", html, flags=re.DOTALL)
         text = re.sub(r"<[^>]+>", "\n", said)
         self.read("report", text)
