@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -35,6 +36,23 @@ def write_atomic(path: str | os.PathLike[str], text: str) -> None:
         stream.write(text.encode("utf-8"))
 
 
+def check_place(path: str | os.PathLike[str]) -> None:
+    """See that a file could be written, before the work begins that it is for.
+
+    Raises
+    ------
+    InputError
+        There is no such folder, or a folder is in its place.
+    """
+    target = Path(os.path.realpath(path))
+    with suppress(OSError):  # what may not be looked at is told when it is written
+        if target.is_dir():
+            raise InputError(f"cannot write {path}: it is a folder", "name a file in it")
+        if not target.parent.is_dir():
+            what = os.strerror(errno.ENOENT)
+            raise InputError(f"cannot write {path}: {what}", "make its folder first")
+
+
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """Provide a stream whose content takes the place of a file when the block has ended well.
@@ -48,8 +66,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """
     target = Path(os.path.realpath(path))
     try:
-        if target.is_dir():
-            raise InputError(f"cannot write {path}: it is a folder", "name a file in it")
+        check_place(path)
         through = target.exists() and not target.is_file()
         with target.open("wb") if through else _replacing(target) as stream:
             yield stream

@@ -10,7 +10,7 @@ from rig import __version__
 from rig.analysis.curves import model_curves
 from rig.commands.output import progress, say, stage
 from rig.estimate.session import estimate
-from rig.files import make_folder, write_atomic
+from rig.files import check_place, make_folder, write_atomic
 from rig.films import read_films
 from rig.report.chapters import in_order
 from rig.report.contents import timelines_and_data
@@ -41,6 +41,7 @@ _NUMERICS = ("numpy", "scipy")
 
 def main(arguments: Namespace) -> int:
     """Write a session's report."""
+    check_place(arguments.output)
     with Session.open(arguments.session, readonly=True) as session:
         protocol = protocol_of(session)
         found = results(session, progress("analysing run"))
