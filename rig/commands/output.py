@@ -115,7 +115,7 @@ def named(cases: Iterable[_Case], wanted: str) -> list[_Case]:
     every = [*cases]
     chosen = [one for one in every if wanted in one.name]
     if not chosen:
-        names = ", ".join(one.name for one in every)
+        names = "; ".join(one.name for one in every)  # some have commas in them
         raise InputError(f"no case has {wanted!r} in its name", f"there are {names}")
     return chosen
 

@@ -106,4 +106,4 @@ def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, graded
 
 def test_a_case_that_is_none_is_named(tmp_path, capsys):
     assert main(["bench", "coverage", "-o", str(tmp_path), "--only", "steel"]) == 2
-    assert "lively strings" in capsys.readouterr().err
+    assert "there are model; resolved, damped strings; " in capsys.readouterr().err
