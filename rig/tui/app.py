@@ -24,6 +24,7 @@ from rig.tui.screens.ask import Ask, AskReason, Confirm, Pick
 from rig.tui.screens.help import Help
 from rig.tui.screens.palette import Choice, Palette
 from rig.tui.stillness import Stillness
+from rig.tui.terminal import Terminal
 from rig.tui.widgets.status import StatusBar
 from rig.tui.widgets.stopbar import StopBar, StopLine
 
@@ -153,7 +154,7 @@ class RigApp(App[None], inherit_bindings=False):
         client: ReconnectingClient | None = None,
         loaded: Callable[[], object] | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(driver_class=Terminal)
         self.options = options
         self.keys: Mapping[str, str] = keys
         self.action_of = {key: name for name, given in keys.items() for key in given.split(",")}
