@@ -422,6 +422,8 @@ class RigApp(App[None], inherit_bindings=False):
             self.action_do("stop")
             if isinstance(screen, (Help, Confirm, Pick)):
                 screen.dismiss(None)
+            elif key == "escape" and len(self.screen_stack) > 1 and screen.is_mounted:
+                screen.dismiss(None)  # a click has left its field
             return True
         if self._ends_countdown():
             return True

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def processes() -> Iterator[ProcessFixture]:
-    """Have a board and a daemon for a protocol of two runs."""
-    with ProcessFixture(runs=2, seed=3) as made:
+    """Have a board and a daemon for a protocol of one run."""
+    with ProcessFixture(runs=1, seed=3) as made:
         made.start_daemon()
         yield made
 

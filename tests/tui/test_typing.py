@@ -214,6 +214,20 @@ def test_a_click_on_a_line_that_is_gone_takes_nothing(session):
     run(work())
 
 
+def test_escape_leaves_a_dialog_whose_field_a_click_has_left(session):
+    async def work():
+        async with _screen(session) as (app, pilot):
+            await pilot.press("ctrl+p")
+            while not isinstance(app.screen, Palette):
+                await pilot.pause(0.01)
+            app.screen.set_focus(None)
+            await pilot.press("escape")
+            assert len(app.screen_stack) == 1
+            assert [method for _, method in app.client.told] == ["stop"]
+
+    run(work())
+
+
 def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async def work():
         async with _screen(session) as (app, pilot):
