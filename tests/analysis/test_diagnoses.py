@@ -99,8 +99,7 @@ def with_rods(protocol: Protocol, rods: int) -> Protocol:
     return replace(protocol, chains=chains)
 
 
-@pytest.mark.parametrize("rods", [24, 26, 27])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("rods", "seed"), [(24, 1), (26, 2), (27, 1)])
 def test_another_number_of_rods_is_void_and_counted(rods, seed):
     one = case(with_rods(UNIFORM, rods), MILD, incline=40.0, seed=seed)
     result = replace(one, protocol=UNIFORM).analyze()

@@ -111,7 +111,8 @@ def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port
 def test_a_port_that_cannot_be_opened_is_device_trouble(
     call, protocol, tmp_path, port, monkeypatch
 ):
-    monkeypatch.setattr("rig.link.client.BOOT_WAIT_S", 0.0)
+    monkeypatch.setattr("rig.recorder.recorder.BOOT_WAIT_S", 0.0)
+    monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.0)
     monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
     assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"), 4)
     if port != "loop://":  # it was never opened

@@ -192,6 +192,7 @@ def test_a_board_at_a_terminal(doctor):
 
 def test_nobody_at_a_port(doctor, terminal, monkeypatch):
     monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
+    monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
     code, out, err = doctor("--port", terminal)
     assert code == 4
     assert "board: the device did not answer Identify\n  do: " in out

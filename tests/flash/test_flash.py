@@ -184,6 +184,7 @@ def test_the_board_says_something_else(names, avrdude, flash):
 
 def test_the_board_says_nothing(avrdude, flash, monkeypatch):
     monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
+    monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
     with silent_port() as path:
         code, out, err = flash("--port", path)
     assert (code, out) == (4, "")
