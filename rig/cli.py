@@ -514,6 +514,9 @@ def _parser() -> Parser:
         "--only", metavar="TEXT", help="layouts with this in their names, such as '25 rods: 2 + 2'"
     )
     layouts.add_argument("--jobs", type=_count, metavar="N", help="layouts at a time")
+    layouts.add_argument(
+        "--more", action="store_true", help="add to what is in that folder, each drop on a new rig"
+    )
     _json(layouts)
     diagnoses = benches.add_parser("diagnoses", help="which faults of a rig are named rightly")
     diagnoses.set_defaults(module="bench_diagnoses")

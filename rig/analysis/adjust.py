@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,7 @@ PATIENT = 6
 has a slope on either side, and steps go to and fro over the best place, which lies between them."""
 _AGAIN = 0.5  # of the last step, taken back by the next one
 _KEPT = 0.1  # of the step before, beyond which a step with its slopes is none
+_NEAR_BY = 10.0  # standard uncertainties: so long a step slopes of an adjustment before allow
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 _MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
 
@@ -60,6 +61,9 @@ class Estimate:
         Whether the steps came to an end.
     plain
         JᵀWJ and JᵀWr in the unknowns' own units; nothing where no edges were adjusted.
+    near
+        With the slopes of all edges: what an adjustment of the same edges that begins here may
+        begin with. Nothing where they scatter more than assumed.
     """
 
     x: Array
@@ -71,6 +75,7 @@ class Estimate:
     scatter: float
     settled: bool = True
     plain: tuple[Array, Array] | None = None
+    near: NormalEquations | None = field(default=None, repr=False)
 
     @cached_property
     def covariance(self) -> Array:
@@ -81,7 +86,7 @@ class Estimate:
         """How far this is from other unknowns, see `length`."""
         return length(scaled(self.x - x, self.sd), self.information)
 
-    @property
+    @cached_property
     def degrees(self) -> float:
         """Degrees of freedom: edges less the unknowns that they determine."""
         return self.edges - self.x.size + float(np.trace(self.covariance))
@@ -94,6 +99,7 @@ def adjust(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
+    near: NormalEquations | None = None,
     *,
     rough: bool = False,
 ) -> Estimate:
@@ -113,6 +119,8 @@ def adjust(
         How short a step is the last, see `length`.
     steps
         How many there are at most.
+    near
+        Equations of the same edges about a point near by, see `Estimate`.
     rough
         Whether only the way matters, and edges are weighed as they were.
     """
@@ -121,10 +129,10 @@ def adjust(
     def equations(at: Array, inflation: float) -> NormalEquations:
         return normal_equations(model, matches, at, sd, inflation)
 
-    def again(at: Array, inflation: float, near: NormalEquations) -> NormalEquations | None:
+    def again(at: Array, inflation: float, near: NormalEquations) -> NormalEquations:
         return with_kept_slopes(model, matches, at, sd, inflation, near, rough=rough)
 
-    return least_squares(equations, sd, x, centre, done, steps, again, rough=rough)
+    return least_squares(equations, sd, x, centre, done, steps, again, near, rough=rough)
 
 
 def least_squares(
@@ -134,7 +142,8 @@ def least_squares(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
-    again: Callable[[Array, float, NormalEquations], NormalEquations | None] | None = None,
+    again: Callable[[Array, float, NormalEquations], NormalEquations] | None = None,
+    near: NormalEquations | None = None,
     *,
     rough: bool = False,
 ) -> Estimate:
@@ -146,39 +155,42 @@ def least_squares(
         Normal equations about a point, if the observations scatter so many times as assumed.
     sd
         Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
-    x, centre, done, steps, rough
+    x, centre, done, steps, near, rough
         As in `adjust`.
     again
         The same about a point near by, with the slopes that they had before: much quicker, and as
-        good while steps get shorter and shorter; nothing where these do not do.
+        good while steps get shorter and shorter.
     """
     y = scaled(x, sd)
     prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
     information = identity = np.eye(x.size)
     found: NormalEquations | None = None
-    chi2, moved = 0.0, 0.0
+    chi2, moved, most = 0.0, 0.0, 0.0
     inflation = damping = 1.0
     settled, kept, ahead = False, False, np.zeros_like(y)
+    if near is not None:
+        found, kept, most = near.in_units(sd), True, _NEAR_BY
+        information = found.matrix + identity
     for step in range(steps):
-        near = found if kept and again is not None else None
-        if near is not None and again is not None:
-            near = again(y * sd, inflation, near)
-        kept = near is not None
-        found = near or equations(y * sd, inflation)
-        if not kept:
-            information = found.matrix + identity
+        if kept and again is not None and found is not None:
+            found = again(y * sd, inflation, found)
+        else:
+            kept, found = False, equations(y * sd, inflation)
+        information = found.matrix + identity
         turned = ahead
         ahead = np.linalg.solve(information, prior - y - found.vector).astype(np.float64)
         size = length(ahead, information)
-        if kept and size > _KEPT * moved:
+        if kept and size > most:
             kept, ahead = False, turned  # slopes are others here: once more with these
             continue
         # Steps to and fro that get shorter end by themselves, and sooner.
-        taken_back = -(ahead @ information @ turned)
-        if step > PATIENT and taken_back > _AGAIN * length(turned, information) ** 2:
-            damping *= 0.5
+        if step > PATIENT:
+            taken_back = -(ahead @ information @ turned)
+            if taken_back > _AGAIN * length(turned, information) ** 2:
+                damping *= 0.5
         y = y + damping * ahead
         last, moved = moved, damping * size
+        most = _KEPT * moved
         previous, chi2 = chi2, found.chi2
         short = moved < done or (damping == 1.0 and moved**2 < done * last)
         # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
@@ -202,7 +214,16 @@ def least_squares(
         # As it is after the last step.
         plain = plain[0], plain[1] + plain[0] @ (damping * ahead * sd)
     return Estimate(
-        y * sd, sd, information, found.matrix, chi2, found.size, inflation, settled, plain
+        y * sd,
+        sd,
+        information,
+        found.matrix,
+        chi2,
+        found.size,
+        inflation,
+        settled,
+        plain,
+        found if inflation == 1.0 else None,
     )
 
 
@@ -247,8 +268,9 @@ def uncertainty(
     """
     inverse = estimate.covariance @ (gradient * estimate.sd)
     whole = math.sqrt(max(0.0, float(gradient * estimate.sd @ inverse)))
+    squares = (inverse * inverse).tolist()  # of blocks so short, Python's own sums are quicker
     parts = {
-        name: math.sqrt(sum(float(inverse[block] @ inverse[block]) for block in blocks))
+        name: math.sqrt(sum(sum(squares[block]) for block in blocks))
         for name, blocks in groups.items()
     }
     edges = math.sqrt(max(0.0, float(inverse @ estimate.data @ inverse)))

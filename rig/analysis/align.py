@@ -9,7 +9,7 @@ nobody else may have.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
+
+Item = TypeVar("Item", bound=np.generic)
 
 # Both together are the worth of a match: an edge 6 widths off is better called extra and missed.
 MISSED = 9.0
@@ -147,7 +149,7 @@ class Pairing:
             # What is left is a few edges: plain lists are quicker here than arrays.
             for row, column in _cheapest(costs.tolist()):
                 found[its.start + column] = self.number[mine[row]]
-        return np.split(found, self.ends[:-1]) if self.ends.size else []
+        return split(found, self.ends)
 
     def _windows(self, levels: Array, heights: Array, reach: float) -> tuple[Index, Index, Index]:
         """Find the expected edges that are near enough to each observed one.
@@ -173,6 +175,12 @@ class Pairing:
         end = np.searchsorted(np.minimum.accumulate(line[::-1])[::-1], mine + reach, side="right")
         rows = np.flatnonzero(end > begin)
         return rows, self.order[begin[rows]], self.order[end[rows] - 1] + 1
+
+
+def split(line: NDArray[Item], ends: Index) -> list[NDArray[Item]]:
+    """Cut a line of all trains' values at the end of each; much quicker than numpy does."""
+    stops = ends.tolist()
+    return [line[begin:end] for begin, end in zip([0, *stops], stops, strict=False)]
 
 
 def _cheapest(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:

@@ -84,10 +84,24 @@ class EdgeArrays:
         return bool(self.blocked.size and self.blocked.all())
 
     @cached_property
+    def order(self) -> Index:
+        """Edges of one channel after the other."""
+        return np.argsort(self.channels, kind="stable")
+
+    def of_channel(self, channel: int) -> Index:
+        """Return the numbers of one channel's edges."""
+        begin, end = np.searchsorted(self._ordered, [channel, channel + 1])
+        return self.order[begin:end]
+
+    @cached_property
+    def _ordered(self) -> Index:
+        return self.channels[self.order]
+
+    @cached_property
     def burst(self) -> Array:
         """How long the flicker of its gate lasts that each edge is part of, s; 0 if clean."""
-        order = np.argsort(self.channels, kind="stable")
-        times, channels = self.times[order], self.channels[order]
+        order, channels = self.order, self._ordered
+        times = self.times[order]
         apart = (np.diff(times) > QUICK) | (np.diff(channels) != 0)
         edge = np.ones(min(1, times.size), dtype=np.bool_)
         begins, ends = np.concatenate([edge, apart]), np.concatenate([apart, edge])
@@ -173,7 +187,7 @@ def edge_train(
         How far above the contact point each rod ends, m: what passes below that is not expected;
         `None` where nothing is struck.
     """
-    mine = np.flatnonzero(edges.channels == gate.channel)
+    mine = edges.of_channel(gate.channel)
     rods, blocks, levels = _passages(gate.height, chain, start, higher, edges.darkening)
     return EdgeTrain(
         number,

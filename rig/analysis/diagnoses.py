@@ -13,6 +13,7 @@ import numpy as np
 
 from rig.analysis.equations import scaled
 from rig.analysis.faults import name_of
+from rig.analysis.identify import MISSED
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -40,6 +41,8 @@ _ENOUGH = 3  # gates that see every rod
 _SOME = 3  # edges expected of a gate that say too little when they are missing
 _DEAD = "dead or not plugged in"
 _PAIR = 2  # edges of a rod
+_FEW_GATES = 8  # of which any two may be exchanged where some see something else
+_BY_CHANCE = 1e-4  # probability below which a rod that nobody saw is none
 
 
 class Diagnosis(NamedTuple):
@@ -51,15 +54,16 @@ class Diagnosis(NamedTuple):
         Numbers of the gates that see something else than they should.
     odd
         Whether edges are missing, or are too many, in a way that is hardly chance.
-    pile
-        Whether that is because rods come to rest above them, and nothing else is to be sought.
+    known
+        Whether what is wrong explains all of it, and nothing else is to be sought: rods come to
+        rest above gates, or one is missing.
     """
 
     void: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     suspects: tuple[int, ...] = ()
     odd: bool = False
-    pile: bool = False
+    known: bool = False
 
 
 def diagnose(fit: Fit) -> Diagnosis:
@@ -73,7 +77,14 @@ def diagnose(fit: Fit) -> Diagnosis:
     if not any(one.strange for one in alive if one.role == "free"):  # where nothing piles up
         under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
     if under:
-        return Diagnosis((_pile(model.protocol, under),), tuple(doubts), pile=True)
+        return Diagnosis((_pile(model.protocol, under),), tuple(doubts), known=True)
+    absent = [
+        why
+        for role, record in model.records.items()
+        if (why := _no_rod(record, [one for one in alive if one.role == role]))
+    ]
+    if absent and not any(one.strange for one in alive):
+        return Diagnosis(tuple(absent), tuple(doubts), known=True)
     for gate in alive:
         name = _name(model.protocol, gate.train)
         if gate.strange:
@@ -89,9 +100,34 @@ def diagnose(fit: Fit) -> Diagnosis:
     displaced += [one for pair in combinations(alive, 2) if _counts_crossed(*pair) for one in pair]
     off = [one for one in alive if one.off > IMPLAUSIBLE]
     suspects = dict.fromkeys(one.train.gate for one in [*displaced, *off])
+    strange = [one.train.gate for one in alive if one.strange]
+    if strange and len(gates) <= _FEW_GATES:
+        # A side of few gates is read well as another fall where one of them is the other side's.
+        suspects = dict.fromkeys([*strange, *(one.train.gate for one in alive)])
     odd = bool(void) or len(displaced) >= _PAIR
     odd |= any(_other_ends([one for one in alive if one.role == role]) for role in model.records)
     return Diagnosis(tuple(void), tuple(doubts), tuple(suspects), odd)
+
+
+def _no_rod(record: ChainRecord, gates: Sequence[_Seen]) -> str:
+    """Say which rod no gate saw, while its neighbours passed; nothing where that may be chance."""
+    rods = record.chain.chain.rods
+    due, seen = np.zeros(rods), np.zeros(rods)
+    for one in gates:  # at each of which a rod that leaves no trace leaves none of either side
+        due[np.unique(one.train.rods)] += 1.0
+        seen[np.unique(one.train.rods[one.match >= 0])] += 1.0
+    absent = np.flatnonzero((due > 0.0) & (seen == 0.0))
+    if absent.size != 1 or absent[0] in (0, rods - 1):
+        return ""  # at an end the chain may have less of them, or hang elsewhere
+    rod = int(absent[0])
+    others = due.sum() - due[rod]
+    missed = max(MISSED, (others - seen.sum()) / max(1.0, others))
+    if rods * missed ** due[rod] > _BY_CHANCE:
+        return ""
+    return (
+        f"no gate saw rod {rod + 1} of {rods} (from the bottom) of chain {record.chain.name} on "
+        f"the {record.role} side: it is missing there"
+    )
 
 
 def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[str]:

@@ -5,24 +5,16 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.align import Pairing
+from rig.analysis.align import Pairing, split
 from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.swing import drawn, lever, swing_sd
-from rig.analysis.trajectory import (
-    COMMON,
-    DRAG,
-    GRAVITY,
-    RELEASE,
-    START,
-    free_trajectory,
-    struck_trajectory,
-)
-from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, Unknowns
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SideColumns, Unknowns, alone, side_columns
 from rig.predictions import air_of
 from rig.units import Quantity
 
@@ -49,27 +41,6 @@ _ALIKE = 0.05
 """Scatter of impulses, relative to α, with which an adjustment begins: more may lead it astray."""
 
 
-class _Local(NamedTuple):
-    """The unknowns that one side knows of, by their places in its own equations.
-
-    Attributes
-    ----------
-    columns
-        Places in the drop's vector, shape ``(columns,)``; first those that move its trajectory.
-    at
-        Where each is among them, by the place in the drop's vector.
-    moving
-        How many move its trajectory.
-    path
-        Derivatives of the trajectory's parameters by these, shape ``(parameters, moving)``.
-    """
-
-    columns: Index
-    at: Index
-    moving: int
-    path: Array
-
-
 class DropModel:
     """One drop: its unknowns, and the equations that tie them to edges.
 
@@ -85,6 +56,8 @@ class DropModel:
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters; as the protocol states it if not given.
+    sides
+        Models of these same records: what was made of their trains need not be made again.
     air
         Whether κ is an unknown.
     """
@@ -96,6 +69,7 @@ class DropModel:
         guesses: Mapping[str, Guess],
         clock_u: float,
         components: Components | None = None,
+        sides: Sequence[DropModel] = (),
         *,
         air: bool = True,
     ) -> None:
@@ -107,11 +81,14 @@ class DropModel:
         self.guesses = guesses
         self.clock_u = clock_u
         self.components = components or stated(protocol)
+        made = {role: one for one in sides for role in one.records}
         self.expected: dict[str, Expected] = {
-            role: Expected.of(record, protocol) for role, record in self.records.items()
+            role: made[role].expected[role] if role in made else Expected.of(record, protocol)
+            for role, record in self.records.items()
         }
         self.pairings: dict[str, Pairing] = {
-            role: Pairing.of(record.trains) for role, record in self.records.items()
+            role: made[role].pairings[role] if role in made else Pairing.of(record.trains)
+            for role, record in self.records.items()
         }
         slopes: dict[str, float] = {
             record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
@@ -125,8 +102,9 @@ class DropModel:
         }
         self.unknowns = self._unknowns()
         self._local = {role: self._columns(role) for role in self.records}
-        # The last path and the last matches of each side: nothing older is asked for again.
+        # The last path, levels and matches of each side: nothing older is asked for again.
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
+        self._levels: dict[str, tuple[bytes, Array]] = {}
         self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
         self._fixed: dict[str, tuple[Seen, Index, Array]] = {}
 
@@ -178,28 +156,16 @@ class DropModel:
             unknowns.add("strings", "strings", pull)
         return unknowns
 
-    def _columns(self, role: str) -> _Local:
+    def _columns(self, role: str) -> SideColumns:
         """Leave out what the other side alone depends on."""
-        others = [f"{name} " for name in self.records if name != role]
-        if role == "free":
-            others += ["alpha", "impulses", "contact", "strike", "top", "strings"]
-        assert self.protocol.gates is not None
-        mine = np.ones(len(self.unknowns), dtype=np.bool_)
-        for name, block in self.unknowns.blocks.items():
-            mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
-        here = np.zeros(len(self.protocol.gates.gates), dtype=np.bool_)
-        here[[train.gate for train in self.records[role].trains]] = True
-        for name in ("beams", "ripple"):
-            if name in self.unknowns:
-                mine[self.unknowns[name]] &= here
-        mine[self.unknowns["datum"]] &= np.array(self.protocol.gates.posts) == role
-        path = self._parameters(role)
-        moves = mine & path.any(axis=0)
-        moving = np.flatnonzero(moves)
-        columns = np.concatenate([moving, np.flatnonzero(mine & ~moves)])
-        at = np.zeros(mine.size, dtype=np.intp)
-        at[columns] = np.arange(columns.size)
-        return _Local(columns, at, moving.size, path[:, moving])
+        record, gates = self.records[role], self.protocol.gates
+        assert gates is not None
+        here = tuple(train.gate for train in record.trains)
+        rods, drawn = 0, ()
+        if role == "impact":
+            rods = record.chain.chain.rods
+            drawn = tuple(self._drawn().tolist()) if "impact swing" in self.unknowns else ()
+        return side_columns(self.unknowns.places, role, here, gates.posts, rods, drawn)
 
     def stiff(self) -> DropModel:
         """Return the same drop with impulses that are nearly alike, the last one too."""
@@ -317,7 +283,7 @@ class DropModel:
         if "impact swing" in at:
             places -= x[at["impact swing"]] * self._drawn()
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        gains += x[at["strings"]] * _alone(places.size)
+        gains += x[at["strings"]] * alone(places.size)
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
@@ -340,30 +306,6 @@ class DropModel:
         found[..., local.columns[: local.moving]] = derivatives @ local.path
         return found
 
-    def _parameters(self, role: str) -> Array:
-        """Derivatives of a trajectory's parameters by all unknowns."""
-        at = self.unknowns
-        rods = self.records["impact"].chain.chain.rods if role == "impact" else 0
-        found = np.zeros((COMMON + 2 * rods, len(at)))
-        found[RELEASE, at[f"{role} release"]] = found[GRAVITY, at["gravity"]] = 1.0
-        if "drag" in at:
-            found[DRAG, at["drag"]] = 1.0
-        found[START, at["drop"]] = found[START, at[f"{role} hang"]] = 1.0
-        if role == "free" and "side" in at:
-            found[START, at["side"]] = 1.0
-        if role == "impact":
-            gains, places = slice(COMMON, COMMON + rods), slice(COMMON + rods, COMMON + 2 * rods)
-            row = np.arange(rods)
-            found[gains, at["alpha"]] = 1.0
-            found[COMMON + row, at["impulses"].start + row] = 1.0
-            found[gains, at["strings"].start] = _alone(rods)
-            found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
-            found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
-            found[-1, at["top"]] = 1.0
-            if "impact swing" in at:
-                found[places, at["impact swing"].start] = -self._drawn()
-        return found
-
     def _drawn(self) -> Array:
         """`drawn` of each rod of the chain that strikes, as it strikes."""
         record = self.records["impact"]
@@ -371,15 +313,18 @@ class DropModel:
 
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""
-        expected = self.expected[role]
-        return np.split(self._levels(role, x, expected), expected.ends)
+        return split(self.all_levels(role, x), self.expected[role].ends)
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Return `levels` of all trains in one line."""
-        return self._levels(role, x, self.expected[role])
+        asked = x.tobytes()
+        known = self._levels.get(role)
+        if known is None or known[0] != asked:
+            known = self._levels[role] = asked, self._all_levels(role, x)
+        return known[1]
 
-    def _levels(self, role: str, x: Array, edges: Expected | Seen) -> Array:
-        at = self.unknowns
+    def _all_levels(self, role: str, x: Array) -> Array:
+        at, edges = self.unknowns, self.expected[role]
         found: Array = edges.levels - edges.sign * x[at[f"{role} width"]]
         found += (x[at["beams"]] + x[at["datum"]][self._post])[edges.gate]
         found -= x[at[f"{role} rods"]][edges.rods]
@@ -403,7 +348,7 @@ class DropModel:
         seen = self._matched(role, matches)
         times = seen.times * (1.0 + x[self.unknowns["clock"]])
         height, speed = self.trajectory(role, x).heights(times)
-        values = height - self._levels(role, x, seen)
+        values = height - self.all_levels(role, x)[seen.pick]
         struck = _loose(self.trajectory(role, x), times, seen)
         return Residuals(values, self._sigma(seen, speed, struck), speed, seen.burst == 0.0, struck)
 
@@ -453,7 +398,7 @@ class DropModel:
         Then the level that it is of, and whether a rod had struck before.
         """
         path = self.trajectory(role, x)
-        levels = self._levels(role, x, seen)
+        levels = self.all_levels(role, x)[seen.pick]
         stamps = seen.times * (1.0 + float(x[self.unknowns["clock"]][0]))
         height, speed = path.heights(stamps)
         off = height - levels
@@ -506,9 +451,11 @@ class DropModel:
         if role == "impact":
             columns.append((at["top"].start, seen.alone.astype(np.float64)))
         edges = seen.times.size
-        rows = np.arange(edges) * self._local[role].columns.size
-        places = np.concatenate([rows + of[column] for column, _ in columns])
-        values = np.concatenate([np.broadcast_to(value, edges) for _, value in columns])
+        places = np.empty((len(columns), edges), dtype=np.intp)
+        values = np.empty((len(columns), edges))
+        for n, (column, value) in enumerate(columns):
+            places[n], values[n] = of[column], value
+        places += np.arange(edges) * self._local[role].columns.size
         self._fixed[role] = seen, places, values
         return places, values
 
@@ -517,11 +464,6 @@ def _loose(path: Trajectory, times: Array, seen: Seen) -> Flags:
     """Which edges are of rods that may be off their chain: a rod has struck, others still fall."""
     found: Flags = path.hit_before(times) & ~seen.alone
     return found
-
-
-def _alone(rods: int) -> Array:
-    """How far each pull is on one rod alone, shape ``(rods,)``: 1/M² for M rods above."""
-    return above(rods) ** -2.0
 
 
 def prior_air(protocol: Protocol) -> tuple[float, float]:

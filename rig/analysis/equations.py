@@ -28,7 +28,7 @@ HUBER = 4.0
 """Standard deviations beyond which an edge counts less."""
 STRAY = 6.0
 """Standard deviations: no rod is that far off once everything was adjusted."""
-_ALIKE = 0.01  # by which the root of an edge's weight may differ where slopes are kept
+_ALIKE = 0.01  # by which the root of an edge's weight may differ and still be the same
 
 
 class Residuals(NamedTuple):
@@ -92,15 +92,17 @@ class Seen(NamedTuple):
 
     Attributes
     ----------
+    pick
+        Which of the expected edges each is.
     paired
         Whether the next edge is the other side of the same rod at the same gate.
     """
 
+    pick: Index
     times: Array
     burst: Array
     rods: Index
     gate: Index
-    levels: Array
     sign: Array
     turn: Array
     drawn: Array
@@ -126,7 +128,7 @@ class Expected(NamedTuple):
     alone
         Whether all rods below have struck: only the top rod falls.
     begins, ends
-        Number of observed edges before each gate, and of expected ones after each but the last.
+        Number of observed edges before each gate, and of expected ones after each.
     """
 
     times: Array
@@ -164,7 +166,7 @@ class Expected(NamedTuple):
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
             np.cumsum(observed) - observed,
-            np.cumsum(expected)[:-1],
+            np.cumsum(expected),
         )
 
     def chosen(self, matches: Sequence[Index]) -> tuple[Index, Index]:
@@ -178,11 +180,11 @@ class Expected(NamedTuple):
         """Join the expected edges that are matched and the observed edge of each."""
         pick, edge = self.chosen(matches)
         return Seen(
+            pick,
             self.times[edge],
             self.burst[edge],
             self.rods[pick],
             self.gate[pick],
-            self.levels[pick],
             self.sign[pick],
             self.turn[pick],
             self.drawn[pick],
@@ -233,6 +235,22 @@ class KeptSlopes(NamedTuple):
     weights: Array
     scale: Array
 
+    def weighing(self, edges: Index, weights: Array, scale: Array) -> KeptSlopes:
+        """Return the same with other weights of some edges."""
+        new = KeptSlopes(self.slopes.copy(), self.columns, self.weights.copy(), self.scale.copy())
+        new.slopes[edges] *= (scale[edges] / self.scale[edges])[:, None]
+        new.weights[edges], new.scale[edges] = weights[edges], scale[edges]
+        return new
+
+    def placed(self, rows: Sequence[int], places: Sequence[int]) -> KeptSlopes:
+        """Return the same of a vector that has each of the unknowns `rows` at `places`."""
+        position = np.full(max(rows) + 1, -1)
+        position[self.columns] = np.arange(self.columns.size)
+        mine = position[np.array(rows)]
+        found = mine >= 0
+        columns = np.array(places)[found]
+        return self._replace(slopes=self.slopes[:, mine[found]], columns=columns)
+
 
 @dataclass(frozen=True, slots=True)
 class NormalEquations:
@@ -258,6 +276,12 @@ class NormalEquations:
     size: int
     plain: tuple[Array, Array] | None = None
     slopes: Mapping[str, KeptSlopes] = field(default_factory=dict)
+
+    def in_units(self, sd: Array) -> NormalEquations:
+        """Return the same where other priors are the units."""
+        assert self.plain is not None
+        matrix, vector = self.plain
+        return replace(self, matrix=matrix * np.outer(sd, sd), vector=vector * sd)
 
 
 def plain_equations(residuals: Array, slopes: Array, sd: Array) -> NormalEquations:
@@ -327,7 +351,7 @@ def with_kept_slopes(
     near: NormalEquations,
     *,
     rough: bool = False,
-) -> NormalEquations | None:
+) -> NormalEquations:
     """Set up the normal equations about a point that is near another one, with its slopes.
 
     That takes a quarter of the time: what is left over of each edge is new, where it leads is not.
@@ -338,23 +362,34 @@ def with_kept_slopes(
         Those about the other point; the rest as in `normal_equations`.
     rough
         Whether edges may count as they did there.
-
-    Returns
-    -------
-    NormalEquations or None
-        Nothing where an edge counts otherwise now, and may not.
     """
     assert near.plain is not None
-    vector, chi2 = np.zeros(x.size), 0.0
+    matrix, vector, chi2 = near.plain[0], np.zeros(x.size), 0.0
+    kept = dict(near.slopes)
     for role, match in matches.items():
         left, old = model.left_over(role, x, match), near.slopes[role]
         residuals, weights, scale = _weighed(left, inflation)
-        if not rough and np.abs(weights - old.weights).max(initial=0.0) > _ALIKE:
-            return None
+        other = np.flatnonzero(np.abs(weights - old.weights) > _ALIKE)
+        if other.size and not rough:
+            # Few edges count otherwise than there.
+            kept[role] = new = old.weighing(other, weights, scale)
+            place = np.ix_(old.columns, old.columns)
+            more, less = new.slopes[other], old.slopes[other]
+            matrix = matrix.copy()
+            matrix[place] += more.T @ more - less.T @ less
+            old = new
         scale = old.scale if rough else scale**2 / old.scale
         vector[old.columns] += (left.values * scale) @ old.slopes
         chi2 += float(residuals @ residuals)
-    return replace(near, vector=vector * sd, chi2=chi2, plain=(near.plain[0], vector))
+    same = matrix is near.plain[0]
+    return replace(
+        near,
+        matrix=near.matrix if same else matrix * np.outer(sd, sd),
+        vector=vector * sd,
+        chi2=chi2,
+        plain=(matrix, vector),
+        slopes=kept,
+    )
 
 
 def _weighed(

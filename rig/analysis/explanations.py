@@ -54,6 +54,7 @@ _VOTED = 0.8  # share of all expected edges that must vote for a fall with a fau
 _TRIED = 4  # faults that are weighed: those that most edges ask for
 _STEPS = 4  # of the search for a size
 _DONE = 0.1  # standard uncertainties: a step so short is the last
+_TOLD = 3.0  # standard uncertainties: a smaller size may as well be none
 _LEFT = 12.5  # gain that another fault may still have beside one that explains everything: 5 σ
 
 
@@ -139,12 +140,12 @@ class Explainer:
                 read_side(self.setting.protocol, one, self.clock_u, self.components)
                 for one in records
             ]
-            stated = sum(one.evidence for one in sides if one is not None)
+            stated = sum(_freely(one) for one in sides if one is not None)
             stated = self._absolute(self.setting, stated)
             others, well = self.faults, False
         else:
             reading = weighed(fit)
-            stated = self._absolute(self.setting, reading.evidence)
+            stated = self._absolute(self.setting, _freely(reading))
             gains, well = np.array(self._gains(fit)), well_read(reading)
             ranked = np.argsort(gains)[::-1][:_TRIED]
             # Of a good reading the score tells beforehand which search would end in vain; air that
@@ -209,7 +210,7 @@ class Explainer:
                     # What one side lacks, the other cannot make up for.
                     least=record.expected - (1.0 - _VOTED) * expected,
                 )
-                self._votes[key] = tried[0].votes if tried else 0
+                self._votes[key] = next((one.votes for one in tried), 0)
             votes += self._votes[key]
         return votes / max(1, expected), 2 * votes - expected
 
@@ -254,21 +255,34 @@ class Explainer:
             if other.evidence < reading.evidence:
                 break
             size, reading = tried, other
-        if not size:
-            return None
+        if not abs(size) > _TOLD * score.u:
+            return None  # it is better read for another reason than that
         return self._explanation(fault, size, score.u, reading, _occam(fault, score.u), stated)
 
     def _explanation(
         self, fault: Fault, size: float, u: float, reading: Reading, occam: float, stated: float
     ) -> Explanation:
         left = max((score.gain for score in self._scores(reading.fit)), default=0.0)
-        evidence = self._absolute(fault.change(self.setting, size), reading.evidence)
+        evidence = self._absolute(fault.change(self.setting, size), _freely(reading))
         return Explanation(
             fault,
             fault.words(size, u),
             evidence - occam - RARE - stated,
             well_read(reading) and left < _LEFT,
         )
+
+
+def _freely(reading: Reading) -> float:
+    """Evidence of a reading where a rod that leaves no trace at a gate is one thing, and not two.
+
+    Else a rod at an end that no gate saw by chance would be taken for one that does not hang there.
+    """
+    unseen = sum(
+        len({*train.rods.tolist()} - {*train.rods[match >= 0].tolist()})
+        for role, record in reading.fit.model.records.items()
+        for train, match in zip(record.trains, reading.fit.matches[role], strict=True)
+    )
+    return reading.evidence - unseen * math.log(MISSED)
 
 
 def _occam(fault: Fault, u: float) -> float:

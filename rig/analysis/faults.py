@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _MORE = 3  # rods by which a chain may differ
+_WIDER = 0.5  # of its thinnest rod, by which rods may look thicker or thinner
 
 
 class Premise(NamedTuple):
@@ -106,6 +107,7 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
         if one.chain.rods > 1:  # one object has no length, and is no chain with rods missing
             yield _length(group, who, one.chain.heights[-1])
             yield _rods(group, who, one.chain.rods)
+        yield _thickness(group, who, protocol.one_object, min(one.widths))
     for role, name in names.items():
         if upside_down(protocol.chains[name]) is not None:
             yield _turned(name, role)
@@ -143,6 +145,22 @@ def _rods(names: set[str], who: str, rods: int) -> Fault:
     )
 
 
+def _thickness(names: set[str], who: str, one_object: bool, width: float) -> Fault:
+    return Fault(
+        _with_chains(names, _widened),
+        lambda d, u: (
+            f"{'what falls' if one_object else f'every rod of {who}'} looks {_size(d, u)} "
+            f"{'thicker' if d > 0 else 'thinner'} than the protocol says"
+        ),
+        (-_WIDER * width, _WIDER * width),
+        lambda model: {
+            f"{role} width": 1.0
+            for role, record in model.records.items()
+            if record.chain.name in names
+        },
+    )
+
+
 def _turned(name: str, role: str) -> Fault:
     return Fault(
         _with_chains({name}, lambda chain, _: upside_down(chain) or chain),
@@ -158,7 +176,7 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
             drop=Quantity(setting.protocol.drop.value + d, setting.protocol.drop.u),
         ),
         lambda d, u: (
-            f"{'it begins' if protocol.one_object else 'the chains hang'} {_size(d, u)} "
+            f"{_hanging(protocol)} {_size(d, u)} "
             f"{_above(d)} above the contact point than the protocol says"
         ),
         _grid(60e-3, 10e-3),
@@ -200,6 +218,12 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
         _grid(0.10, 0.02),
         lambda model: {"gravity": model.protocol.gravity.value},
     )
+
+
+def _hanging(protocol: Protocol) -> str:
+    if protocol.one_object:
+        return "it begins"
+    return "the chains hang" if protocol.two_chains else "the chain hangs"
 
 
 def _post(side: str) -> Fault:
@@ -286,6 +310,10 @@ def _with_chains(
 def _stretched(chain: RodChain, by: float) -> RodChain:
     heights = tuple(height * (1.0 + by) for height in chain.chain.heights)
     return replace(chain, chain=replace(chain.chain, heights=heights))
+
+
+def _widened(chain: RodChain, by: float) -> RodChain:
+    return replace(chain, widths=tuple(width + by for width in chain.widths))
 
 
 def _with_more(chain: RodChain, more: float) -> RodChain:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,11 +12,12 @@ from rig.analysis.equations import STRAY
 from rig.analysis.pattern import middle
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
+    from rig.analysis.equations import NormalEquations
     from rig.analysis.pattern import Guess
 
     Array = NDArray[np.float64]
@@ -38,6 +39,11 @@ _MEDIAN = 0.6745  # of |normal numbers|, in standard deviations
 _MOST = 1.5  # by which few edges may happen to scatter more
 
 
+def count_matched(side: Sequence[Index]) -> int:
+    """Count the edges of a side that belong to a rod."""
+    return int(np.count_nonzero(np.concatenate(side) >= 0))
+
+
 @dataclass(frozen=True, slots=True)
 class Matched:
     """A drop's unknowns, and which edge is which rod."""
@@ -48,7 +54,7 @@ class Matched:
     @property
     def matched(self) -> int:
         """Number of edges that belong to a rod."""
-        return sum(int((match >= 0).sum()) for side in self.matches.values() for match in side)
+        return sum(map(count_matched, self.matches.values()))
 
     @property
     def rods(self) -> dict[int, int]:
@@ -81,6 +87,7 @@ def settle(
     steps: int = STEPS,
     x: Array | None = None,
     done: float = CLOSE,
+    near: NormalEquations | None = None,
 ) -> Fit:
     """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
 
@@ -98,6 +105,8 @@ def settle(
         already to what they should.
     done
         Of a standard uncertainty: how short the last step is.
+    near
+        Of these matches, see `rig.analysis.adjust.adjust`.
     """
     begun = x is not None and matches is not None
     x = model.first() if x is None else x
@@ -106,20 +115,24 @@ def settle(
         matches = match(model, x, _COARSE)
     # Not to the end where the matches are about to change.
     estimate = adjust(
-        stiff, matches, x, done=done if begun else _NEAR, steps=steps, rough=not begun
+        stiff, matches, x, done=done if begun else _NEAR, steps=steps, near=near, rough=not begun
     )
     last = model if begun else None
     for round_ in range(rounds):
         x, before = estimate.x, matches
         matches = without_strays(model, x, match(model, x), estimate.scatter)
         now = model if round_ else stiff
+        near = None
         if _alike(matches, before):
             matches = before  # what was made for these is at hand
             if now is last:
                 break
-        estimate = adjust(now, matches, x, done=done, steps=steps, rough=now is not model)
+            near = estimate.near
+        estimate = adjust(
+            now, matches, x, done=done, steps=steps, near=near, rough=now is not model
+        )
         last = now
-        if round_ and estimate.beyond(x) < max(_SAME, done):
+        if now is model and estimate.beyond(x) < max(_SAME, done):
             break
     return Fit(model, matches, estimate)
 
@@ -152,7 +165,8 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
     """
     x, clock = begun.x.copy(), model.unknowns["clock"]
     x[clock] = (1.0 + x[clock]) * rate - 1.0
-    return Fit(model, begun.matches, adjust(model, begun.matches, x))
+    estimate = adjust(model, begun.matches, x)
+    return Fit(model, begun.matches, replace(estimate, near=None))  # larger than all the rest
 
 
 def first_match(model: DropModel) -> Matches:

@@ -17,8 +17,8 @@ import numpy as np
 
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel, prior_air
-from rig.analysis.equations import HUBER, scaled
-from rig.analysis.fit import ROUGHLY, Fit, first_match, settle
+from rig.analysis.equations import HUBER, KeptSlopes, NormalEquations, scaled
+from rig.analysis.fit import ROUGHLY, Fit, count_matched, first_match, settle
 from rig.analysis.pattern import (
     AIRS,
     ANY_ALPHA,
@@ -33,7 +33,7 @@ from rig.analysis.pattern import (
 from rig.analysis.pattern import guesses as votes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -170,7 +170,8 @@ def read_side(
     """Read one side quickly, near where its edges are if they come one by one as expected."""
     side = _Side(protocol, record, clock_u, components)
     near, kappa = around_order(protocol, record), prior_air(protocol)[0]
-    found = side.judged(side.guesses(near, kappa, 0.0, near_alpha(record))[:_QUICK])
+    tried = side.guesses(near, kappa, 0.0, near_alpha(record))
+    found = side.judged(itertools.islice(tried, _QUICK))
     return found[0] if found else None
 
 
@@ -239,6 +240,8 @@ class _Side:
         Whether what the air does is known already.
     begun
         Falls that were adjusted, as they were guessed: nothing is adjusted twice.
+    models
+        That of the first guess: what was made of the trains is not made again for others.
     """
 
     protocol: Protocol
@@ -247,6 +250,7 @@ class _Side:
     components: Components
     told: bool = True
     begun: list[Trajectory] = field(default_factory=list)
+    models: list[DropModel] = field(default_factory=list)
 
     def readings(self, window: Span, kappa: float, clock: float) -> list[Reading]:
         """Judge the guesses within a window, those first that are known to be near."""
@@ -285,10 +289,10 @@ class _Side:
         clock: float,
         alphas: Span = ANY_ALPHA,
         pull: float = 0.0,
-    ) -> list[Guess]:
+    ) -> Iterator[Guess]:
         drop, gravity = self.protocol.drop, self.protocol.gravity.value + pull
         found = votes(self.record, drop, gravity, kappa, clock, window, alphas, self.least)
-        return [replace(one, pull=pull) for one in found] if pull else found
+        return (replace(one, pull=pull) for one in found) if pull else found
 
     def _pulls(self) -> list[float]:
         """Accelerations to try beside the stated one, so near that votes overlap."""
@@ -308,7 +312,8 @@ class _Side:
         """Share of the expected edges that vote for the same fall, at most."""
         drop, gravity = self.protocol.drop, self.protocol.gravity.value
         tried = votes(self.record, drop, gravity, window=window, alphas=near_alpha(self.record))
-        return min(1.0, max((one.votes for one in tried), default=0) / max(1, self.record.expected))
+        most = next((one.votes for one in tried), 0)
+        return min(1.0, most / max(1, self.record.expected))
 
     def judged(self, tried: Iterable[Guess]) -> list[Reading]:
         """Adjust one guess after another while a better one may still come."""
@@ -327,7 +332,10 @@ class _Side:
                 {self.record.role: one},
                 self.clock_u,
                 self.components,
+                self.models[:1],
             )
+            if not self.models:
+                self.models.append(model)
             if self._known(model, one, enough):
                 continue
             matches = first_match(model)
@@ -473,14 +481,16 @@ def _together(
         if len(pair) == 1:
             # One side is all there is: the same, to the end.
             fit = pair[0].fit
-            tried.append(weighed(settle(fit.model, fit.matches, x=fit.x)))
+            tried.append(weighed(settle(fit.model, fit.matches, x=fit.x, near=fit.estimate.near)))
             continue
         begin: dict[str, Guess] = {
             role: adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)
         }
         matches = {role: one.fit.matches[role] for role, one in zip(roles, pair, strict=True)}
-        model = DropModel(protocol, records, begin, clock_u, components)
-        tried.append(weighed(settle(model, matches, x=_begun(model, pair))))
+        sides = [one.fit.model for one in pair]
+        model = DropModel(protocol, records, begin, clock_u, components, sides)
+        x, near = _begun(model, pair)
+        tried.append(weighed(settle(model, matches, x=x, near=near)))
     best, *rest = _best(tried)
     if not best.evidence > 0.0:
         return Identification(None, _shares(best.fit))
@@ -492,14 +502,16 @@ def _together(
     return Identification(fit, _shares(fit), odds, best.evidence, other)
 
 
-def _begun(model: DropModel, sides: Sequence[Reading]) -> Array:
+def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, NormalEquations | None]:
     """Unknowns of both sides together, as far as each side has told them by itself.
 
     Each side's equations at its own estimate, one below the other: were they linear, this would be
-    the solution of all.
+    the solution of all. With them goes what an adjustment may begin with.
     """
     at, size = model.unknowns, len(model.unknowns)
     matrix, vector = np.zeros((size, size)), np.zeros(size)
+    slopes: dict[str, KeptSlopes] = {}
+    edges = 0
     for side in sides:
         (role,), own, estimate = side.fit.matches, side.fit.model.unknowns, side.fit.estimate
         assert estimate.plain is not None
@@ -515,9 +527,15 @@ def _begun(model: DropModel, sides: Sequence[Reading]) -> Array:
         seen, left = estimate.plain
         matrix[np.ix_(places, places)] += seen[np.ix_(rows, rows)]
         vector[places] += (seen @ x - left)[rows]
+        edges += estimate.edges
+        if estimate.near is not None:
+            slopes[role] = estimate.near.slopes[role].placed(rows, places)
     sd = at.sd
     told = matrix * np.outer(sd, sd) + np.eye(size)
-    return np.asarray(sd * np.linalg.solve(told, sd * vector), dtype=np.float64)
+    x = np.asarray(sd * np.linalg.solve(told, sd * vector), dtype=np.float64)
+    if len(slopes) < len(sides):
+        return x, None
+    return x, NormalEquations(told, vector, 0.0, edges, (matrix, vector), slopes)
 
 
 def weighed(fit: Fit) -> Reading:
@@ -530,11 +548,10 @@ def _begins(fit: Fit) -> list[Guess]:
 
 
 def _shares(fit: Fit) -> dict[str, float]:
-    found = {}
-    for role, record in fit.model.records.items():
-        matched = sum(int(np.count_nonzero(match >= 0)) for match in fit.matches[role])
-        found[role] = matched / max(1, record.expected)
-    return found
+    return {
+        role: count_matched(fit.matches[role]) / max(1, record.expected)
+        for role, record in fit.model.records.items()
+    }
 
 
 def _likely(protocol: Protocol, pair: Sequence[Reading]) -> float:

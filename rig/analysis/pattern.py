@@ -8,6 +8,7 @@ off. All moments with many votes are kept; `rig.analysis.identify` judges betwee
 
 from __future__ import annotations
 
+import heapq
 import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,7 +18,7 @@ import numpy as np
 from rig.analysis.free_flight import fall_through, lasting, reach_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -116,8 +117,10 @@ def guesses(
     window: Span = EVER,
     alphas: Span = ANY_ALPHA,
     least: float = 0.0,
-) -> list[Guess]:
+) -> Iterator[Guess]:
     """Find all moments for which many edges of a chain vote, those with the most first.
+
+    Each is sought only when it is asked for.
 
     Parameters
     ----------
@@ -135,17 +138,20 @@ def guesses(
     slack = slack_of(record)
     pairs = _pairs(record, clock)
     if pairs.times.size == 0:
-        return []
-    found: list[Guess] = []
-    for height in _heights(start, slack):
+        return
+
+    def begun_at(height: float) -> Iterator[Guess]:
         tried = _alphas(record, height, gravity, kappa, slack, alphas)
         paths = _paths(record, height, gravity, kappa, tried)
         for release, path, votes in _moments(pairs, paths, slack, window, least):
-            alpha = float(paths.alphas[path])
-            found.append(Guess(release, height, alpha, kappa, clock, votes))
-    found.sort(key=lambda one: -one.votes)
-    most = found[0].votes if found else 0
-    return [one for one in found if one.votes >= _FEWEST * most][:_KEPT]
+            yield Guess(release, height, float(paths.alphas[path]), kappa, clock, votes)
+
+    most = 0
+    for one in itertools.islice(merged(*map(begun_at, _heights(start, slack))), _KEPT):
+        most = max(most, one.votes)
+        if one.votes < _FEWEST * most:
+            return
+        yield one
 
 
 def _heights(start: Quantity, slack: float) -> list[float]:
@@ -382,6 +388,6 @@ def middle(values: Array) -> float:
     return float(np.sort(values)[values.size // 2])
 
 
-def merged(*several: Sequence[Guess]) -> list[Guess]:
-    """Put several lists of guesses in one, those with the most votes first."""
-    return sorted(itertools.chain.from_iterable(several), key=lambda one: -one.votes)
+def merged(*several: Iterable[Guess]) -> Iterator[Guess]:
+    """Put several rows of guesses in one, those with the most votes first, as each row has them."""
+    return heapq.merge(*several, key=lambda one: -one.votes)

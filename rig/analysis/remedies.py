@@ -22,6 +22,11 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
         r"has \d+ rods, not",
         "hang the chain that the protocol describes, or write its rods into the protocol",
     ),
+    ("no gate saw rod", "hang the rod in, or write the chain's own spacing into the protocol"),
+    (
+        "looks .* (thicker|thinner)",
+        "measure the rods' diameter again, and how wide the beams are, and write what a beam sees",
+    ),
     ("(longer|shorter) than", "measure the chain's length again and write it into the protocol"),
     (
         "gates are .* (higher|lower)",
@@ -29,7 +34,7 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
     ),
     ("post is .* (higher|lower)", "measure that post's zero against the other post's"),
     (
-        "(chains hang|it begins) .* (higher|lower)",
+        "(chains? hangs?|it begins) .* (higher|lower)",
         "measure the drop again and write it into the protocol",
     ),
     ("clock is", "say how well the timer's clock is known, or compare it: rig import --help"),

@@ -5,13 +5,16 @@ Some of it is the rig's and the chains' own, the same in every drop (`SharedUnkn
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.components import above
+from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -72,6 +75,11 @@ class Unknowns:
         """Place of each block in the vector, by name."""
         return self._blocks
 
+    @property
+    def places(self) -> tuple[tuple[str, int, int], ...]:
+        """Name, beginning and end of each block."""
+        return tuple((name, block.start, block.stop) for name, block in self._blocks.items())
+
     @cached_property
     def sd(self) -> Array:
         """Prior standard uncertainties once all are added, shape ``(unknowns,)``."""
@@ -81,6 +89,103 @@ class Unknowns:
     def groups(self) -> dict[str, list[slice]]:
         """Blocks of each line of the uncertainty budget."""
         return self._groups
+
+
+class SideColumns(NamedTuple):
+    """The unknowns that one side knows of, by their places in its own equations.
+
+    Attributes
+    ----------
+    columns
+        Places in the drop's vector, shape ``(columns,)``; first those that move its trajectory.
+    at
+        Where each is among them, by the place in the drop's vector.
+    moving
+        How many move its trajectory.
+    path
+        Derivatives of the trajectory's parameters by these, shape ``(parameters, moving)``.
+    """
+
+    columns: Index
+    at: Index
+    moving: int
+    path: Array
+
+
+@lru_cache(maxsize=64)  # a session asks for the same few again and again
+def side_columns(
+    places: tuple[tuple[str, int, int], ...],
+    role: str,
+    gates: tuple[int, ...],
+    posts: tuple[str, ...],
+    rods: int,
+    drawn: tuple[float, ...],
+) -> SideColumns:
+    """Leave out what the other side alone depends on.
+
+    Parameters
+    ----------
+    places
+        As in `Unknowns`.
+    gates
+        Numbers of those beside this side's chain.
+    posts
+        Sides that have a post, in order.
+    rods
+        Of the chain that strikes; 0 for the free side.
+    drawn
+        See `rig.analysis.swing.drawn`, of each of these rods as it strikes; none where it does not
+        swing.
+    """
+    at = {name: slice(begin, end) for name, begin, end in places}
+    others = ["impact " if role == "free" else "free "]
+    if role == "free":
+        others += ["alpha", "impulses", "contact", "strike", "top", "strings"]
+    mine = np.ones(places[-1][2], dtype=np.bool_)
+    for name, block in at.items():
+        mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
+    for name in ("beams", "ripple"):
+        if name in at:
+            mine[at[name]] &= np.isin(np.arange(at[name].stop - at[name].start), gates)
+    mine[at["datum"]] &= np.array(posts) == role
+    path = _path(at, role, mine.size, rods, drawn)
+    moves = mine & path.any(axis=0)
+    moving = np.flatnonzero(moves)
+    columns = np.concatenate([moving, np.flatnonzero(mine & ~moves)])
+    place = np.zeros(mine.size, dtype=np.intp)
+    place[columns] = np.arange(columns.size)
+    return SideColumns(columns, place, moving.size, path[:, moving])
+
+
+def _path(
+    at: Mapping[str, slice], role: str, size: int, rods: int, drawn: tuple[float, ...]
+) -> Array:
+    """Derivatives of a trajectory's parameters by all unknowns."""
+    found = np.zeros((COMMON + 2 * rods, size))
+    found[RELEASE, at[f"{role} release"]] = found[GRAVITY, at["gravity"]] = 1.0
+    if "drag" in at:
+        found[DRAG, at["drag"]] = 1.0
+    found[START, at["drop"]] = found[START, at[f"{role} hang"]] = 1.0
+    if role == "free" and "side" in at:
+        found[START, at["side"]] = 1.0
+    if role == "impact":
+        gains, places = slice(COMMON, COMMON + rods), slice(COMMON + rods, COMMON + 2 * rods)
+        row = np.arange(rods)
+        found[gains, at["alpha"]] = 1.0
+        found[COMMON + row, at["impulses"].start + row] = 1.0
+        found[gains, at["strings"].start] = alone(rods)
+        found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
+        found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
+        found[-1, at["top"]] = 1.0
+        if drawn:
+            found[places, at["impact swing"].start] = -np.array(drawn)
+    return found
+
+
+def alone(rods: int) -> Array:
+    """How far each pull is on one rod alone, shape ``(rods,)``: 1/M² for M rods above."""
+    found: Array = above(rods) ** -2.0
+    return found
 
 
 class SharedUnknowns:

@@ -94,7 +94,7 @@ def judge(
     void += unlike
     if fit is not None:
         faults = diagnose(fit)
-        if faults.pile:  # all else that is odd follows from it
+        if faults.known:  # all else that is odd follows from it
             return Judgement("void", (*void, *faults.void), known=True)
         # A motion in the wrong air tells nothing of the gates.
         accused, suspects = _other_air(fit) or faults.void, faults.suspects

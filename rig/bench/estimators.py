@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.drop import fit_drop
+from rig.analysis.joint_fit import joint_fit
 from rig.analysis.monte_carlo import monte_carlo
 from rig.analysis.quantities import measurands
 from rig.analysis.result import GOOD
 from rig.bench.accuracy import repeated
-from rig.bench.baselines import TimerReading, line_fit, two_gate_timer
+from rig.bench.baselines import TimerReading, line_fit, plain_fit, two_gate_timer
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
 from rig.results import detailed, protocol_of
 from rig.runner import Operator, run_protocol
 from rig.session.store import Session
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -85,7 +87,7 @@ def estimators(
     repeats: int,
     budget_s: float,
     say: Callable[[str], None],
-) -> tuple[list[Estimator], list[str]]:
+) -> tuple[list[Estimator], list[str], dict[str, float]]:
     """Simulate a session and try every estimator on the same drops.
 
     Parameters
@@ -101,8 +103,9 @@ def estimators(
 
     Returns
     -------
-    estimators, left_out
-        And what was left out, in words.
+    estimators, left_out, times_lstsq
+        And what was left out, in words; and what the adjustments take, over one
+        ``numpy.linalg.lstsq`` a chain with as many edges and unknowns.
 
     Raises
     ------
@@ -137,6 +140,10 @@ def estimators(
         if fit is not None:
             cases.append(_Case(scene, one.run, drops[key], scale, fit, truths[key]))
     alone_s = (time.process_time() - begin) / max(1, len(good))
+    begin = time.process_time()
+    for one, key in zip(good, keys, strict=True):
+        one_thread(plain_fit)(scene, drops[key], one, clock.scale(drops[key]).hz)
+    plain_s = (time.process_time() - begin) / max(1, len(good))
     if not cases:
         raise InputError("no good drop to compare", "take fewer disturbances, or more repeats")
     session_readings = [
@@ -176,7 +183,11 @@ def estimators(
             say(f"{name}, M = {trials:.0e}: {took:.1f} s")
             seconds = alone_s + took / len(cases)  # it begins with that fit
             found.append(_point(name, trials, seconds, values, ours))
-    return found, left_out
+    begin = time.process_time()
+    joint_fit([one.fit for one in cases])
+    joint_s = (time.process_time() - begin) / len(cases)
+    times = {"one-run fit": alone_s / plain_s, "joint fit alone": joint_s / plain_s}
+    return found, left_out, times
 
 
 def drawn(fit: Fit, draws: int, seed: int) -> TimerReading:
@@ -225,9 +236,16 @@ def drawn(fit: Fit, draws: int, seed: int) -> TimerReading:
     return TimerReading(*(total / draws).tolist())
 
 
-def as_json(found: list[Estimator], left_out: list[str]) -> dict[str, Any]:
+def as_json(
+    found: list[Estimator], left_out: list[str], times_lstsq: dict[str, float]
+) -> dict[str, Any]:
     """As ``rig bench estimators --json`` prints it."""
-    return {"simulated": True, "estimators": [asdict(one) for one in found], "left_out": left_out}
+    return {
+        "simulated": True,
+        "estimators": [asdict(one) for one in found],
+        "left_out": left_out,
+        "times_lstsq": times_lstsq,
+    }
 
 
 def _alone(case: _Case) -> TimerReading:

@@ -7,11 +7,10 @@ import re
 import time
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
-from itertools import islice
+from dataclasses import asdict, dataclass, field
+from itertools import chain, islice
 from multiprocessing import get_context
 from pathlib import Path
-from statistics import fmean
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +46,32 @@ _NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 @dataclass(slots=True)
+class Sums:
+    """What is added up over the drops of a cell.
+
+    Attributes
+    ----------
+    seconds, good_seconds, plain_seconds
+        Processor time of identification and adjustment, of all drops and of good ones, and of one
+        ``numpy.linalg.lstsq`` with the edges and unknowns of the good ones.
+    measured
+        Drops with a result.
+    errors, ratios
+        Squares of their errors, and of these over u.
+    worst
+        The largest error over u.
+    """
+
+    seconds: float = 0.0
+    good_seconds: float = 0.0
+    plain_seconds: float = 0.0
+    measured: int = 0
+    errors: float = 0.0
+    ratios: float = 0.0
+    worst: float = 0.0
+
+
+@dataclass(slots=True)
 class Cell:
     """A layout with one disturbance.
 
@@ -63,13 +88,12 @@ class Cell:
         Good drops with an edge given to another rod than it came from.
     edges, wrong_edges, strays
         Of good drops: given to a rod, to a wrong one, and strays given to one.
-    measured, errors, ratios
-        Which measurand, its errors, and these over u.
+    measured
+        Which measurand the errors are of.
     reasons
         Kinds of reasons for voids, numbers left out, by their number.
-    seconds, good_seconds, plain_seconds
-        Processor time of identification and adjustment, of all drops and of good ones, and of one
-        ``numpy.linalg.lstsq`` with the edges and unknowns of the good ones.
+    sums
+        Of times and errors.
     """
 
     chain: str
@@ -84,19 +108,16 @@ class Cell:
     wrong_edges: int = 0
     strays: int = 0
     measured: str | None = None
-    errors: list[float] = field(default_factory=list)
-    ratios: list[float] = field(default_factory=list)
     reasons: Counter[str] = field(default_factory=Counter)
-    seconds: float = 0.0
-    good_seconds: float = 0.0
-    plain_seconds: float = 0.0
+    sums: Sums = field(default_factory=Sums)
 
     def add(
         self, protocol: Protocol, fall: SimulatedDrop, result: DropResult, seconds: float
     ) -> None:
         """Compare one drop with its truth."""
+        sums = self.sums
         self.drops += 1
-        self.seconds += seconds
+        sums.seconds += seconds
         if _beyond(protocol, fall, result):
             self.beyond += 1
             return
@@ -106,8 +127,8 @@ class Cell:
             return
         begin = time.process_time()
         plain_fit(protocol, fall.drop, result, HZ)
-        self.plain_seconds += time.process_time() - begin
-        self.good_seconds += seconds
+        sums.plain_seconds += time.process_time() - begin
+        sums.good_seconds += seconds
         wrong, strays = fall.rods(result.matches)
         self.wrong += wrong > 0
         self.edges += len(result.matches)
@@ -117,37 +138,52 @@ class Cell:
         if self.measured is not None:
             found = result.quantities[self.measured]
             error = found.value - fall.truth[self.measured]
-            self.errors.append(error)
-            self.ratios.append(error / found.u)
+            sums.measured += 1
+            sums.errors += error**2
+            sums.ratios += (error / found.u) ** 2
+            sums.worst = max(sums.worst, abs(error / found.u))
 
     def share(self, verdict: str) -> float:
         """Share of a verdict in the drops that count; 0 where none does."""
         return self.verdicts[verdict] / max(1, self.verdicts.total())
 
     def json(self) -> dict[str, Any]:
-        """Return the figures to report."""
-        told = ("chain", "gates", "heights_mm", "disturbance", "drops", "beyond", "wrong", "edges",
-                "wrong_edges", "strays", "measured")  # fmt: skip
-        errors, ratios = self.errors, self.ratios
-        return {name: getattr(self, name) for name in told} | {
+        """Return the figures to report; `read` makes the same cell of them."""
+        sums = self.sums
+        return {name: getattr(self, name) for name in _TOLD} | {
             "verdicts": dict(sorted(self.verdicts.items())),
             "void_share": self.share("void"),
             "marginal_share": self.share("marginal"),
-            "error_rms": _rms(errors),
-            "z_rms": _rms(ratios),
-            "z_worst": max(map(abs, ratios), default=None),
-            "ms_per_drop": 1e3 * self.seconds / max(1, self.drops),
-            "times_lstsq": _ratio(self.good_seconds, self.plain_seconds),
+            "error_rms": _rms(sums.errors, sums.measured),
+            "z_rms": _rms(sums.ratios, sums.measured),
+            "z_worst": sums.worst if sums.measured else None,
+            "ms_per_drop": 1e3 * sums.seconds / max(1, self.drops),
+            "times_lstsq": _ratio(sums.good_seconds, sums.plain_seconds),
             "reasons": dict(self.reasons.most_common()),
+            "sums": asdict(sums),
         }
+
+    @classmethod
+    def read(cls, said: Mapping[str, Any]) -> Cell:
+        """Take a cell from what `json` returned."""
+        return cls(
+            **{name: said[name] for name in _TOLD},
+            verdicts=Counter(said["verdicts"]),
+            reasons=Counter(said["reasons"]),
+            sums=Sums(**said["sums"]),
+        )
+
+
+_TOLD = ("chain", "gates", "heights_mm", "disturbance", "drops", "beyond", "wrong", "edges",
+         "wrong_edges", "strays", "measured")  # fmt: skip
 
 
 def _ratio(one: float, other: float) -> float | None:
     return one / other if other > 0.0 else None
 
 
-def _rms(values: Sequence[float]) -> float | None:
-    return math.sqrt(fmean(one**2 for one in values)) if values else None
+def _rms(squares: float, count: int) -> float | None:
+    return math.sqrt(squares / count) if count else None
 
 
 def _beyond(protocol: Protocol, fall: SimulatedDrop, result: DropResult) -> bool:
@@ -161,7 +197,11 @@ def _beyond(protocol: Protocol, fall: SimulatedDrop, result: DropResult) -> bool
 
 
 def study(
-    layouts: Sequence[GateLayout], drops: int, jobs: int | None, say: Callable[[str], None]
+    layouts: Sequence[GateLayout],
+    drops: int,
+    jobs: int | None,
+    say: Callable[[str], None],
+    before: Sequence[Cell] = (),
 ) -> list[Cell]:
     """Let chains fall on every layout with every disturbance.
 
@@ -173,41 +213,57 @@ def study(
         Layouts at a time; as many as there are processors if not given.
     say
         Told how far it is.
+    before
+        What was found before, to which these drops are added; each is on a further rig.
 
     Returns
     -------
     list
-        In the order of the layouts, each with its disturbances.
+        In the order of the layouts, each with its disturbances; then what was found on others.
     """
+    known: dict[tuple[str, str], list[Cell]] = {}
+    for cell in before:
+        known.setdefault((cell.chain, cell.heights_mm), []).append(cell)
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        work = {pool.submit(cells, layout, drops): n for n, layout in enumerate(layouts)}
+        work = {
+            pool.submit(cells, one, drops, known.pop((one.kind.name, one.heights), ())): n
+            for n, one in enumerate(layouts)
+        }
         found: dict[int, list[Cell]] = {}
         for done in as_completed(work):
             found[work[done]] = done.result()
             first = found[work[done]][0]
             say(f"{len(found)} of {len(layouts)}: {first.chain}, {first.gates} gates")
-    return [cell for n in sorted(found) for cell in found[n]]
+    return [cell for n in sorted(found) for cell in found[n]] + [*chain(*known.values())]
 
 
 @one_thread
-def cells(layout: GateLayout, drops: int) -> list[Cell]:
-    """Let chains fall on one layout with every disturbance."""
+def cells(layout: GateLayout, drops: int, before: Sequence[Cell] = ()) -> list[Cell]:
+    """Let chains fall on one layout with every disturbance, and add up with what was found."""
+    begun = {cell.disturbance: cell for cell in before}
     with TemporaryDirectory() as folder:
         path = Path(folder) / "layout.yaml"
         path.write_text(layout.protocol(), encoding="utf-8")
         protocol = reader.read(path)
         planned = {run.number: run for run in runs(protocol)}
         numbers = [*planned]
-        made = [[numbers[_STRIDE * n % len(numbers)]] for n in range(drops)]
-        asked = [
-            Asked(_url(path, settings), range(1, drops + 1), made)
-            for settings in DISTURBANCES.values()
-        ]
-        all_falls = falls(asked)
-        return [
-            _cell(layout, name, protocol, planned, islice(all_falls, drops))
+        found = [
+            begun.get(name) or Cell(layout.kind.name, layout.gates, layout.heights, name)
             for name in DISTURBANCES
         ]
+        rigs = [range(cell.drops, cell.drops + drops) for cell in found]
+        asked = [
+            Asked(
+                _url(path, settings),
+                [1 + n for n in mine],
+                [[numbers[_STRIDE * n % len(numbers)]] for n in mine],
+            )
+            for settings, mine in zip(DISTURBANCES.values(), rigs, strict=True)
+        ]
+        all_falls = falls(asked)
+        for cell in found:
+            _fill(cell, protocol, planned, islice(all_falls, drops))
+    return found
 
 
 def _url(path: Path, settings: Mapping[str, str]) -> str:
@@ -217,19 +273,14 @@ def _url(path: Path, settings: Mapping[str, str]) -> str:
     return url
 
 
-def _cell(
-    layout: GateLayout,
-    disturbance: str,
-    protocol: Protocol,
-    planned: Mapping[int, Run],
-    made: Iterable[SimulatedDrop],
-) -> Cell:
-    cell = Cell(layout.kind.name, layout.gates, layout.heights, disturbance)
+def _fill(
+    cell: Cell, protocol: Protocol, planned: Mapping[int, Run], made: Iterable[SimulatedDrop]
+) -> None:
+    """Analyse drops, and compare each with its truth."""
     for fall in made:
         begin = time.process_time()
         result, _ = fit_drop(protocol, planned[fall.drop.run], fall.drop, time_scale(fall.seed))
         cell.add(protocol, fall, result, time.process_time() - begin)
-    return cell
 
 
 def totals(found: Sequence[Cell]) -> list[dict[str, Any]]:
@@ -242,19 +293,21 @@ def totals(found: Sequence[Cell]) -> list[dict[str, Any]]:
 def _total(name: str, of: Sequence[Cell]) -> dict[str, Any]:
     verdicts = sum((one.verdicts for one in of), Counter[str]())
     counted = max(1, verdicts.total())
+    sums = [one.sums for one in of]
+    drops = sum(one.drops for one in of)
     return {
         "disturbance": name,
-        "drops": sum(one.drops for one in of),
+        "drops": drops,
         "beyond": sum(one.beyond for one in of),
         "void_share": verdicts["void"] / counted,
         "marginal_share": verdicts["marginal"] / counted,
         "wrong": sum(one.wrong for one in of),
         "edges": sum(one.edges for one in of),
         "wrong_edges": sum(one.wrong_edges for one in of),
-        "z_rms": _rms([ratio for one in of for ratio in one.ratios]),
-        "ms_per_drop": 1e3 * sum(one.seconds for one in of) / max(1, sum(one.drops for one in of)),
+        "z_rms": _rms(sum(one.ratios for one in sums), sum(one.measured for one in sums)),
+        "ms_per_drop": 1e3 * sum(one.seconds for one in sums) / max(1, drops),
         "times_lstsq": _ratio(
-            sum(one.good_seconds for one in of), sum(one.plain_seconds for one in of)
+            sum(one.good_seconds for one in sums), sum(one.plain_seconds for one in sums)
         ),
     }
 

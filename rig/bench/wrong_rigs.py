@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     Scene = dict[str, Any]
 
+_LONG = 6  # rods of which one may be missing that is at no end
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
 
@@ -111,6 +112,27 @@ def _more_rods(scene: Scene, more: float) -> bool:
     return True
 
 
+def _rod_missing(scene: Scene, _: float) -> bool:
+    """Take a rod out of the middle; the others stay where they are."""
+    _own(scene)
+    chain = scene["chains"]["A"]
+    if not isinstance(chain["rods"], int) or "length" not in chain or chain["rods"] < _LONG:
+        return False
+    gaps = chain["rods"] - 1
+    pitch = float(_NUMBER.findall(chain.pop("length"))[0]) / gaps
+    chain["rods"] -= 1
+    chain["spacing"] = [f"{pitch * (1 + (n == gaps // 2)):.9g} mm" for n in range(gaps - 1)]
+    return True
+
+
+def _thicker(scene: Scene, percent: float) -> bool:
+    """Of rods all alike: of several kinds each would be thicker by as much of itself."""
+    even = [chain for chain in scene["chains"].values() if "diameter" in chain]
+    for chain in even:
+        chain["diameter"] = _scaled(chain["diameter"], 1.0 + percent / 100.0)
+    return bool(even)
+
+
 def _hung(scene: Scene, mm: float) -> bool:
     scene["drop"] = _moved(scene["drop"], mm)
     return True
@@ -150,11 +172,14 @@ def _dead(scene: Scene, _: float) -> bool:
     return bool(side)
 
 
-def _exchanged(scene: Scene, _: float) -> bool:
-    gates = scene["gates"]["free" if "free" in scene["gates"] else "impact"]
-    if len(gates) > 1:
-        gates[0]["channel"], gates[-1]["channel"] = gates[-1]["channel"], gates[0]["channel"]
-    return len(gates) > 1
+def _exchanged(scene: Scene, sides: float) -> bool:
+    """Exchange the lowest and the highest gate of a side, or the lowest ones of both sides."""
+    gates = [scene["gates"][side] for side in ("free", "impact") if scene["gates"].get(side)]
+    if len(gates) < sides or (len(gates[0]) < 2 and sides < 2):
+        return False
+    one, other = gates[0][0], gates[1][0] if sides > 1 else gates[0][-1]
+    one["channel"], other["channel"] = other["channel"], one["channel"]
+    return True
 
 
 def _crossed(scene: Scene, _: float) -> bool:
@@ -187,6 +212,8 @@ def _tilted(scene: Scene, forgotten: float) -> bool:
 WRONG_RIGS = (
     WrongRig("chain stretched", "longer|shorter", (0.3, -1.0, 3.0), "%", _stretched),
     WrongRig("other number of rods", r"has \d+ rods, not", (-1.0, 1.0, 2.0), "rods", _more_rods),
+    WrongRig("rod missing", "no gate saw rod", change=_rod_missing),
+    WrongRig("rods thicker", "looks .* (thicker|thinner)", (25.0, -20.0), "%", _thicker),
     WrongRig("drop height", "chains? hangs? .*(higher|lower)", (8.0, -15.0, 30.0), "mm", _hung),
     WrongRig("contact level", "all gates are", (3.0, -6.0, 15.0), "mm", _contact),
     WrongRig(
@@ -203,7 +230,7 @@ WRONG_RIGS = (
     WrongRig("post's datum", "post is", (2.0, 5.0, 15.0), "mm", _post),
     WrongRig("gate off", "^the gate on .*(higher|lower) than", (3.0, -8.0, 20.0), "mm", _one_gate),
     WrongRig("gate dead", "gave no edges", change=_dead),
-    WrongRig("gates exchanged", "wrong way round", change=_exchanged),
+    WrongRig("gates exchanged", "wrong way round", (1.0, 2.0), "sides", _exchanged),
     WrongRig("chains exchanged", "on each other's side", change=_crossed),
     WrongRig("chain upside down", "upside down", change=_turned),
     WrongRig("wrong incline", "incline|board is at", (1.0, 2.0), "inclines", _tilted),

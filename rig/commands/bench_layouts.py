@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.figures import layouts_figure
 from rig.bench.layout_catalogue import LAYOUTS, chosen
-from rig.bench.layouts import DISTURBANCES, DROPS, as_json, study
+from rig.bench.layouts import DISTURBANCES, DROPS, Cell, as_json, study
 from rig.commands.output import leave_study, say
+from rig.errors import InputError
 from rig.files import make_folder
 from rig.measurands import MEASURANDS
 from rig.report.columns import Column, filled
@@ -17,6 +19,7 @@ from rig.text_table import csv_text, text_table
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
     Record = Mapping[str, Any]
 
@@ -27,7 +30,8 @@ _HEAD = """\
 Written by `rig bench layouts --drops {drops}`: falls of the simulated rig without disturbances,
 with the default ones, and with all of them doubled, {drops} on each layout with each. Every drop
 is on a rig of its own and judged against the hidden truth; drops that truly miss more edges than
-the protocol accepts are left out. Every number is in `layouts.csv` and `layouts.json`.
+the protocol accepts are left out. Every number is in `layouts.csv` and `layouts.json`, to which
+`--more` adds further rigs.
 
 ![Map of layouts](layouts.svg)"""
 
@@ -37,15 +41,27 @@ def main(arguments: Namespace) -> int:
     layouts = chosen(LAYOUTS, arguments.only)
     folder = make_folder(arguments.output)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
-    drops = arguments.drops or DROPS
-    found = study(layouts, drops, arguments.jobs, say)
+    before = _found_before(folder / "layouts.json") if arguments.more else []
+    found = study(layouts, arguments.drops or DROPS, arguments.jobs, say, before)
     whole = as_json(found)
     cells = whole["layouts"]
+    drops = " or ".join(map(str, sorted({cell.drops for cell in found})))
     leave_study(
         folder, "layouts", _HEAD.format(drops=drops), _lines(whole), whole, _csv(cells),
         layouts_figure(cells), as_json=arguments.json,
     )  # fmt: skip
     return 0
+
+
+def _found_before(file: Path) -> list[Cell]:
+    """Read what this bench has left."""
+    try:
+        return [Cell.read(one) for one in json.loads(file.read_text(encoding="utf-8"))["layouts"]]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"cannot add to {file}: {error}",
+            "leave --more out to begin anew; rig bench layouts writes this file there",
+        ) from error
 
 
 def _csv(cells: Sequence[Record]) -> str:

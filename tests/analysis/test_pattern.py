@@ -84,7 +84,7 @@ def test_one_of_the_first_votes_is_the_fall(scene):
         if record.ratios is not None:
             chain = record.chain.chain
             alpha = impact_on(one.protocol.surface, chain, one.run.incline_deg).alpha
-        found = guesses(record, one.protocol.drop, one.protocol.gravity.value)
+        found = [*guesses(record, one.protocol.drop, one.protocol.gravity.value)]
         assert found[0].votes == record.expected
         assert abs(found[0].release - DELAY) * 8.0 < 3.0 * slack_of(record)
         assert abs(found[0].alpha - alpha) < 0.05
@@ -93,22 +93,22 @@ def test_one_of_the_first_votes_is_the_fall(scene):
 def test_votes_are_only_counted_where_a_release_may_be():
     drop, gravity = RECORD.protocol.drop, RECORD.protocol.gravity.value
     for record in RECORD.records:
-        best = guesses(record, drop, gravity)[0]
-        assert guesses(record, drop, gravity, window=EVER)[0] == best
+        best = next(guesses(record, drop, gravity))
+        assert next(guesses(record, drop, gravity, window=EVER)) == best
         for begin, end in ((-0.01, 0.01), (0.02, 0.2)):
             window = best.release + begin, best.release + end
-            found = guesses(record, drop, gravity, window=window)
+            found = [*guesses(record, drop, gravity, window=window)]
             # Half the widest vote is a window's edge.
             assert all(window[0] - 0.01 < one.release < window[1] + 0.01 for one in found)
             near = max(one.votes for one in found)
             assert (near > 0.95 * best.votes) == (begin < 0.0)
-        assert guesses(record, drop, gravity, window=(-np.inf, -60.0)) == []
+        assert not [*guesses(record, drop, gravity, window=(-np.inf, -60.0))]
 
 
 def test_no_chain_begins_below_what_it_strikes():
     """A drop stated so badly that some starts within its uncertainty are no starts."""
     (record, *_) = RECORD.records
-    found = guesses(record, Quantity(0.01, 0.01), RECORD.protocol.gravity.value)
+    found = [*guesses(record, Quantity(0.01, 0.01), RECORD.protocol.gravity.value)]
     assert all(one.start > 0.0 for one in found)
 
 
@@ -149,9 +149,9 @@ def test_falls_that_cannot_have_votes_enough_are_not_counted(monkeypatch, piled)
     drop, gravity = scene.protocol.drop, scene.protocol.gravity.value
     for record in scene.records:
         least = 0.6 * record.expected
-        every = guesses(record, drop, gravity)
+        every = [*guesses(record, drop, gravity)]
         whole, counted = sum(counted), []
-        some = guesses(record, drop, gravity, least=least)
+        some = [*guesses(record, drop, gravity, least=least)]
         assert [one for one in some if one.votes >= least] == [
             one for one in every if one.votes >= least
         ]

@@ -57,6 +57,8 @@ def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
     assert by_name["camera reading"]["seconds"] is None
     camera, ours = (by_name[name] for name in ("camera reading", "session fit"))
     assert ours["separation_median_m"] < camera["separation_median_m"]
+    assert found["times_lstsq"].keys() == {"one-run fit", "joint fit alone"}
+    assert found["times_lstsq"]["one-run fit"] > 1.0  # it solves at least one such system
     assert any("M = 1e+06" in one for one in found["left_out"])
     assert {path.suffix for path in (tmp_path / "o").iterdir()} == {".csv", ".json", ".md", ".svg"}
     assert "SIMULATED" in (tmp_path / "o" / "estimators.svg").read_text("utf-8")

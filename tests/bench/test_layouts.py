@@ -95,13 +95,19 @@ def test_a_drop_that_truly_is_beyond_the_limits_does_not_count():
 
 
 def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
-    arguments = ["bench", "layouts", "-o", str(tmp_path), "--only", "3 rods: 2 + 2", "--drops", "3"]
-    assert main([*arguments, "--jobs", "1", "--json"]) == 0
+    arguments = ["bench", "layouts", "-o", str(tmp_path), "--only", "3 rods: 2 + 2"]
+    assert main([*arguments, "--drops", "1", "--jobs", "1", "--json"]) == 0
+    one = json.loads(capsys.readouterr().out)
+    assert main([*arguments, "--drops", "1", "--more", "--jobs", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
+    # A second rig is another one: what the first has left is still there.
+    for less, more in zip(one["layouts"], found["layouts"], strict=True):
+        assert less["edges"] < more["edges"]
+        assert less["sums"]["errors"] < more["sums"]["errors"]
     assert [one["disturbance"] for one in found["layouts"]] == [*DISTURBANCES]
     for one in found["layouts"]:
-        assert (one["drops"], one["wrong_edges"]) == (3, 0)
-        assert sum(one["verdicts"].values()) + one["beyond"] == 3
+        assert (one["drops"], one["wrong_edges"]) == (2, 0)
+        assert sum(one["verdicts"].values()) + one["beyond"] == 2
     quiet = found["layouts"][0]
     assert (quiet["void_share"], quiet["beyond"]) == (0.0, 0)
     assert quiet["error_rms"] < 1e-5
@@ -111,7 +117,15 @@ def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
     assert "SIMULATED" in (tmp_path / "layouts.svg").read_text("utf-8")
     page = (tmp_path / "layouts.md").read_text("utf-8")
     assert "36, 117 + 32.4, 108" in page
-    assert "`rig bench layouts --drops 3`" in page
+    assert "`rig bench layouts --drops 2`" in page
+
+
+@pytest.mark.parametrize("text", [None, "", "{}", '{"layouts": [{"chain": "3 rods"}]}'])
+def test_what_is_no_result_of_this_bench_cannot_be_added_to(tmp_path, capsys, text):
+    if text is not None:
+        (tmp_path / "layouts.json").write_text(text)
+    assert main(["bench", "layouts", "-o", str(tmp_path), "--more"]) == 2
+    assert "cannot add to" in capsys.readouterr().err
 
 
 def test_an_unknown_layout_is_told_with_those_there_are(tmp_path, capsys):
