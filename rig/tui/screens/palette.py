@@ -56,6 +56,8 @@ class Palette(Dialog[str | None]):
         yield Words(id="how")
 
     def on_mount(self) -> None:
+        if not self.query("#how"):
+            return  # left before it was there
         self.query_one("#how", Words).say_content(
             how(("↑ ↓ Enter", "do it", "screen.take"), ("Esc", "leave it", "screen.leave"))
         )
