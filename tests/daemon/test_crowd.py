@@ -264,13 +264,22 @@ def test_no_error_speaks_of_python(door):
     door(test)
 
 
-def test_a_stop_is_read_behind_any_number_of_requests(door):
+def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
     async def test(server, path, _):
         reader, writer = await asyncio.open_unix_connection(path)
         control = rpc.request("take_control", {}, 2)
         waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
         writer.write(HELLO)
         await reader.readline()
+        (client,) = server.publisher.connections
+        do = client._do
+
+        async def held(one, request):
+            if request.method == "wait":
+                await asyncio.Event().wait()
+            return await do(one, request)
+
+        monkeypatch.setattr(client, "_do", held)
         writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
         told = {}
         while not {299, 1000} <= told.keys():  # the stop may overtake
