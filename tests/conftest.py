@@ -43,8 +43,8 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Have every worker begin with what goes by the clock, and only then compute.
 
-    A board that is not heard of for a fifth of a second disarms itself, as it should: beside tests
-    that need all processors that is no rare event. Those that wait are good neighbours.
+    A board that is not heard of for a quarter of a second disarms itself, as it should: beside
+    tests that need all processors that is no rare event. Those that wait are good neighbours.
     """
     workers = getattr(config, "workerinput", {}).get("workercount", 1)
     waiting: list[pytest.Item] = []

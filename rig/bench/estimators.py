@@ -140,9 +140,10 @@ def estimators(
         if fit is not None:
             cases.append(_Case(scene, one.run, drops[key], scale, fit, truths[key]))
     alone_s = (time.process_time() - begin) / max(1, len(good))
+    fit_plainly = one_thread(plain_fit)
     begin = time.process_time()
     for one, key in zip(good, keys, strict=True):
-        one_thread(plain_fit)(scene, drops[key], one, clock.scale(drops[key]).hz)
+        fit_plainly(scene, drops[key], one, clock.scale(drops[key]).hz)
     plain_s = (time.process_time() - begin) / max(1, len(good))
     if not cases:
         raise InputError("no good drop to compare", "take fewer disturbances, or more repeats")

@@ -58,8 +58,9 @@ def _found_before(file: Path) -> list[Cell]:
     try:
         return [Cell.read(one) for one in json.loads(file.read_text(encoding="utf-8"))["layouts"]]
     except (OSError, ValueError, KeyError, TypeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not what this bench leaves"
         raise InputError(
-            f"cannot add to {file}: {error}",
+            f"cannot add to {file}: {why}",
             "leave --more out to begin anew; rig bench layouts writes this file there",
         ) from error
 

@@ -14,7 +14,7 @@ from rig.design.rewriting import with_heights
 from rig.design.search import better, readable, room
 from rig.design.trials import trials, trials_text
 from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import check_place, write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
@@ -38,6 +38,8 @@ def main(arguments: Namespace) -> int:
     """Predict what a layout will tell, and look for a better one."""
     if arguments.output and arguments.no_search:
         raise InputError("-o writes what is proposed, and --no-search proposes nothing")
+    if arguments.output:
+        check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
     there = beams_of(protocol)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Estimate the parameters of the impacts from a session."""
+    folder = None if arguments.output is None else make_folder(arguments.output)
     with Session.open(arguments.session, readonly=True) as session:
         analysis, _ = detailed(session, progress("analysing run"))
         found = estimate(protocol_of(session), analysis)
@@ -32,10 +33,9 @@ def main(arguments: Namespace) -> int:
         if like is not None and not like.like:
             print(like.sentence)
         print(estimate_text(found, sections, simulated=simulated))
-    if arguments.output is not None:
+    if folder is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
-        folder = make_folder(arguments.output)
         drawn = estimate_pictures(found, sections, simulated=simulated)
         for name, picture in drawn.items():
             write_atomic(folder / f"{name}.svg", picture.svg)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.commands.output import progress, say
+from rig.files import make_folder
 from rig.results import results, tick_rates
 from rig.session.export import export_csv
 from rig.session.store import Session
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Write a session as CSV files."""
+    make_folder(arguments.csv)
     with Session.open(arguments.session, readonly=True) as session:
         found = results(session, progress("analysing run"))
         export_csv(arguments.csv, session, found.json(), tick_rates(session))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import print_json, say
 from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import predictions
 from rig.protocol import reader
@@ -97,6 +97,7 @@ def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     path = Path(output)
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     kind_of(picture)
+    check_place(picture)
     falls = _resolved(number) if resolved else None
     drawing, columns = paper_figure(number, falls)
     write_figure(picture, drawing)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from rig.commands.output import say
 from rig.errors import InputError
-from rig.files import replacing
+from rig.files import check_place, replacing
 from rig.protocol import reader
 from rig.report.canvas import KINDS
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
@@ -105,8 +105,7 @@ def _check_place(output: Path) -> None:
             f"{output}: the ending {output.suffix or 'is missing and'} says no kind of file",
             f"end the name in one of {', '.join(_KINDS)}",
         )
-    if not output.parent.is_dir():
-        raise InputError(f"cannot write {output}: there is no folder {output.parent}")
+    check_place(output)
     if _drawn(output):
         import_module("matplotlib")
 

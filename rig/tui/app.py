@@ -452,7 +452,8 @@ class RigApp(App[None], inherit_bindings=False):
                 if self._stillness.meant(self._face, at_s):
                     screen.dismiss(True)
             case Help() | Palette() | AskReason() if by:
-                screen.move(by)
+                if screen.is_mounted:
+                    screen.move(by)
             case Help():
                 screen.dismiss(None)
             case Ask() | Palette() | AskReason() if key == "escape":

@@ -125,7 +125,8 @@ def test_what_is_no_result_of_this_bench_cannot_be_added_to(tmp_path, capsys, te
     if text is not None:
         (tmp_path / "layouts.json").write_text(text)
     assert main(["bench", "layouts", "-o", str(tmp_path), "--more"]) == 2
-    assert "cannot add to" in capsys.readouterr().err
+    why = "No such file or directory" if text is None else "it is not what this bench leaves"
+    assert f"cannot add to {tmp_path / 'layouts.json'}: {why}\n" in capsys.readouterr().err
 
 
 def test_an_unknown_layout_is_told_with_those_there_are(tmp_path, capsys):

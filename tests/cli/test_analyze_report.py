@@ -11,7 +11,7 @@ import pytest
 from rig.report.bars import LABELS, bar
 from rig.results import detailed
 from rig.session.store import Session
-from tests.cli.lab import rig, short
+from tests.cli.lab import PROTOCOLS, rig, short
 
 SVG = 'xmlns="http://www.w3.org/2000/svg"'
 
@@ -151,13 +151,28 @@ def test_a_title_cannot_break_the_page(call, tmp_path):
     assert "&lt;b&gt;" in html
 
 
-def test_a_report_that_cannot_be_written_is_not_begun(call, finished, tmp_path, monkeypatch):
-    monkeypatch.setattr("rig.commands.report.results", Mock(side_effect=AssertionError))
-    done = call("report", finished.session, "-o", tmp_path / "none" / "r.html")
+@pytest.mark.parametrize(
+    ("command", "work", "place"),
+    [
+        (["report", "SESSION", "-o"], "report.results", "none/r.html"),
+        (["report", "SESSION", "-o"], "report.results", "."),
+        (["estimate", "SESSION", "-o"], "estimate.detailed", "file/figures"),
+        (["export", "SESSION", "--csv"], "export.results", "file/tables"),
+        (["design", PROTOCOLS / "picket-fence.yaml", "-o"], "design.better", "none/new.yaml"),
+        (["predict", "--figure", "3", "-o"], "predict._table", "none/figure.svg"),
+    ],
+)
+def test_what_cannot_be_written_is_not_begun(
+    call, finished, tmp_path, monkeypatch, command, work, place
+):
+    monkeypatch.setattr(f"rig.commands.{work}", Mock(side_effect=AssertionError))
+    (tmp_path / "file").touch()
+    words = [finished.session if word == "SESSION" else word for word in command]
+    done = call(*words, tmp_path / place)
     assert done.code == 2
-    assert done.err.startswith(f"cannot write {tmp_path / 'none' / 'r.html'}: ")
-    assert call("report", finished.session, "-o", tmp_path).code == 2
-    assert list(tmp_path.iterdir()) == []
+    assert done.err.startswith("cannot ")
+    assert str(tmp_path / place) in done.err
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
 def test_bars_are_as_long_as_the_analysis_says(finished):

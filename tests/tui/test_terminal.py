@@ -86,18 +86,6 @@ class Terminal:
 
         until(gone)
 
-    def falls(self, run: int) -> None:
-        """Let a run fall; arm again where a busy machine let board or daemon wait too long."""
-
-        def fell() -> bool:
-            time.sleep(1.2 * STILL_S)
-            screen = self.screen()
-            if "Enter arm" in screen:
-                self.press("Enter")
-            return f"run {run}, attempt " in screen and "release skew" in screen
-
-        until(fell, lambda: self.tmux("capture-pane", "-p"))
-
     def drops(self, number: int) -> None:
         """Arm until chains fall: on a busy machine a board that is not heard of disarms itself."""
 

@@ -228,6 +228,30 @@ def test_escape_leaves_a_dialog_whose_field_a_click_has_left(session):
     run(work())
 
 
+@pytest.mark.parametrize("key", ["down", "enter", "escape"])
+def test_a_dialog_bears_keys_that_come_before_it_is_there(session, key):
+    async def work():
+        async with _screen(session) as (app, pilot):
+            app.driver.flow = replace(MOMENTS["result"], ticket=app.flow.ticket + 1)
+            await pilot.pause(0.12)
+            opened = set()
+            for dialog in filter(None, DIALOGS):
+                for turns in range(3):
+                    app._takes(dialog, time.monotonic())
+                    await asyncio.sleep(0)
+                    opened.add(type(app.screen).__name__)
+                    for _ in range(turns):
+                        await asyncio.sleep(0)
+                    app._takes(key, time.monotonic())
+                    await pilot.pause(0.01)
+                    while len(app.screen_stack) > 1:
+                        app.screen.dismiss(None)
+                        await pilot.pause(0.01)
+            assert {"Palette", "Help", "Ask"} <= opened
+
+    run(work())
+
+
 def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async def work():
         async with _screen(session) as (app, pilot):

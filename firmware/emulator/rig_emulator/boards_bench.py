@@ -191,7 +191,7 @@ class Bench:
 
 
 def page() -> str:
-    """Measure both boards and write the table."""
+    """Measure both boards and write the page."""
     columns = {name: dict(Bench(wiring).rows()) for name, wiring in _COMPARED.items()}
     names = list(next(iter(columns.values())))
     lines = [f"| | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]

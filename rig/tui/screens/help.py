@@ -53,12 +53,9 @@ class Help(Dialog[None]):
 
     def contents(self) -> ComposeResult:
         with VerticalScroll(can_focus=False):
-            yield Words(id="table")
-
-    def on_mount(self) -> None:
-        self.query_one("#table", Words).say_content(
-            table(self._page, self._keys, self.app.size.width >= 100)
-        )
+            told = Words(id="table")
+            told.say_content(table(self._page, self._keys, self.app.size.width >= 100))
+            yield told
 
     def move(self, by: int) -> None:
         """Scroll."""

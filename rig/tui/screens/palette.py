@@ -51,33 +51,32 @@ class Palette(Dialog[str | None]):
         self._choices = sorted(choices, key=lambda one: bool(one.hindrance))
 
     def contents(self) -> ComposeResult:
-        yield Input(placeholder="what is to be done?")
-        yield _Choices(markup=False)
-        yield Words(id="how")
-
-    def on_mount(self) -> None:
-        if not self.query("#how"):
-            return  # left before it was there
-        self.query_one("#how", Words).say_content(
+        options, keys = _Choices(*self._fitting(""), markup=False), Words(id="how")
+        options.can_focus = False
+        keys.say_content(
             how(("↑ ↓ Enter", "do it", "screen.take"), ("Esc", "leave it", "screen.leave"))
         )
-        self.query_one(OptionList).can_focus = False
-        self.query_one(Input).focus()
-        self._narrow("")
+        yield Input(placeholder="what is to be done?")
+        yield options
+        yield keys
+
+    def on_mount(self) -> None:
+        for options in self.query(OptionList):
+            options.action_first()
+        self.query(Input).focus()
 
     @on(Input.Changed)
     def _typed(self, event: Input.Changed) -> None:
-        self._narrow(event.value)
-
-    def _narrow(self, query: str) -> None:
         """Show what fits, what can be done first."""
-        matcher = Matcher(query)
-        shown = [one for one in self._choices if not query or matcher.match(one.text)]
         options = self.query_one(OptionList)
         options.clear_options()
-        options.add_options(Option(_line(one), one.name, disabled=bool(one.hindrance))
-                            for one in shown)  # fmt: skip
+        options.add_options(self._fitting(event.value))
         options.action_first()
+
+    def _fitting(self, query: str) -> list[Option]:
+        matcher = Matcher(query)
+        return [Option(_line(one), one.name, disabled=bool(one.hindrance))
+                for one in self._choices if not query or matcher.match(one.text)]  # fmt: skip
 
     def move(self, by: int) -> None:
         """Go to the previous or next."""
