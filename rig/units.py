@@ -47,6 +47,7 @@ class Dimension(Enum):
     MASS = ("a mass", "35 g")
     DENSITY = ("a density", "1.2 kg/m^3")
     FREQUENCY = ("a frequency", "1 Hz")
+    TURNING = ("a rate of turning", "0.5 rad/s")
     NUMBER = ("a plain number", "0.50 ± 0.05")
 
     @property
@@ -99,6 +100,8 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
     "g/cm^3": (Dimension.DENSITY, Fraction(1000)),
     "Hz": (Dimension.FREQUENCY, Fraction(1)),
     "kHz": (Dimension.FREQUENCY, Fraction(1000)),
+    "rad/s": (Dimension.TURNING, Fraction(1)),
+    "deg/s": (Dimension.TURNING, 1 / _DEGREES_PER_RADIAN),
     "1": (Dimension.NUMBER, Fraction(1)),
     "%": (Dimension.NUMBER, Fraction(1, 100)),
     "ppm": (Dimension.NUMBER, Fraction(1, 10**6)),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.units import Dimension, UnitError, parse
+from sim.resolved_dials import NAMES as RESOLVED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -193,9 +194,13 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
     dials = begins[chosen[0]]() if chosen else Dials()
     changes: dict[str, float] = {}
     for name, text in rest.items():
+        if name in RESOLVED:
+            raise InputError(
+                f"{scheme}://: {name} is a dial of the resolved world", "add dynamics=resolved"
+            )
         if name not in _NAMES:
             accepted = (*begins, *_OF_THE_URL, *_NAMES)
-            close = get_close_matches(name, accepted, 1)
+            close = get_close_matches(name, (*accepted, *RESOLVED), 1)
             raise InputError(
                 f"{scheme}://: unknown dial {name!r}",
                 f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(accepted)}",

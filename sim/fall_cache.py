@@ -1,4 +1,4 @@
-"""Resolved falls that were made before, on the disk: one file of JSON for each."""
+"""Resolved falls made before, on the disk: for each a file of JSON, behind a line to know it by."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from sim import resolved
 
 KEPT = 2000
-"""Files at most; the oldest go."""
+"""Files at most, of some 0.1 MB each; the oldest go."""
 
 
 def key(*what: object) -> str:
@@ -23,9 +23,10 @@ def key(*what: object) -> str:
 
 @cache
 def _code() -> str:
+    """All of the simulation: how chains hang, cameras and films are kept in a fall too."""
     digest = hashlib.sha256()
     world = Path(resolved.__file__).parent
-    for source in sorted([*world.glob("*.py"), *world.parent.glob("resolved_*.py")]):
+    for source in sorted([*world.glob("*.py"), *world.parent.glob("*.py")]):
         digest.update(source.read_bytes())
     return digest.hexdigest()
 
@@ -37,10 +38,16 @@ def folder() -> Path:
 
 
 def load(name: str) -> Any | None:
-    """Find a fall; `None` if it was never made, or cannot be read."""
+    """Find a fall; `None` if it was never made, or is not what was kept."""
     with suppress(OSError, ValueError):
-        return json.loads((folder() / f"{name}.json").read_text(encoding="utf-8"))
+        digest, text = (folder() / f"{name}.json").read_text(encoding="utf-8").split("\n", 1)
+        if digest == _digest(text):
+            return json.loads(text)
     return None
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def save(name: str, what: Any) -> None:
@@ -48,9 +55,14 @@ def save(name: str, what: Any) -> None:
     with suppress(OSError):
         place = folder()
         place.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(what)
         beside = place / f"{name}.{os.getpid()}.new"
-        beside.write_text(json.dumps(what), encoding="utf-8")
-        beside.replace(place / f"{name}.json")
+        try:
+            beside.write_text(f"{_digest(text)}\n{text}", encoding="utf-8")
+            beside.replace(place / f"{name}.json")
+        except OSError:  # what a full disk took of it must not stay
+            beside.unlink(missing_ok=True)
+            raise
         kept = sorted(place.glob("*.json"), key=lambda one: one.stat().st_mtime)
         for old in kept[:-KEPT]:
             old.unlink(missing_ok=True)

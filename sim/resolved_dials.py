@@ -17,10 +17,15 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-def _dial(
-    default: float, dimension: Dimension, low: float = 0.0, high: float = float("inf")
-) -> Any:
+def _dial(default: float, dimension: Dimension, low: float, high: float) -> Any:
     return field(default=default, metadata={"dimension": dimension, "low": low, "high": high})
+
+
+def _switch() -> Any:
+    return field(
+        default=1.0,
+        metadata={"dimension": Dimension.NUMBER, "low": 0.0, "high": 1.0, "switch": True},
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +69,24 @@ class ResolvedDials:
     board_time: float = _dial(0.2e-3, Dimension.TIME, 1e-5, 2e-3)
     rod_time: float = _dial(0.2e-3, Dimension.TIME, 1e-5, 2e-3)
     rod_restitution: float = _dial(0.5, Dimension.NUMBER, DEADEST, 1.0)
-    rod_friction: float = _dial(0.3, Dimension.NUMBER)
-    rods_touch: float = _dial(1.0, Dimension.NUMBER, 0.0, 1.0)
-    density: float = _dial(450.0, Dimension.DENSITY, 1.0)
-    roll: float = _dial(1.0, Dimension.NUMBER, 0.0, 1.0)
-    tilt_sd: float = _dial(1.0, Dimension.ANGLE)
-    yaw_sd: float = _dial(2.0, Dimension.ANGLE)
-    aside_sd: float = _dial(0.5e-3, Dimension.LENGTH)
-    off_centre_sd: float = _dial(1e-3, Dimension.LENGTH)
-    swing_sd: float = _dial(10e-3, Dimension.SPEED)
-    spin_sd: float = _dial(0.0, Dimension.NUMBER)
+    rod_friction: float = _dial(0.3, Dimension.NUMBER, 0.0, 10.0)
+    rods_touch: float = _switch()
+    density: float = _dial(450.0, Dimension.DENSITY, 1.0, 25e3)
+    roll: float = _switch()
+    tilt_sd: float = _dial(1.0, Dimension.ANGLE, 0.0, 45.0)
+    yaw_sd: float = _dial(2.0, Dimension.ANGLE, 0.0, 45.0)
+    aside_sd: float = _dial(0.5e-3, Dimension.LENGTH, 0.0, 0.1)
+    off_centre_sd: float = _dial(1e-3, Dimension.LENGTH, 0.0, 1.0)
+    swing_sd: float = _dial(10e-3, Dimension.SPEED, 0.0, 10.0)
+    spin_sd: float = _dial(0.0, Dimension.TURNING, 0.0, 100.0)
 
 
 NAMES = tuple(one.name for one in fields(ResolvedDials))
+_UNITS = {
+    Dimension.TIME: " s", Dimension.LENGTH: " m", Dimension.ANGLE: " deg", Dimension.SPEED: " m/s",
+    Dimension.DENSITY: " kg/m^3", Dimension.TURNING: " rad/s",
+}  # fmt: skip
+"""Of what `parse` gives, as limits are told in."""
 _HANGING = ("tilt_sd", "yaw_sd", "aside_sd", "off_centre_sd", "swing_sd", "spin_sd")
 
 
@@ -103,10 +113,13 @@ def read_resolved_dials(settings: Mapping[str, str], scheme: str = "sim") -> Res
             value = parse(text, kind["dimension"]).value
         except UnitError as error:
             raise InputError(f"{scheme}://: {one.name}: {error}") from None
+        if kind.get("switch") and value not in {0.0, 1.0}:
+            raise InputError(f"{scheme}://: {one.name}: {text} is neither 0 nor 1")
+        unit = _UNITS.get(kind["dimension"], "")
         if not kind["low"] <= value <= kind["high"]:
             raise InputError(
                 f"{scheme}://: {one.name}: {text} is outside of what is accepted",
-                f"{kind['low']:g} to {kind['high']:g}, in SI units",
+                f"{kind['low']:g} to {kind['high']:g}{unit}",
             )
         changes[one.name] = value
     return replace(ResolvedDials(), **changes)

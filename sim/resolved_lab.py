@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -17,8 +18,11 @@ from sim.beam import SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
 from sim.film import film
 from sim.lab import ChainLab, is_test
+from sim.resolved.compiled import is_compiled
 from sim.resolved.contact_law import DEADEST
-from sim.resolved.fall import fall
+from sim.resolved.fall import fall, usual_step
+from sim.resolved.foresight import MOST_ROD_STEPS, impossible, processor_time, rod_steps
+from sim.resolved.motion import LONGEST
 from sim.resolved.scene import Board, Bounce, Chain, Rods, Strings
 from sim.resolved_beam import shadows
 from sim.truth import Truth
@@ -32,8 +36,12 @@ if TYPE_CHECKING:
     from sim.resolved.scene import Fall
     from sim.resolved_dials import ResolvedDials
 
+log = logging.getLogger(__name__)
+
 NEXT = 4
 """Runs that are made in the background, from the one on that is being armed."""
+MOST_S, TOLD_S = 120.0, 5.0
+"""Processor time of a fall that is refused, and of a drop that is told of before it is made, s."""
 TRACK_S = 1 / 960
 """Between two moments of the track: half a frame of the paper's camera."""
 ROD_LENGTH = 0.102
@@ -63,6 +71,19 @@ class ResolvedTruth(Truth):
     film: dict[str, Any] | None = None
 
 
+_HANGING = "look at length, tilt, drop and incline, and at dials of how chains hang, and drag"
+_LONG = (
+    "fewer rods, a lower drop, heavier rods (mass, density), softer strings (string_strain) or "
+    "longer touches (board_time, rod_time)"
+)
+_INSTALL = 'pip install "chainrig[resolved]", which is numba'
+_SLOW = "sim: each drop takes about %.2g s to make"
+_NOT_COMPILED = (
+    f"sim: numba is not installed: each drop takes about %.2g s to make, hundreds of times as long "
+    f"as with {_INSTALL}"
+)
+
+
 class ResolvedLab(ChainLab):
     """Everything behind the gates, with rods, strings and board resolved in time.
 
@@ -76,7 +97,7 @@ class ResolvedLab(ChainLab):
     Raises
     ------
     InputError
-        Chains of beads, or rods whose diameter is unknown.
+        Chains of beads, rods whose diameter is unknown, or a drop that cannot be or takes too long.
     """
 
     def __init__(
@@ -100,6 +121,13 @@ class ResolvedLab(ChainLab):
             *([] if protocol.contact == Contact() else [protocol.contact]),
         )  # fmt: skip
         self._ahead = Ahead(self._make)
+        kinds = {
+            (run.incline_deg, run.impact, run.free): number for number, run in self.runs.items()
+        }
+        some = [self._checked(pack_label(number, 1)) for number in kinds.values()]
+        longest = max(sum(map(processor_time, chains.values())) for chains in some)
+        if longest > TOLD_S:
+            log.warning(_SLOW if is_compiled() else _NOT_COMPILED, longest)
 
     def rest(self, label: int) -> int:
         """As of `ChainLab`; the drop that is being armed and the next ones begin to be made."""
@@ -144,13 +172,35 @@ class ResolvedLab(ChainLab):
         name = fall_cache.key(self._key, self.filmed, label)
         made: dict[str, Any] | None = fall_cache.load(name)
         if made is None:
-            chains = self.chains(label)
+            chains = self._checked(label)
             falls = {side: fall(chain) for side, chain in chains.items()}
             made = self._seen(label, falls)
             if self.filmed and "impact" in chains:
                 made["truth"]["film"] = film(chains["impact"], falls["impact"])
             fall_cache.save(name, made)
         return made
+
+    def _checked(self, label: int) -> dict[Side, Chain]:
+        """Hang the chains of a drop, and see that they can fall.
+
+        Raises
+        ------
+        InputError
+            Rods that are where others or the board are, a fall that does not end, or a long one.
+        """
+        chains = self.chains(label)
+        number, _ = unpack_label(label)
+        for side, chain in chains.items():
+            if (why := impossible(chain)) is not None:
+                raise InputError(f"dynamics=resolved: run {number}, {side} side: {why}", _HANGING)
+            if rod_steps(chain) > MOST_ROD_STEPS or processor_time(chain) > MOST_S:
+                raise InputError(
+                    f"dynamics=resolved: run {number}, {side} side: a fall of "
+                    f"{chain.rods.masses.size} rods would take {processor_time(chain):.2g} s of "
+                    f"processor time, in steps of {1e6 * usual_step(chain):.2g} µs",
+                    _LONG if is_compiled() else f"{_LONG}, or {_INSTALL}",
+                )
+        return chains
 
     def chains(self, label: int) -> dict[Side, Chain]:
         """Hang the chains of a drop as they really are."""
@@ -309,7 +359,16 @@ def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
     """When the top rod's middle passes the contact level, s after release, and how fast, m/s.
 
     Where the rod strikes before, it falls on as if nothing had been there.
+
+    Raises
+    ------
+    InputError
+        It struck nothing as long as falls go on.
     """
+    if not math.isfinite(struck.strike_s):
+        raise InputError(
+            f"dynamics=resolved: the top rod strikes nothing within {LONGEST:g} s", _HANGING
+        )
     contact, speed = float(struck.touched_height[-1]), struck.top_speed
     if contact >= 0.0:
         there = math.sqrt(speed**2 + 2.0 * gravity * contact)

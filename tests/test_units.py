@@ -17,6 +17,7 @@ BASES = {
     Dimension.MASS: "kg",
     Dimension.DENSITY: "kg/m^3",
     Dimension.FREQUENCY: "Hz",
+    Dimension.TURNING: "rad/s",
     Dimension.NUMBER: "",
 }
 FINITE = st.floats(min_value=-1e12, max_value=1e12, allow_nan=False)

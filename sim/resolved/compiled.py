@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+def is_compiled() -> bool:
+    """Whether loops are compiled here, and not run as they stand."""
+    return numba is not None and not numba.config.DISABLE_JIT
+
+
 def compiled(function: Function, *, keep: bool = True) -> Function:
     """Compile a function when it is first called; threads may run it side by side.
 

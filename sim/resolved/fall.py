@@ -38,9 +38,9 @@ def fall(
         When to end, s; by default `after` the top rod has touched something, and for a chain that
         strikes nothing once the top rod is a rod's length below the contact level.
     step
-        s; by default `STEP`, or `stable_step` where that is less.
+        s; by default `usual_step`.
     """
-    step = min(STEP, stable_step(chain)) if step is None else step
+    step = usual_step(chain) if step is None else step
     world = hang(chain)
     skipped = skip(chain, world, step)
     begin = skipped.size * SAMPLE * step
@@ -70,6 +70,11 @@ def fall(
         slack=float(falling / steps) if steps else math.nan,
         turning=float(record.top[1]),
     )
+
+
+def usual_step(chain: Chain) -> float:
+    """`STEP`, or `stable_step` where that is less, s."""
+    return min(STEP, stable_step(chain))
 
 
 _LOST = {

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _FIXED = 1e6  # kg: in a second 10 kN move it by 5 mm
 _SOUND = 0.5  # of 2, where the leapfrog of the stiffest string would break
+_TOUCH = 10  # steps in the shortest touch: with three, touches give energy
 
 
 def hang(chain: Chain) -> World:
@@ -33,7 +34,7 @@ def hang(chain: Chain) -> World:
 
 
 def stable_step(chain: Chain) -> float:
-    """The longest step, s, that the stiffest string between the lightest rods bears well."""
+    """The longest step, s, that touches and the stiffest string between the lightest rods bear."""
     bodies = _bodies(chain)
     stiffness = _strings(chain, bodies).stiffness.T
     both = np.zeros((2, bodies.mass.size))
@@ -41,7 +42,10 @@ def stable_step(chain: Chain) -> float:
     both[:, 1:] += stiffness
     # A rod's end weighs a quarter of the rod; its two strings pull one against the other.
     fastest = np.sqrt(2.0 * both * 4.0 / bodies.mass).max()
-    return _SOUND / float(fastest) if fastest else math.inf
+    strings = _SOUND / float(fastest) if fastest else math.inf
+    bounces = [chain.board.bounce] if chain.board is not None else []
+    bounces += [chain.touching] if chain.touching is not None else []
+    return min([strings, *(one.time_s / _TOUCH for one in bounces)])
 
 
 def gaps(world: World) -> Numbers:

@@ -369,7 +369,7 @@ def _strike(bodies: Bodies, ground: Ground, record: Record, step: float) -> None
 
 
 @compiled
-def _closest(bodies: Bodies, one: int, other: int) -> tuple[float, Vector, Vector, Vector]:
+def closest(bodies: Bodies, one: int, other: int) -> tuple[float, Vector, Vector, Vector]:
     """Overlap of two rods, both arms, and the normal from the other to the one."""
     u, w = _row(bodies.axis, one), _row(bodies.axis, other)
     apart = _minus(_row(bodies.place, one), _row(bodies.place, other))
@@ -402,7 +402,7 @@ def _look(bodies: Bodies, neighbours: Neighbours) -> None:
         tall = bodies.half[one] * abs(bodies.axis[one, 2]) + bodies.radius[one] + REACH
         tall += bodies.half[other] * abs(bodies.axis[other, 2]) + bodies.radius[other] + REACH
         high = abs(bodies.place[one, 2] - bodies.place[other, 2])
-        if high < tall and _closest(bodies, one, other)[0] > -REACH:
+        if high < tall and closest(bodies, one, other)[0] > -REACH:
             neighbours.near[number] = p
             number += 1
         else:
@@ -416,7 +416,7 @@ def _collide(bodies: Bodies, neighbours: Neighbours, record: Record, step: float
     for n in range(neighbours.number[0]):
         p = neighbours.near[n]
         one, other = neighbours.one[p], neighbours.other[p]
-        overlap, arm, other_arm, normal = _closest(bodies, one, other)
+        overlap, arm, other_arm, normal = closest(bodies, one, other)
         if overlap <= 0.0:
             neighbours.fastest[p] = 0.0
             continue

@@ -132,7 +132,13 @@ def test_stated_dials_are_the_protocol_s_own_but_for_those_that_are_set():
 
 @pytest.mark.parametrize(
     ("typo", "meant"),
-    [("skew", "skew_sd"), ("mised", "missed"), ("corupt", "corrupt"), ("quite", "quiet")],
+    [
+        ("skew", "skew_sd"),
+        ("mised", "missed"),
+        ("corupt", "corrupt"),
+        ("quite", "quiet"),
+        ("stringrestitution", "string_restitution"),
+    ],
 )
 def test_an_unknown_dial_is_named_and_a_near_one_proposed(typo, meant):
     with pytest.raises(InputError, match=repr(typo)) as caught:

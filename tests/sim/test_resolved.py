@@ -18,7 +18,8 @@ from sim import work_precision
 from sim.integrators import euler, runge_kutta
 from sim.published import folded_time
 from sim.resolved.contact_law import damping
-from sim.resolved.fall import fall
+from sim.resolved.fall import AFTER, fall
+from sim.resolved.foresight import duration, impossible
 from sim.resolved.hanging import stable_step
 from sim.resolved.motion import push
 from sim.resolved.scene import Board, Bounce, Chain, Fall, Rods, Strings
@@ -224,8 +225,37 @@ def test_a_folded_chain_falls_as_calkin_and_march_found():
 
 
 def test_a_stiffer_string_needs_a_shorter_step():
-    soft, stiff = (replace(SCENES[0], strings=Strings(0.3, strain)) for strain in (0.2, 0.002))
+    soft, stiff = (replace(SCENES[0], strings=Strings(0.3, strain)) for strain in (0.02, 0.0002))
     assert stable_step(stiff) == pytest.approx(stable_step(soft) / 10)
+
+
+@pytest.mark.parametrize("touching", [None, Bounce(0.5, 1e-5, 0.3)])
+def test_a_shorter_touch_needs_a_shorter_step_and_gives_no_energy(touching):
+    chain = replace(SCENES[0], start=0.05, board=board(0.0, time_s=1e-5), touching=touching)
+    step = stable_step(chain)
+    assert step <= 1e-5 / 5
+    kept, lost = (fall(chain, step=s).energy for s in (step, 1e-5))
+    assert np.diff(kept).max() < 1e-6 * kept[0]
+    assert np.diff(lost).max() > 1e-2 * kept[0]  # what the step is for
+
+
+@pytest.mark.parametrize("kappa", [0.0, 0.5, 3.0])
+def test_how_long_a_fall_takes_is_known_before(kappa):
+    """What strikes nothing and sinks through the board's place, with its air."""
+    chain = Chain(rods(2), Strings(), 0.3, GRAVITY, drag=np.full(2, kappa))
+    found = fall(chain)
+    there = float(np.interp(0.0, -found.heights[:, -1], found.times))
+    assert duration(chain) == pytest.approx(there + AFTER, abs=1e-6)
+
+
+def test_a_chain_that_cannot_hang_is_refused_beforehand():
+    crossed = replace(SCENES[0], rods=rods(3, tilt=math.radians(30)))
+    assert impossible(SCENES[0]) is None
+    assert "rods 1 and 2" in str(impossible(crossed))
+    assert impossible(replace(crossed, touching=None)) is None  # they pass through each other
+    assert "rod 1 is in the board" in str(impossible(replace(SCENES[0], start=-0.01)))
+    thick_air = replace(SCENES[0], drag=np.full(3, 1e3))
+    assert "more than 5 s" in str(impossible(thick_air))
 
 
 def test_error_against_run_time(monkeypatch):

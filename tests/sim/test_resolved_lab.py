@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +18,11 @@ from rig.link.messages import pack_label
 from rig.ports import truth_file
 from rig.protocol import reader
 from rig.runner import Operator, run_protocol
-from sim import fall_cache
+from sim import fall_cache, resolved_lab
 from sim.dials import Dials, read_dials
 from sim.edges import Request, falls
 from sim.film import film
+from sim.resolved import foresight
 from sim.resolved.fall import fall
 from sim.resolved_dials import NAMES, ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
@@ -152,6 +155,7 @@ def test_a_scene_without_a_board_costs_little():
     chain = lab.chains(pack_label(1, 1))["free"]
     found = fall(chain)
     assert found.frames_s.size == 0  # not one step: the whole way down is a formula
+    assert foresight.processor_time(chain) == 0.0
 
 
 def test_what_was_kept_for_other_parameters_is_not_taken(dropped):
@@ -167,6 +171,38 @@ def test_a_disk_that_takes_nothing_only_costs_time(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     fall_cache.save("x", {"a": 1})
     assert fall_cache.load("x") is None
+
+
+def test_a_full_disk_leaves_no_scraps(monkeypatch, tmp_path):
+    def fill(self, text, encoding):
+        self.write_bytes(text.encode(encoding)[:3])
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with monkeypatch.context() as full:
+        full.setattr(Path, "write_text", fill)
+        fall_cache.save("x", {"a": 1})
+    assert not [*fall_cache.folder().iterdir()]
+
+
+@pytest.mark.parametrize("hurt", [lambda t: t[:-1], lambda t: t.replace("1", "2"), lambda _: "[]"])
+def test_a_fall_that_was_damaged_on_the_disk_is_made_anew(hurt, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    fall_cache.save("x", {"a": 1})
+    assert fall_cache.load("x") == {"a": 1}
+    (path,) = fall_cache.folder().iterdir()
+    path.write_text(hurt(path.read_text()))
+    assert fall_cache.load("x") is None
+
+
+def test_only_so_many_falls_are_kept(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(fall_cache, "KEPT", 2)
+    for age, name in enumerate("abc"):
+        fall_cache.save(name, name)
+        os.utime(fall_cache.folder() / f"{name}.json", (age, age))
+    fall_cache.save("d", "d")
+    assert [fall_cache.load(name) for name in "abcd"] == [None, None, "c", "d"]
 
 
 def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
@@ -198,7 +234,12 @@ def test_falls_for_benchmarks(scene):
         ("dynamics", "real", "model or resolved"),
         ("string_restitution", "0.05", "0.1 to 1"),
         ("board_time", "2 mm", "a time"),
-        ("rods_touch", "2", "0 to 1"),
+        ("rods_touch", "0.5", "neither 0 nor 1"),
+        ("spin_sd", "3", "rad/s"),
+        ("swing_sd", "1e9 m/s", "0 to 10 m/s"),
+        ("tilt_sd", "30 deg", "in each other as it hangs"),
+        ("drag", "1000", "more than 5 s"),
+        ("hang_sd", "9 m", "as it hangs"),
         ("restitution", "-0.37", "restitution"),
     ],
 )
@@ -209,8 +250,39 @@ def test_bad_settings_are_refused(scene, setting, text, says):
 
 
 def test_dials_of_the_resolved_world_are_unknown_to_the_model():
-    with pytest.raises(InputError, match="string_restitution"):
+    with pytest.raises(InputError, match="string_restitution") as caught:
         read_dials(choose_world({"string_restitution": "0.5"})[1])
+    assert caught.value.hint == "add dynamics=resolved"
+
+
+def test_a_fall_that_would_take_minutes_is_refused_and_a_long_one_told_of(
+    scene, tmp_path, monkeypatch, caplog
+):
+    def asked(path: str) -> None:
+        set_scene("sim", {"protocol": path, "dynamics": "resolved"})
+
+    asked(scene)
+    assert not caplog.records
+    monkeypatch.setattr(foresight, "is_compiled", lambda: False)
+    monkeypatch.setattr(resolved_lab, "is_compiled", lambda: False)
+    asked(scene)
+    (told,) = caplog.messages
+    assert "numba is not installed" in told
+    small = Path(scene).read_text()
+    for was, now in (("145 mm", "20 mm"), ("12.7 mm", "0.1 mm"), ("102 mm", "2 mm")):
+        small = small.replace(was, now)
+    path = tmp_path / "threads.yaml"
+    path.write_text(small)
+    with pytest.raises(InputError, match="of 4 rods would take") as caught:
+        asked(str(path))
+    assert "numba" in caught.value.hint
+
+
+def test_a_top_rod_that_never_lands_is_said(dropped):
+    lab, _, _ = dropped
+    struck = replace(fall(lab.chains(pack_label(1, 1))["impact"]), touched_s=np.full(4, np.inf))
+    with pytest.raises(InputError, match="strikes nothing"):
+        at_level(struck, GRAVITY)
 
 
 def test_quiet_hangs_chains_still_and_keeps_the_materials():
