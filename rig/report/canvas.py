@@ -97,10 +97,17 @@ class Canvas:
     def file(self, kind: Kind) -> bytes:
         """Return the figure as a file of a kind; the same drawing gives the same bytes."""
         import matplotlib as mpl  # noqa: PLC0415 - as in `canvas`
+        from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
 
         made = io.BytesIO()
         with ctrl_c_waits(), mpl.rc_context(_STYLE):
-            self.figure.savefig(made, format=kind, dpi=_DPI, metadata=self._metadata(kind))
+            if kind == "svg":
+                # `savefig` would go through all that is drawn once more, only for the layout.
+                drawn: Any = FigureCanvasSVG(self.figure)
+                self.figure.set_dpi(_DPI)  # of pixels in it
+                drawn.print_svg(made, metadata=self._metadata(kind))
+            else:
+                self.figure.savefig(made, format=kind, dpi=_DPI, metadata=self._metadata(kind))
         return made.getvalue()
 
     def _metadata(self, kind: Kind) -> dict[str, Any]:
