@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from rig.commands import design
+from rig.design.trials import trials
 from tests.scenes.draw import scene
 from tests.scenes.through import faults
 
@@ -19,6 +21,21 @@ SOME = (0, 1, 4, 6, 7, 8, 9, 10, 12, 13, 14, 15, 16, 20, 21, 22, 25, 27, 28, 30)
 VOID = 17
 """A scene in which every drop is void, and each command seeks the causes anew: with few drops."""
 MANY = 240
+
+
+@pytest.fixture(autouse=True)
+def _trials_once(monkeypatch):
+    """Make a layout's trial drops once: `check` and `design` each say what became of them."""
+    made = {}
+
+    def once(protocol):
+        key = repr(protocol)
+        if key not in made:
+            made[key] = trials(protocol)
+        return made[key]
+
+    monkeypatch.setattr("rig.design.trials.trials", once)
+    monkeypatch.setattr(design, "trials", once)
 
 
 def _assert_sound(drawn: Scene, folder: Path) -> None:
