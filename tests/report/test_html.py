@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -15,21 +16,27 @@ from rig.report.pictures import pictures
 from rig.sections import Sections
 from tests.report import fake_analysis
 
-TWO = fake_analysis.two_chains(repeats=4)
-CONTEXT = ReportContext(
-    title="Uniform rod chains",
-    analysis=TWO,
-    simulated=True,
-    figures=pictures(TWO, fake_analysis.curves(), True, skew_limit_s=0.005, sections=Sections()),
-    protocol_text="protocol: 1\n",
-    protocol_source="uniform.yaml",
-    protocol_sha256="ab" * 32,
-    provenance={"session": "a.rig", "created": "2025-01-01T00:00:00+00:00"},
-    identities=[{"serial": "A1", "tick_hz": 2_000_000}],
-    clock={"rate (ppm)": -1330.0},
-    notes=["Air drag is left out."],
-)
 VOID_TAGS = {"meta", "br", "hr", "img", "link"}
+
+
+@cache
+def context() -> ReportContext:
+    """A session of two chains; to draw its figures takes most of a second."""
+    two = fake_analysis.two_chains(repeats=4)
+    curves = fake_analysis.curves()
+    return ReportContext(
+        title="Uniform rod chains",
+        analysis=two,
+        simulated=True,
+        figures=pictures(two, curves, True, skew_limit_s=0.005, sections=Sections()),
+        protocol_text="protocol: 1\n",
+        protocol_source="uniform.yaml",
+        protocol_sha256="ab" * 32,
+        provenance={"session": "a.rig", "created": "2025-01-01T00:00:00+00:00"},
+        identities=[{"serial": "A1", "tick_hz": 2_000_000}],
+        clock={"rate (ppm)": -1330.0},
+        notes=["Air drag is left out."],
+    )
 
 
 class Balance(HTMLParser):
@@ -64,7 +71,7 @@ def parse(page: str) -> Balance:
 
 
 def test_the_page_is_whole_and_needs_nothing_else() -> None:
-    page = report_html(CONTEXT)
+    page = report_html(context())
     parser = parse(page)
     assert len(parser.ids) == len(set(parser.ids))
     places = [link[1:] for link in parser.links if not link.startswith("data:")]
@@ -81,7 +88,7 @@ def test_the_page_is_whole_and_needs_nothing_else() -> None:
         "226 / 225 / 1 / 0 / 0",
     ):
         assert text in page
-    assert page == report_html(CONTEXT)
+    assert page == report_html(context())
 
 
 def test_text_is_escaped() -> None:
@@ -94,7 +101,7 @@ def test_text_is_escaped() -> None:
         Audit(0, 0, 0, 0, 0),
         {bad: Measured(1.0, 1.0, budget={bad: 1.0})},
     )
-    figures = [replace(picture, alt=bad, caption=bad) for picture in CONTEXT.figures]
+    figures = [replace(picture, alt=bad, caption=bad) for picture in context().figures]
     page = report_html(
         ReportContext(
             title=bad,
@@ -131,8 +138,8 @@ def test_what_is_missing_is_left_out() -> None:
 
 
 def test_written_whole(tmp_path: Path) -> None:
-    write_report(tmp_path / "r.html", CONTEXT)
-    assert (tmp_path / "r.html").read_text("utf-8") == report_html(CONTEXT)
+    write_report(tmp_path / "r.html", context())
+    assert (tmp_path / "r.html").read_text("utf-8") == report_html(context())
 
 
 def test_importing_loads_neither_matplotlib_nor_numpy() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, fields, replace
+from functools import cache
 
-import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,7 +30,12 @@ UNSET = {"restitution", "friction", "reference"}  # not-a-number, which equals n
 SIGNED = {"restitution", "clock", "drift", "reference"}
 NAMES = {field.name for field in fields(Dials)}
 
-REGISTRY = pint.UnitRegistry()
+
+@cache
+def registry():
+    import pint  # takes its time, with its registry
+
+    return pint.UnitRegistry()
 
 
 def same(one: Dials, other: Dials) -> bool:
@@ -83,7 +88,7 @@ def test_a_dial_with_its_unit_changes_nothing_else(name, text, value):
 def test_units_agree_with_pint(dial, number):
     name, unit = dial
     base = "s" if name in TIMES else "m"
-    wanted = REGISTRY.Quantity(float(number), unit).to(base).magnitude
+    wanted = registry().Quantity(float(number), unit).to(base).magnitude
     assert getattr(read_dials({name: f"{number} {unit}"}), name) == pytest.approx(wanted, rel=1e-14)
 
 
