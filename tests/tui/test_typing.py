@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from rich.style import Style
 from textual import events
@@ -24,6 +24,7 @@ from rig.tui.pictures import QUIET, FakeClient
 from rig.tui.screens.palette import Palette
 from rig.tui.state import state_of
 from tests.cli.lab import short
+from tests.examples import examples
 from tests.tui.lab import KEYS, run
 
 STILL_S = 0.15
@@ -133,7 +134,7 @@ def session(tmp_path_factory):
     return path
 
 
-@settings(max_examples=8, deadline=None)
+@examples(4)
 @given(episodes)
 @example(ARMS)
 @example(ENDS)
