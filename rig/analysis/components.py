@@ -35,11 +35,15 @@ class Components:
     departure
         How far off its chain a rod that passes a beam may be once rods have struck, m: strings
         bounce, rods turn, and none of that is in the equations.
+    few
+        And how far besides where but few rods still fall: over their number.
     impulse, impulse_floor
         Scatter of single impulses about α: relative to α, and where α is small.
     bounce
         What strings that bounce add to the scatter of the last pull, relative to α. One rod alone
         goes with what its own string does; where M are left it counts by 1/M.
+    landed
+        By how much the top rod strikes too early to be seen pass: relative to the protocol's own.
     gates, rods
         Beam heights and rod places: relative to the protocol's own uncertainties.
     swing
@@ -51,12 +55,24 @@ class Components:
     hang: float = _DEFAULT.hang
     beam: float = _DEFAULT.beam_offset
     departure: float = _DEFAULT.departure
+    few: float = _DEFAULT.last_rods
     impulse: float = _DEFAULT.impulses
     impulse_floor: float = _DEFAULT.impulse_floor
     bounce: float = _DEFAULT.last_impulse
     gates: float = 1.0
     rods: float = 1.0
     swing: float = 1.0
+    landed: float = 1.0
+
+    def departures(self, loose: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance of how far rods are off their chain, m².
+
+        Parameters
+        ----------
+        loose
+            See `rig.analysis.trajectory.Trajectory.loose`.
+        """
+        return (loose > 0.0) * self.departure**2 + (self.few * loose) ** 2
 
     def impulses(self, alpha: float, above: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scatter of each impulse's α, for an α.
@@ -84,6 +100,7 @@ def stated(protocol: Protocol) -> Components:
         priors.hang,
         priors.beam_offset,
         priors.departure,
+        priors.last_rods,
         priors.impulses,
         priors.impulse_floor,
         priors.last_impulse,

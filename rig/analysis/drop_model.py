@@ -147,7 +147,10 @@ class DropModel:
             contact = protocol.contact
             unknowns.add("contact", "contact", contact.level.u)
             unknowns.add("strike", "contact", contact.strike.u)
-            unknowns.add("top", "top rod", math.sqrt(2.0) * components.departure)
+            # It falls on as it was off its chain while two were left.
+            off = math.hypot(components.departure, 0.5 * components.few)
+            unknowns.add("top", "top rod", math.sqrt(2.0) * off)
+            unknowns.add("landed", "contact", components.landed)
             # In α, like impulses; the same for all drops of a condition, whatever each one found.
             pull = math.hypot(
                 protocol.priors.strings * self.records["impact"].alpha,
@@ -175,7 +178,7 @@ class DropModel:
         tight = replace(self.protocol.priors, strings=0.0)
         other.protocol = replace(self.protocol, priors=tight)
         impulse = min(_ALIKE, self.components.impulse)
-        other.components = replace(self.components, impulse=impulse, bounce=0.0)
+        other.components = replace(self.components, impulse=impulse, bounce=0.0, landed=0.0)
         other.unknowns = other._unknowns()  # other priors, and the same paths
         return other
 
@@ -334,6 +337,7 @@ class DropModel:
             found += x[at[f"{role} swing"]] * edges.drawn
         if role == "impact":
             found -= edges.alone * x[at["top"]][0]
+            found -= edges.landed * x[at["landed"]][0]
         return found
 
     def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
@@ -349,8 +353,8 @@ class DropModel:
         times = seen.times * (1.0 + x[self.unknowns["clock"]])
         height, speed = self.trajectory(role, x).heights(times)
         values = height - self.all_levels(role, x)[seen.pick]
-        struck = _loose(self.trajectory(role, x), times, seen)
-        return Residuals(values, self._sigma(seen, speed, struck), speed, seen.burst == 0.0, struck)
+        loose = _loose(self.trajectory(role, x), times, seen)
+        return Residuals(values, self._sigma(seen, speed, loose), speed, seen.burst == 0.0, loose)
 
     def independent(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """Return `residuals` with of each what the one before tells of it taken away."""
@@ -359,7 +363,7 @@ class DropModel:
     def parted(self, role: str, left: Residuals, matches: Sequence[Index]) -> Residuals:
         """Make `independent` of some residuals."""
         left = left._replace(values=left.values.copy(), sigma=left.sigma.copy())
-        self._part(self._matched(role, matches), left.struck, left.values, left.sigma)
+        self._part(self._matched(role, matches), left.loose > 0.0, left.values, left.sigma)
         return left
 
     def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:
@@ -376,36 +380,36 @@ class DropModel:
         sigma[first + 1] = np.sqrt(sigma[first + 1] ** 2 - share * shared)
         return told
 
-    def _sigma(self, seen: Seen, speed: Array, struck: Flags) -> Array:
+    def _sigma(self, seen: Seen, speed: Array, loose: Array) -> Array:
         """Standard deviation of where each edge was seen, m."""
         known = self.components
         variance = known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2)
-        found: Array = np.sqrt(variance + struck * known.departure**2)
+        found: Array = np.sqrt(variance + known.departures(loose))
         return found
 
     def left_over(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """Return the left sides of `equations` alone."""
         seen, path = self._matched(role, matches), self.trajectory(role, x)
-        times, late, levels, struck = self._stamps(role, x, seen)
+        times, late, levels, loose = self._stamps(role, x, seen)
         height, speed = path.heights(times)
-        values, sigma = height - levels + speed * late, self._sigma(seen, speed, struck)
-        self._part(seen, struck, values, sigma)
-        return Residuals(values, sigma, speed, seen.burst == 0.0, struck)
+        values, sigma = height - levels + speed * late, self._sigma(seen, speed, loose)
+        self._part(seen, loose > 0.0, values, sigma)
+        return Residuals(values, sigma, speed, seen.burst == 0.0, loose)
 
-    def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Flags]:
+    def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Array]:
         """When each edge should have been stamped, by how much later that is than it was, s.
 
-        Then the level that it is of, and whether a rod had struck before.
+        Then the level that it is of, and how loose the chain was.
         """
         path = self.trajectory(role, x)
         levels = self.all_levels(role, x)[seen.pick]
         stamps = seen.times * (1.0 + float(x[self.unknowns["clock"]][0]))
         height, speed = path.heights(stamps)
         off = height - levels
-        struck = _loose(path, stamps, seen)
-        near = np.abs(off) <= STRAY * self._sigma(seen, speed, struck)
+        loose = _loose(path, stamps, seen)
+        near = np.abs(off) <= STRAY * self._sigma(seen, speed, loose)
         late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
-        return stamps + late, late, levels, struck
+        return stamps + late, late, levels, loose
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges.
@@ -416,20 +420,20 @@ class DropModel:
         """
         at, local, seen = self.unknowns, self._local[role], self._matched(role, matches)
         rate, path = 1.0 + float(x[at["clock"]][0]), self.trajectory(role, x)
-        times, late, levels, struck = self._stamps(role, x, seen)
+        times, late, levels, loose = self._stamps(role, x, seen)
         height, speed, moved = path.sights(times, local.path)
         values = height - levels + speed * late
-        sigma = self._sigma(seen, speed, struck)
+        sigma = self._sigma(seen, speed, loose)
         slopes = np.zeros((times.size, local.columns.size))
         places, fixed = self._fixed_slopes(role, seen)
         slopes.ravel()[places] = fixed
         slopes[:, : local.moving] += moved
         # Of a slow clock the true time is later, and the chain lower by then.
         slopes[:, local.at[at["clock"].start]] -= speed * times / rate
-        told = self._part(seen, struck, values, sigma)
+        told = self._part(seen, loose > 0.0, values, sigma)
         second = np.flatnonzero(told)
         slopes[second] -= told[second, None] * slopes[second - 1]
-        left = Residuals(values, sigma, speed, seen.burst == 0.0, struck)
+        left = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
         return Equations(left, told, slopes, local.columns, len(at))
 
     def _fixed_slopes(self, role: str, seen: Seen) -> tuple[Index, Array]:
@@ -450,6 +454,7 @@ class DropModel:
             columns.append((at[f"{role} swing"].start, -seen.drawn))
         if role == "impact":
             columns.append((at["top"].start, seen.alone.astype(np.float64)))
+            columns.append((at["landed"].start, seen.landed))
         edges = seen.times.size
         places = np.empty((len(columns), edges), dtype=np.intp)
         values = np.empty((len(columns), edges))
@@ -460,10 +465,9 @@ class DropModel:
         return places, values
 
 
-def _loose(path: Trajectory, times: Array, seen: Seen) -> Flags:
-    """Which edges are of rods that may be off their chain: a rod has struck, others still fall."""
-    found: Flags = path.hit_before(times) & ~seen.alone
-    return found
+def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:
+    """How loose a chain is at each edge, see `Trajectory.loose`; the top rod alone is no chain."""
+    return np.where(seen.alone, 0.0, path.loose(times))
 
 
 def prior_air(protocol: Protocol) -> tuple[float, float]:

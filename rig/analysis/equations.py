@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.drop_model import DropModel
     from rig.protocol.protocol import Protocol
+    from rig.units import Quantity
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -28,6 +29,9 @@ HUBER = 4.0
 """Standard deviations beyond which an edge counts less."""
 STRAY = 6.0
 """Standard deviations: no rod is that far off once everything was adjusted."""
+SLOWED = 0.5
+"""Share of its speed that a rod loses at most whose one end strikes: that of a uniform rod which
+turns about its middle, thrown back as fast as it came (Eq. 5 with β = 1 and ξ = ⅓)."""
 _ALIKE = 0.01  # by which the root of an edge's weight may differ and still be the same
 
 
@@ -44,15 +48,15 @@ class Residuals(NamedTuple):
         Of the chain at each edge, m/s.
     clean
         Whether each edge is no part of a flicker.
-    struck
-        Whether a rod had struck before.
+    loose
+        How loose the chain was, see `rig.analysis.trajectory.Trajectory.loose`.
     """
 
     values: Array
     sigma: Array
     speed: Array
     clean: Flags
-    struck: Flags
+    loose: Array
 
 
 class Equations(NamedTuple):
@@ -107,6 +111,7 @@ class Seen(NamedTuple):
     turn: Array
     drawn: Array
     alone: Flags
+    landed: Array
     paired: Flags
 
 
@@ -127,6 +132,8 @@ class Expected(NamedTuple):
         See `rig.analysis.swing.drawn`, of its rod.
     alone
         Whether all rods below have struck: only the top rod falls.
+    landed
+        How much higher it may be there because it struck before, m; one standard deviation.
     begins, ends
         Number of observed edges before each gate, and of expected ones after each.
     """
@@ -140,6 +147,7 @@ class Expected(NamedTuple):
     turn: Array
     drawn: Array
     alone: Flags
+    landed: Array
     begins: Index
     ends: Index
 
@@ -155,6 +163,7 @@ class Expected(NamedTuple):
         alone &= levels < (
             -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
         )
+        left = np.where(alone, levels + strikes[-1], np.inf)  # of the top rod's way
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
@@ -165,6 +174,7 @@ class Expected(NamedTuple):
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
+            _landed(protocol.contact.strike, left),
             np.cumsum(observed) - observed,
             np.cumsum(expected),
         )
@@ -189,6 +199,7 @@ class Expected(NamedTuple):
             self.turn[pick],
             self.drawn[pick],
             self.alone[pick],
+            self.landed[pick],
             self._pairs(pick),
         )
 
@@ -197,6 +208,19 @@ class Expected(NamedTuple):
         rods, gate = self.rods[pick], self.gate[pick]
         found[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
         return found
+
+
+def _landed(strike: Quantity, left: Array) -> Array:
+    """See `Expected.landed`: normally distributed strikes, from which on a rod is slower."""
+    found = np.zeros_like(left)
+    if strike.u <= 0.0:
+        return found
+    for place in np.flatnonzero(np.isfinite(left)):
+        z = (float(left[place]) - strike.value) / strike.u
+        beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
+        square = (1.0 + z * z) * beyond - z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+        found[place] = SLOWED * strike.u * math.sqrt(max(square, 0.0))
+    return found
 
 
 def robust_weights(residuals: Array, cut: float = math.inf) -> Array:

@@ -40,6 +40,7 @@ _MEMBERS = ("gates", "rods", "beam", "hang", "swing")
 _BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
+_MANY = 9  # rods that still fall: so many are as good as more
 
 
 class Evidence:
@@ -67,7 +68,7 @@ class Evidence:
         self._squares = dict.fromkeys(_MEMBERS, 0.0)
         self._determined = dict.fromkeys(_MEMBERS, 0.0)
         self._impulses: list[Array] = []
-        self._edges: list[tuple[Array, Array, Flags]] = []
+        self._edges: list[tuple[Array, Array, Array]] = []
 
     def common(self, name: str, y: Array, v: Array, sd: Array) -> None:
         """Count a block of the session's unknowns.
@@ -103,7 +104,7 @@ class Evidence:
         """Count what is left over of the edges that are no part of a flicker."""
         for row in residuals:
             good = row.clean & (np.abs(row.values) <= STRAY * row.sigma)
-            self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.struck[good]))
+            self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
 
     def _count(self, kind: str, y: Array, v: Array) -> None:
         self._squares[kind] += float(y @ y)
@@ -121,6 +122,11 @@ class Evidence:
         """
         old = self.components
         new: dict[str, float] = {}
+        self._share(("jitter", "floor", "departure", "few"), *self._binned(parameters, struck), new)
+        # Where rods leave their chain, a few drops that happen to be alike show nothing of strings.
+        loose = max(LEAST_SHARE, min(1.0, new["departure"] / self.stated.departure))
+        if loose < 2.0 * LEAST_SHARE:  # where no rod is off its chain, few are not either
+            new["few"] = LEAST_SHARE * self.stated.few
         for kind, found in self._squares.items():
             stated = _member((getattr(self.stated, kind) / getattr(old, kind)) ** 2, 1.0)
             weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
@@ -132,34 +138,37 @@ class Evidence:
         if self._impulses:
             size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
             kinds = np.stack([size, np.ones_like(size), alone])
-            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
-        self._share(("jitter", "floor", "departure"), *self._binned(parameters, struck), new)
-        self.components = replace(old, **new)
+            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new, loose)
+        self.components = replace(old, landed=loose, **new)
         return self
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
-        """Sort edges by what scatters alike: at about the same speed, before or after an impact.
+        """Sort edges by what scatters alike: at about the same speed, with as many rods falling.
 
         Returns
         -------
         kinds, squares, counts
-            By how much each component counts in each bin, shape ``(3, bins)``; sums of squares,
+            By how much each component counts in each bin, shape ``(4, bins)``; sums of squares,
             and their degrees of freedom.
         """
         parts = zip(*self._edges, strict=True)
-        squares, speeds, after = (np.concatenate(part) for part in parts)
+        squares, speeds, loose = (np.concatenate(part) for part in parts)
         # Few bins do as well as all edges.
         edges = np.linspace(speeds.min(), speeds.max(), _BINS + 1)[1:-1]
-        place = np.digitize(speeds, edges) + _BINS * after
-        counts: Array = np.bincount(place, minlength=2 * _BINS).astype(np.float64)
-        sums: Array = np.bincount(place, squares, 2 * _BINS).astype(np.float64)
-        middles = np.bincount(place, speeds, 2 * _BINS) / np.maximum(counts, 1)
-        late = np.repeat([0.0, 1.0], _BINS)
+        after = loose > 0.0
+        left = np.minimum(np.divide(1.0, loose, out=np.zeros_like(loose), where=after), _MANY)
+        place = np.digitize(speeds, edges) + _BINS * np.rint(left).astype(np.intp)
+        bins = _BINS * (_MANY + 1)
+        counts: Array = np.bincount(place, minlength=bins).astype(np.float64)
+        sums: Array = np.bincount(place, squares, bins).astype(np.float64)
+        middles = np.bincount(place, speeds, bins) / np.maximum(counts, 1)
+        few = np.bincount(place, loose**2, bins) / np.maximum(counts, 1)
+        late = (few > 0.0).astype(np.float64)
         # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
         total, behind = max(1, squares.size), max(1, int(after.sum()))
         taken = (parameters - struck) / total + late * struck / behind
         full = counts > 0
-        kinds = np.stack([middles, np.ones_like(middles), late])[:, full]
+        kinds = np.stack([middles, np.ones_like(middles), late, few])[:, full]
         degrees: Array = (np.maximum(0.5, 1.0 - taken) * counts)[full]
         return kinds, sums[full], degrees
 
@@ -170,6 +179,7 @@ class Evidence:
         squares: Array,
         counts: Array,
         new: dict[str, float],
+        share_left: float = LEAST_SHARE,
     ) -> None:
         """Estimate components that make up one variance.
 
@@ -181,7 +191,7 @@ class Evidence:
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
         squares, counts = squares + share * (_member(stated, found) @ kinds), counts + share
-        least = LEAST_SHARE**2 * stated
+        least = share_left**2 * stated
         for _ in range(_INNER):
             for n, sizes in enumerate(kinds):
                 found[n] = max(

@@ -43,7 +43,8 @@ _ROUNDS = 30  # of which few drops need many, for they tell little of the scatte
 _REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
 _DONE = 0.02  # of a standard uncertainty
 _STEADY = 0.02  # relative change of the components
-_LEAST = {"floor": 5e-6, "departure": 5e-6}  # where others of its kind count for more
+_LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
+"""Where others of their kind count for more."""
 
 
 @dataclass(frozen=True, slots=True)

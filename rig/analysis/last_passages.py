@@ -43,6 +43,8 @@ class _Passages(NamedTuple):
         What each edge is off by itself, m.
     sign
         −½ where a rod's lower side darkens the beam, ½ where its upper side clears it.
+    landed
+        How much higher the rod may be because it struck before, m; one standard deviation.
     """
 
     times: Array
@@ -51,12 +53,18 @@ class _Passages(NamedTuple):
     rod: Index
     sigma: Array
     sign: Array
+    landed: Array
 
     def only(self, chosen: Flags) -> _Passages:
         """Leave out the others."""
-        times, heights, gate, rod, sigma, sign = self
         return _Passages(
-            times[chosen], heights[chosen], gate[chosen], rod[chosen], sigma[chosen], sign[chosen]
+            self.times[chosen],
+            self.heights[chosen],
+            self.gate[chosen],
+            self.rod[chosen],
+            self.sigma[chosen],
+            self.sign[chosen],
+            self.landed[chosen],
         )
 
 
@@ -128,14 +136,16 @@ def _passages(fit: Fit, role: str) -> _Passages:
     heights = expected.levels[pick] + places[-1]
     clock = 1.0 + float(fit.x[model.unknowns["clock"]][0])
     sigma = model.residuals(role, fit.x, fit.matches[role]).sigma
-    return _Passages(expected.times[edge] * clock, heights, gate, rod, sigma, expected.sign[pick])
+    sign, landed = expected.sign[pick], model.components.landed * expected.landed[pick]
+    return _Passages(expected.times[edge] * clock, heights, gate, rod, sigma, sign, landed)
 
 
 def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[float, float], Array]:
     """Height and speed of a chain's top rod at a moment, and their covariance.
 
     Generalized least squares of z(t) = z − v(t − t₀) − ½g(t − t₀)²: edges are off by themselves,
-    and together by their beam's height and aim, their rod's place and the rods' width.
+    and together by their beam's height and aim, their rod's place, the rods' width, and what a rod
+    that strikes early loses.
     """
     protocol, chain = fit.model.protocol, fit.model.records[role].chain
     assert protocol.gates is not None
@@ -151,6 +161,7 @@ def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[floa
         + beam * (seen.gate[:, None] == seen.gate)
         + place**2 * (seen.rod[:, None] == seen.rod)
         + chain.width_u**2 * np.outer(seen.sign, seen.sign)
+        + np.outer(seen.landed, seen.landed)
     )
     weighted = np.linalg.solve(covariance, np.column_stack([design, fallen]))
     inverse = np.linalg.inv(design.T @ weighted[:, :2])

@@ -180,12 +180,13 @@ class Trajectory:
         """`air` of some legs, likewise."""
         return float(self.air[0]) if self.air.size == 1 else self.air[leg]
 
-    def hit_before(self, times: Array) -> NDArray[np.bool_]:
-        """Whether a rod has struck before each time."""
+    def loose(self, times: Array) -> Array:
+        """How loose the chain is at each time: 1/M for M rods that still fall, 0 if none struck."""
         if self.hits is None:
-            return np.zeros(times.shape, dtype=np.bool_)
-        found: NDArray[np.bool_] = times > self.time[1]
-        return found
+            return np.zeros(times.shape)
+        struck = np.searchsorted(self.time[1:], times, side="left")
+        left: Array = np.maximum(self.time.size - 1 - struck, 1)
+        return np.where(struck > 0, 1.0 / left, 0.0)
 
     def _legs(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         leg = np.maximum(np.searchsorted(self.time, times, side="right") - 1, 0)

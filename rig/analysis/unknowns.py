@@ -140,7 +140,7 @@ def side_columns(
     at = {name: slice(begin, end) for name, begin, end in places}
     others = ["impact " if role == "free" else "free "]
     if role == "free":
-        others += ["alpha", "impulses", "contact", "strike", "top", "strings"]
+        others += ["alpha", "impulses", "contact", "strike", "top", "strings", "landed"]
     mine = np.ones(places[-1][2], dtype=np.bool_)
     for name, block in at.items():
         mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")

@@ -158,7 +158,7 @@ def _gates(protocol: Protocol) -> list[str]:
     return lines
 
 
-_STRUCK = {"departure", "impulses", "impulse_floor", "last_impulse", "strings"}
+_STRUCK = {"departure", "last_rods", "impulses", "impulse_floor", "last_impulse", "strings"}
 """Priors of a chain that strikes something."""
 
 

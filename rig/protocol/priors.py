@@ -73,6 +73,11 @@ PRIORS: dict[str, Prior] = {
         "how far off its chain a rod may be once rods have struck",
         "resolved falls: 0.2 mm with dead strings to 0.4 mm with lively ones",
     ),
+    "last_rods": Prior(
+        _length(),
+        "and besides where few rods still fall: times one over their number",
+        "resolved falls: 0.2 mm with damped strings to 2.4 mm with lively ones",
+    ),
     "impulses": Prior(
         Range(Dimension.NUMBER, 0.0, 1.0, "%", open_low=True),
         "scatter of single impulses, relative to α",

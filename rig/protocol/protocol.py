@@ -236,6 +236,7 @@ class Priors:
     beam_offset: float = 1.0e-3
     swing: float = 0.1
     departure: float = 0.25e-3
+    last_rods: float = 0.5e-3
     impulses: float = 0.2
     impulse_floor: float = 0.003
     last_impulse: float = 0.3

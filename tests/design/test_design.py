@@ -28,6 +28,7 @@ from tests.estimate.sessions import DIALS, analysis, forms
 INCLINES = (30.0, 50.0, 70.0)
 TRUE = Components(
     floor=1e-6, hang=1e-4, beam=5e-4, departure=1e-6, impulse=0.02, impulse_floor=1e-6, bounce=1e-6,
+    few=1e-6, landed=1e-6,
     gates=2 / 3,
 )  # fmt: skip
 """What the simulation's default dials are, in the analysis' words."""
