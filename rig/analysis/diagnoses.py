@@ -30,6 +30,8 @@ STRANGE = 0.5
 """Share of its expected edges below which a gate sees something else than its chain; below `RIGHT`
 too, where more than `FEW` are missing."""
 FEW = 8
+FEW_GATES = 8
+"""Gates of which any two may be exchanged where some see something else."""
 IMPLAUSIBLE = 6.0
 """Standard uncertainties beyond which a beam is not where the protocol says: by rods all alike and
 evenly spaced, an exchanged gate is fitted well at a wrong height."""
@@ -41,7 +43,6 @@ _ENOUGH = 3  # gates that see every rod
 _SOME = 3  # edges expected of a gate that say too little when they are missing
 _DEAD = "dead or not plugged in"
 _PAIR = 2  # edges of a rod
-_FEW_GATES = 8  # of which any two may be exchanged where some see something else
 _BY_CHANCE = 1e-4  # probability below which a rod that nobody saw is none
 
 
@@ -101,7 +102,7 @@ def diagnose(fit: Fit) -> Diagnosis:
     off = [one for one in alive if one.off > IMPLAUSIBLE]
     suspects = dict.fromkeys(one.train.gate for one in [*displaced, *off])
     strange = [one.train.gate for one in alive if one.strange]
-    if strange and len(gates) <= _FEW_GATES:
+    if strange and len(gates) <= FEW_GATES:
         # A side of few gates is read well as another fall where one of them is the other side's.
         suspects = dict.fromkeys([*strange, *(one.train.gate for one in alive)])
     odd = bool(void) or len(displaced) >= _PAIR

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.alone import Alone
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
-from rig.analysis.diagnoses import silent
+from rig.analysis.diagnoses import FEW_GATES, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.explanations import Explainer, explained
@@ -118,8 +118,10 @@ def _fitted(
         if one.unlike and explain:
             if one.explained is None:
                 assert protocol.gates is not None
-                gates = enumerate(protocol.gates.gates)
-                strange = [n for n, gate in gates if gate.side in one.poor]
+                gates = protocol.gates.gates
+                strange = [n for n, gate in enumerate(gates) if gate.side in one.poor]
+                if not strange and len(gates) <= FEW_GATES:
+                    strange = [*range(len(gates))]  # each may see nearly what another should
                 weigh = _explainer(protocol, run, drop, rough, components, strange)
                 one = replace(one, explained=tuple(explained(weigh.explain(None))))
                 known[job] = one

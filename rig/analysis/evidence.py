@@ -37,6 +37,7 @@ Size = TypeVar("Size", float, "Array")
 STATED_WEIGHT = 1.0
 """Members that a stated uncertainty counts for."""
 _MEMBERS = ("gates", "rods", "beam", "hang", "swing")
+_EDGES = ("jitter", "floor", "departure", "few")
 _BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
@@ -122,11 +123,15 @@ class Evidence:
         """
         old = self.components
         new: dict[str, float] = {}
-        self._share(("jitter", "floor", "departure", "few"), *self._binned(parameters, struck), new)
-        # Where rods leave their chain, a few drops that happen to be alike show nothing of strings.
-        loose = max(LEAST_SHARE, min(1.0, new["departure"] / self.stated.departure))
-        if loose < 2.0 * LEAST_SHARE:  # where no rod is off its chain, few are not either
+        kinds, squares, counts = self._binned(parameters, struck)
+        self._share(_EDGES, kinds, squares, counts, new)
+        loose = new["departure"] / self.stated.departure
+        if loose < 2.0 * LEAST_SHARE:
+            # Where no rod is off its chain, few are not either: the least of it explains nothing.
+            self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
             new["few"] = LEAST_SHARE * self.stated.few
+        # Where rods leave their chain, a few drops that happen to be alike show nothing of strings.
+        loose = max(LEAST_SHARE, min(1.0, loose))
         for kind, found in self._squares.items():
             stated = _member((getattr(self.stated, kind) / getattr(old, kind)) ** 2, 1.0)
             weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
