@@ -128,6 +128,9 @@ def _fitted(
             reasons = (*reasons, *(one.explained or ()))
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
     model = DropModel(protocol, records, one.begun.guesses, scale.u, components)
+    if one.begun.x.size != len(model.unknowns):  # it was found out where other things were unknown
+        del known[job]
+        return _fitted(protocol, run, drop, scale, components, known, explain=explain)
     fit = timed(model, one.begun, scale.hz / rough.hz)
     audit = blank.after(fit.matched)
     found = quantities(fit.model, fit.estimate)

@@ -19,7 +19,7 @@ from rig.protocol.reader import parse
 from rig.report.remarks import model_lines
 from rig.units import Quantity
 from sim.dials import Dials
-from tests.analysis.drops import HZ, UNIFORM, Case, case
+from tests.analysis.drops import HZ, STATED, UNIFORM, Case, case
 from tests.analysis.sessions import MILD, analysis, cases
 
 GATES = {gate.channel: gate for gate in UNIFORM.gates.gates}
@@ -93,6 +93,10 @@ def test_how_far_rods_are_off_is_learned_and_what_falls_before_is_none_the_worse
     components = found.joint.components
     assert components.departure == pytest.approx(DEPARTURE, rel=0.15)
     assert components.floor < 10e-6  # free chain and first edges scatter as they did
+    # Pulls that happen to be alike show nothing of strings where rods are off their chain.
+    assert straight.joint is not None
+    assert straight.joint.components.impulse < 0.5 * STATED.impulse
+    assert components.impulse >= STATED.impulse
     for one, run, still in zip(cases(EIGHT, MILD, 5), found.runs, straight.runs, strict=True):
         assert run.quantities["release_skew_s"].u < 3.0 * still.quantities["release_skew_s"].u
         for name in ("separation_m", "speed_m_s", "release_skew_s", "fall_time_s"):
@@ -168,6 +172,23 @@ def test_at_strike_is_that_much_before_the_level(above):
     slope = abs(1.0 - free / level)
     more = math.hypot(found["separation_m"].u, slope * math.hypot(1e-4, contact.level.u))
     assert found["separation_strike_m"].u == pytest.approx(more, rel=0.1)
+
+
+@pytest.mark.parametrize("above", [0.0, 10e-3])
+def test_a_top_rod_that_may_have_struck_is_seen_higher_by_half_of_what_it_had_to_go_on(above):
+    """The mean square of that, by where normally distributed strikes are."""
+    contact = Contact(strike=Quantity(above, 8e-3))
+    expected = case(replace(UNIFORM, contact=contact), seed=3).model()[0].expected["impact"]
+    strikes = above + 8e-3 * np.linspace(-9.0, 9.0, 2001)
+    chances = np.exp(-0.5 * ((strikes - above) / 8e-3) ** 2)
+    alone = np.flatnonzero(expected.alone)
+    assert alone.size == 4
+    assert not expected.landed[~expected.alone].any()
+    for n in alone:
+        off = expected.sign[n] * UNIFORM.chains["A"].widths[TOP]
+        lost = 0.5 * np.maximum(strikes - LOWEST[expected.gate[n]].height + off, 0.0)
+        usual = math.sqrt(np.average(lost**2, weights=chances))
+        assert expected.landed[n] == pytest.approx(usual, rel=1e-3)
 
 
 @pytest.mark.parametrize(
