@@ -184,7 +184,7 @@ class Evidence:
         squares: Array,
         counts: Array,
         new: dict[str, float],
-        share_left: float = LEAST_SHARE,
+        share_at_least: float = LEAST_SHARE,
     ) -> None:
         """Estimate components that make up one variance.
 
@@ -196,7 +196,7 @@ class Evidence:
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
         squares, counts = squares + share * (_member(stated, found) @ kinds), counts + share
-        least = share_left**2 * stated
+        least = share_at_least**2 * stated
         for _ in range(_INNER):
             for n, sizes in enumerate(kinds):
                 found[n] = max(
