@@ -1,0 +1,86 @@
+"""What a resolved fall says of itself, against what its places and speeds say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.resolved.fall import fall
+from sim.resolved.hanging import hang
+from sim.resolved.scene import Chain, Fall, Strings
+from tests.sim.test_resolved import DROP, GRAVITY, MASS, SCENES, WOOD, board, rods
+
+STEP = 2e-6  # so that frames are often
+
+
+@pytest.fixture(scope="module")
+def struck() -> tuple[Chain, Fall]:
+    chain = SCENES[1]
+    return chain, fall(chain, step=STEP, after=1e-3)
+
+
+@pytest.mark.parametrize("incline", [0.0, 40.0])
+def test_the_first_rod_touches_when_and_where_free_fall_brings_it(incline):
+    found = fall(Chain(rods(2), Strings(), DROP, GRAVITY, board(incline)), after=0.0)
+    assert found.touched_s[0] == pytest.approx(math.sqrt(2 * DROP / GRAVITY), abs=1e-8)
+    assert found.touched_height[0] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_the_top_rod_strikes_where_its_track_is_then(struck):
+    _, found = struck
+    there = np.interp(found.strike_s, found.times, found.heights[:, -1])
+    assert found.touched_height[-1] == pytest.approx(there, abs=1e-6)
+    before = found.times < found.strike_s
+    slope = np.polyfit(found.times[before][-5:], found.heights[before][-5:, -1], 1)[0]
+    assert found.top_speed == pytest.approx(-slope, rel=1e-3)
+
+
+def test_what_a_rod_pulled_is_what_the_next_one_gained():
+    chain = Chain(rods(2, spread=1.0), Strings(), DROP, GRAVITY, board(40.0), WOOD)
+    found = fall(chain, step=STEP, after=1e-3)
+    gained = MASS * (found.top_speed - GRAVITY * found.strike_s)
+    assert gained > 0.0
+    assert found.pulled[0] == pytest.approx(gained, rel=1e-3)
+
+
+def test_what_strings_lose_is_all_that_is_lost_where_nothing_else_is():
+    parting = np.array([1.0, -1.0, 1.0])
+    found = fall(Chain(rods(3), Strings(0.3), DROP, GRAVITY, swing=parting), until=0.3, step=STEP)
+    spent = found.energy[0] - found.energy[-1]
+    assert spent > 0.05 * MASS  # of the 3/2 that they had
+    assert found.lost["strings"] == pytest.approx(spent, rel=1e-2)
+
+
+def test_the_share_of_slack_strings_is_that_of_the_frames(struck):
+    chain, found = struck
+    while_striking = (found.frames_s > found.touched_s[0]) & (found.frames_s < found.strike_s)
+    places, axes = found.places[while_striking], found.axes[while_striking]
+    rest, half = hang(chain).strings.rest, chain.rods.length / 2
+    loose = [
+        np.linalg.norm(np.diff(places + side * half * axes, axis=2), axis=1) <= rest[:, n]
+        for n, side in enumerate((-1.0, 1.0))
+    ]
+    assert found.slack == pytest.approx(np.mean(loose), abs=0.02)
+    assert 0.5 < found.slack < 1.0
+
+
+def test_how_fast_the_last_rod_turns_is_how_its_axis_moves(struck):
+    _, found = struck
+    axes = found.axes[found.frames_s < found.strike_s, :, -1].astype(float)
+    late = slice(-4, None)
+    turned = np.linalg.norm(axes[late][-1] - axes[late][0])
+    seconds = np.ptp(found.frames_s[found.frames_s < found.strike_s][late])
+    assert found.turning == pytest.approx(turned / seconds, rel=0.02)
+    assert found.turning > 0.1
+
+
+def test_what_air_takes_is_told_by_steps_and_by_formula():
+    chain = Chain(rods(2), Strings(), 0.2, GRAVITY, drag=np.full(2, 0.5))
+    by_steps, by_formula = (fall(replace(chain, spin=one), step=STEP) for one in (1e-9, 0.0))
+    spent = by_steps.energy[0] - by_steps.energy[-1]
+    assert by_steps.lost["air"] == pytest.approx(spent, rel=5e-3)  # steps go on after a frame
+    assert by_formula.lost["air"] == pytest.approx(by_steps.lost["air"], rel=1e-3)
+    assert by_steps.lost["strings"] < 1e-9 * spent
