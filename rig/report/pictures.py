@@ -17,6 +17,7 @@ from rig.report.film import film_figure
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from rig.analysis.result import DropResult
     from rig.analysis.session import Analysis
     from rig.films import Film
     from rig.report.bars import Bars
@@ -54,7 +55,8 @@ def pictures(
     bars
         What the bars on means of several runs stand for.
     films
-        Of simulated drops, by run and attempt; the first that counts is shown.
+        Of simulated drops, by run and attempt; the first that counts is shown, and the first that
+        does not, which may have ended in a pile.
     sections
         Where a figure that cannot be drawn is noted.
     """
@@ -104,22 +106,21 @@ def pictures(
                 ),
             )
         )
-    for one in analysis.runs:
-        film = (films or {}).get((one.run.number, one.attempt))
-        if film is not None and one.verdict in GOOD:
-            drawn.append(
-                (
-                    partial(film_figure, film),
-                    PageFigure(
-                        "",
-                        f"How run {one.run.number} fell",
-                        f"Run {one.run.number} as the simulation let it fall: the striking chain "
-                        "from the front and, below, along its rods. Slack strings are dotted.",
-                        "impacts",
-                    ),
-                )
+    for one, film in _filmed(analysis, films or {}):
+        judged = "" if one.verdict in GOOD else f" ({one.verdict})"
+        drawn.append(
+            (
+                partial(film_figure, film),
+                PageFigure(
+                    "",
+                    f"How run {one.run.number} fell",
+                    f"Run {one.run.number}{judged} as the simulation let it fall at "
+                    f"{film.incline_deg:g}°: the striking chain from the front and, below, along "
+                    "its rods. Slack strings are dotted.",
+                    "impacts",
+                ),
             )
-            break
+        )
     found = []
     for draw, figure in drawn:
         svg = sections.make(f'The figure "{figure.alt}"', draw)
@@ -127,3 +128,15 @@ def pictures(
             found.append(replace(figure, svg=svg))
     budget = sections.make("The figure of the budget", lambda: budget_figure(analysis, simulated))
     return [*found, budget] if budget is not None else found
+
+
+def _filmed(
+    analysis: Analysis, films: Mapping[tuple[int, int], Film]
+) -> list[tuple[DropResult, Film]]:
+    """Choose the drops whose films are shown."""
+    with_film = [one for one in analysis.runs if (one.run.number, one.attempt) in films]
+    good, other = (
+        [one for one in with_film if (one.verdict in GOOD) is counts][:1]
+        for counts in (True, False)
+    )
+    return [(one, films[one.run.number, one.attempt]) for one in good + other]

@@ -152,8 +152,10 @@ def test_pictures_follow_the_scene() -> None:
     ]
     first = next(one for one in TWO.runs if one.verdict == "accepted")
     films = {(one.run.number, one.attempt): FILM for one in TWO.runs}
-    fell = pictures(TWO, CURVES, films=films, sections=Sections())[2]
+    fell, lost = pictures(TWO, CURVES, films=films, sections=Sections())[2:4]
     assert fell.alt == f"How run {first.run.number} fell"
+    void = next(one for one in TWO.runs if one.verdict == "void")
+    assert f"Run {void.run.number} (void) as the simulation let it fall" in lost.caption
     assert pictures(fake_analysis.EMPTY, sections=Sections()) == []
     picture, _ = pictures(fake_analysis.single_chain(), sections=Sections())
     assert "eparation" not in picture.alt + picture.caption
