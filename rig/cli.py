@@ -493,6 +493,9 @@ def _parser() -> Parser:
     other.add_argument("--drops", type=_count, metavar="N", help="at each incline (default 4)")
     other.add_argument("--only", metavar="TEXT", help="cases with this in their names")
     other.add_argument(
+        "--before", metavar="DIR", help="set what an earlier one left in this folder beside it"
+    )
+    other.add_argument(
         "--film", type=float, metavar="DEG", help="draw one fall at this incline instead"
     )
     other.add_argument(

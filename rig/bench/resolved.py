@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 UNIFORM, GRADED = "inclined-uniform.yaml", "graded-chain.yaml"
-DROPS = 1
-"""At each incline of a session, five minutes of a processor; three where there is but one."""
+DROPS = 4
+"""At each incline of a session, a block A, B, B, A; three times as many where there is but one. All
+cases take some three minutes of a processor."""
 
 
 @dataclass(frozen=True, slots=True)

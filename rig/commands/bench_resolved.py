@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.figures import resolved_figure, work_figure
 from rig.bench.resolved import CASES, DROPS, as_json, film, published, study, work
+from rig.bench.resolved_before import beside, read_before
 from rig.commands.output import leave_study, named, print_json, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.measurands import told
@@ -56,11 +58,13 @@ def main(arguments: Namespace) -> int:
         say(f"{folder / 'resolved-fall.svg'}")
         return 0
     chosen = named(CASES, arguments.only or "")
+    before = arguments.before and read_before(Path(arguments.before) / "resolved.csv")
     folder = make_folder(arguments.output)
     found = study(arguments.protocols, arguments.drops or DROPS, chosen, say)
     whole = as_json(found)
+    lines = [*beside(before, found), "", *_lines(whole)] if before else _lines(whole)
     leave_study(
-        folder, "resolved", _HEAD, _lines(whole), whole, _csv(found), resolved_figure(found),
+        folder, "resolved", _HEAD, lines, whole, _csv(found), resolved_figure(found),
         as_json=arguments.json,
     )  # fmt: skip
     return 0

@@ -11,6 +11,7 @@ import pytest
 
 from rig.bench import resolved_paper
 from rig.bench.resolved import CASES, JudgedDrop, as_json, summary
+from rig.bench.resolved_before import beside, read_before
 from rig.bench.resolved_paper import Ensemble
 from rig.cli import main
 from rig.commands import bench_resolved
@@ -77,6 +78,31 @@ def test_the_command_leaves_page_table_and_picture(tmp_path, monkeypatch, capsys
     assert all(float(row["true separation_strike_m"]) > 0 for row in rows)
     ET.fromstring((out / "resolved.svg").read_text())
     assert "resolved.svg" in (out / "resolved.md").read_text()
+    kept = read_before(out / "resolved.csv")
+    wanted = whole["cases"][0]
+    for name, one in summary(kept)["quantities"].items():
+        for figure in ("n", "rms", "bias", "coverage"):
+            assert one[figure] == pytest.approx(wanted["quantities"][name][figure], rel=1e-12)
+    assert "2 of 2 drops are the same falls" in beside(kept, kept)[0]
+
+
+def test_before_and_now_stand_side_by_side():
+    before = [VOID, replace(GOOD, run=1), replace(GOOD, run=3, case="air")]
+    now = [replace(GOOD, run=2), replace(GOOD, run=1, truth=GOOD.truth | {"separation_m": 0.1})]
+    said, _, _, row = beside(before, now)
+    assert said.endswith("1 of 2 drops are the same falls:")
+    assert row.split()[:8] == ["damped", "strings", "2", "→", "2", "50%", "→", "0%"]
+    assert "– → 1.00" in beside([VOID], now)[3]
+
+
+@pytest.mark.parametrize("text", [None, "case,run\ndamped strings,1\n"])
+def test_what_is_no_table_of_sessions_is_named(text, tmp_path, capsys):
+    if text is not None:
+        (tmp_path / "resolved.csv").write_text(text)
+    words = ["bench", "resolved", "-o", str(tmp_path / "out"), "--before", str(tmp_path)]
+    assert main(words) == 2
+    assert "resolved.csv" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_case_that_is_none_is_named(tmp_path, capsys):
