@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Estimate the parameters of the impacts from a session."""
-    folder = None if arguments.output is None else make_folder(arguments.output)
     with Session.open(arguments.session, readonly=True) as session:
+        folder = None if arguments.output is None else make_folder(arguments.output)
         analysis, _ = detailed(session, progress("analysing run"))
         found = estimate(protocol_of(session), analysis)
         simulated = session.simulated

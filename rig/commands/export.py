@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Write a session as CSV files."""
-    make_folder(arguments.csv)
     with Session.open(arguments.session, readonly=True) as session:
+        make_folder(arguments.csv)
         found = results(session, progress("analysing run"))
         export_csv(arguments.csv, session, found.json(), tick_rates(session))
     say(f"CSV files: {arguments.csv}")
