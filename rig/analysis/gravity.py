@@ -18,6 +18,7 @@ import numpy as np
 from rig.analysis.adjust import least_squares
 from rig.analysis.drop_model import prior_air
 from rig.analysis.equations import NormalEquations, plain_equations
+from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.free_flight import leg_slopes
 from rig.analysis.result import GOOD, Measured, normalized_error
 from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING
@@ -110,7 +111,9 @@ def check_gravity(
     # Beams, rods and clock are the same in every drop, so that no number of drops averages them.
     common = math.sqrt(fmean(one.u**2 for one in found))
     own = stdev(one.value for one in found) / math.sqrt(len(found)) if len(found) > 1 else 0.0
-    mean = Measured(fmean(one.value for one in found), math.hypot(common, own))
+    u = math.hypot(common, own)
+    degrees = (len(found) - 1) * (u / own) ** 4 if own else math.inf  # GUM G.4
+    mean = Measured(fmean(one.value for one in found), u, degrees)
     return GravityCheck(mean, protocol.gravity, len(found))
 
 
@@ -173,6 +176,11 @@ def free_gravity(
         )
 
     found = least_squares(equations, sd, np.zeros(sd.size))
+    # How much edges scatter is seen where they are many; what is stated of it counts as one more.
+    if found.scatter == 1.0:
+        degrees = found.edges - float(np.trace(found.covariance @ found.data))
+        sigma = sigma * math.sqrt((STATED_WEIGHT + found.chi2) / (STATED_WEIGHT + degrees))
+        found = least_squares(equations, sd, found.x)
     value = float(point[2] + found.x[2])
     fitted = math.sqrt(found.covariance[2, 2]) * sd[2]
     return Measured(value, math.hypot(fitted, 2.0 * value * scale.u))

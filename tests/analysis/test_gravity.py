@@ -45,6 +45,20 @@ def test_its_interval_holds_the_truth(scene):
     assert errors.std() > 0.1 * widths.mean(), "and it is not far too wide"
 
 
+def test_how_much_edges_scatter_is_seen_and_not_taken_for_granted():
+    """What is stated counts as one edge of hundreds, be it ten times too much."""
+    one = case(UNIFORM, with_dials(jitter_sd=2e-6), incline=40.0)
+    result = one.analyze()
+    u = [
+        free_gravity(
+            replace(UNIFORM, priors=replace(UNIFORM.priors, edge_floor=floor)),
+            result, one.drop, one.scale,
+        ).u
+        for floor in (10e-6, 100e-6)
+    ]  # fmt: skip
+    assert u[1] < 1.1 * u[0]
+
+
 @pytest.mark.parametrize("wrong", [-3000e-6, 3000e-6])
 def test_a_wrong_clock_shows_twice(wrong):
     one = case(UNIFORM, QUIET, incline=40.0)
