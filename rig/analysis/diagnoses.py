@@ -37,6 +37,7 @@ IMPLAUSIBLE = 6.0
 evenly spaced, an exchanged gate is fitted well at a wrong height."""
 RIGHT = 0.8
 _FIRST = 2  # rods that pass a gate before others lie under it
+_LAST = 3  # and last ones, which do not pass the lowest gate where others lie there
 _WHOLE = 0.9  # share of its edges that says that a gate sees every rod
 _ABOUT = 0.1  # by which a gate may see more rods than one above it
 _ENOUGH = 3  # gates that see every rod
@@ -249,6 +250,11 @@ def _buried(protocol: Protocol, gates: Sequence[_Seen]) -> list[_Seen]:
 def _pile(protocol: Protocol, gates: Sequence[_Seen]) -> str:
     names = " and ".join(_name(protocol, one.train) for one in gates)
     verb = "does" if len(gates) == 1 else "do"
+    if np.count_nonzero(gates[0].match[-_PAIR * _LAST :] < 0) < _PAIR:  # one edge by chance
+        return (
+            f"{names} {verb} not see every rod pass, while the gates above do; the last rods pass "
+            "and none lie there: those before them strike too early, or the gate misses some"
+        )
     return (
         f"rods pile up on the surface: {names} {verb} not see them all pass, while the gates above "
         "do; the last rods strike those that lie there"

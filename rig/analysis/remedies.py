@@ -16,6 +16,7 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
     ("likeliest, but not clearly", _COMPARE),  # names several things, of which one may be true
     ("in the wrong way round", "exchange the two plugs, or their channels in the protocol"),
     ("pile up", "incline the surface more, or hang fewer rods"),
+    ("see every rod", "let the chains hang still before they go, or put the lowest gate higher"),
     ("upside down", "turn the chain round"),
     ("on each other's side", "exchange the two chains, or hang them as the run asks for"),
     (

@@ -150,6 +150,22 @@ def test_rods_that_come_to_rest_above_the_lowest_gates_are_a_pile(gates):
         assert (f"channel {gate.channel} " in reason) == (gate.channel in lost)
 
 
+def test_where_the_last_rods_pass_the_lowest_gate_none_lie_there():
+    """The upper sides of those before them come late, as where chains swing."""
+    one = case(UNIFORM, MILD, incline=40.0)
+    edges, seen = list(one.drop.edges), set()
+    for n, (_, channel, _, rod) in enumerate(one.truth.edges):
+        if channel == LOWEST[0].channel and rod < TOP - 3:
+            if rod in seen:
+                edges[n] = edges[n]._replace(tick=edges[n].tick + round(1.5e-3 * HZ))
+            seen.add(rod)
+    result = one.with_edges(edges).analyze()
+    assert result.verdict == "void"
+    (reason,) = result.reasons
+    assert "the last rods pass and none lie there" in reason
+    assert f"channel {LOWEST[0].channel} " in reason
+
+
 def test_a_gate_that_goes_blind_above_others_is_no_pile():
     one = case(UNIFORM, MILD, incline=40.0)
     result = without(one, {LOWEST[2].channel: 8}).analyze()
