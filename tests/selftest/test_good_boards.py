@@ -61,6 +61,19 @@ def test_a_busy_computer_blames_no_board(monkeypatch):
     assert "too busy" in found["arming times out"].why
 
 
+def test_a_computer_that_is_busy_for_a_moment_blames_no_board():
+    class HeldUp(LoopedBoard):
+        heard = 0
+
+        def receive(self, start_ns, data):
+            self.heard += 1
+            super().receive(start_ns + 150_000_000 * (self.heard == 60), data)
+
+    found = outcomes(port_of(HeldUp(Wire())))
+    assert failed(found) == []
+    assert found["round trips"].why.endswith("this computer was too busy for 1 of 60")
+
+
 def test_without_leave_no_release_is_driven():
     board = Watched(Wire())
     found = outcomes(port_of(board), release=False)
