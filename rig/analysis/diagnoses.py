@@ -79,7 +79,7 @@ def diagnose(fit: Fit) -> Diagnosis:
     if not any(one.strange for one in alive if one.role == "free"):  # where nothing piles up
         under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
     if under:
-        return Diagnosis((_pile(model.protocol, under),), tuple(doubts), known=True)
+        return Diagnosis((_rods_missed(model.protocol, under),), tuple(doubts), known=True)
     absent = [
         why
         for role, record in model.records.items()
@@ -247,7 +247,7 @@ def _buried(protocol: Protocol, gates: Sequence[_Seen]) -> list[_Seen]:
     return gates[:under] if passed and fewer and clear else []
 
 
-def _pile(protocol: Protocol, gates: Sequence[_Seen]) -> str:
+def _rods_missed(protocol: Protocol, gates: Sequence[_Seen]) -> str:
     names = " and ".join(_name(protocol, one.train) for one in gates)
     verb = "does" if len(gates) == 1 else "do"
     if np.count_nonzero(gates[0].match[-_PAIR * _LAST :] < 0) < _PAIR:  # one edge by chance

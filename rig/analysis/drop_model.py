@@ -164,11 +164,11 @@ class DropModel:
         record, gates = self.records[role], self.protocol.gates
         assert gates is not None
         here = tuple(train.gate for train in record.trains)
-        rods, drawn = 0, ()
+        rods, lower = 0, ()
         if role == "impact":
             rods = record.chain.chain.rods
-            drawn = tuple(self._drawn().tolist()) if "impact swing" in self.unknowns else ()
-        return side_columns(self.unknowns.places, role, here, gates.posts, rods, drawn)
+            lower = tuple(self._drawn().tolist()) if "impact swing" in self.unknowns else ()
+        return side_columns(self.unknowns.places, role, here, gates.posts, rods, lower)
 
     def stiff(self) -> DropModel:
         """Return the same drop with impulses that are nearly alike, the last one too."""

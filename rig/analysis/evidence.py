@@ -125,13 +125,13 @@ class Evidence:
         new: dict[str, float] = {}
         kinds, squares, counts = self._binned(parameters, struck)
         self._share(_EDGES, kinds, squares, counts, new)
-        loose = new["departure"] / self.stated.departure
-        if loose < 2.0 * LEAST_SHARE:
+        parted = new["departure"] / self.stated.departure
+        if parted < 2.0 * LEAST_SHARE:
             # Where no rod is off its chain, few are not either: the least of it explains nothing.
             self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
             new["few"] = LEAST_SHARE * self.stated.few
         # Where rods leave their chain, a few drops that happen to be alike show nothing of strings.
-        loose = max(LEAST_SHARE, min(1.0, loose))
+        parted = max(LEAST_SHARE, min(1.0, parted))
         for kind, found in self._squares.items():
             stated = _member((getattr(self.stated, kind) / getattr(old, kind)) ** 2, 1.0)
             weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
@@ -143,8 +143,8 @@ class Evidence:
         if self._impulses:
             size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
             kinds = np.stack([size, np.ones_like(size), alone])
-            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new, loose)
-        self.components = replace(old, landed=loose, **new)
+            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new, parted)
+        self.components = replace(old, landed=parted, **new)
         return self
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:

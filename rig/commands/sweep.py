@@ -35,7 +35,7 @@ _FEW_CHUNKS = 20
 def main(arguments: Namespace) -> int:
     """Compute a sweep and write it to a file."""
     output = Path(arguments.output)
-    _check_place(output)
+    _check_output(output)
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
     if _drawn(output):
@@ -98,7 +98,7 @@ def _drawn(output: Path) -> bool:
     return output.suffix.removeprefix(".") in KINDS
 
 
-def _check_place(output: Path) -> None:
+def _check_output(output: Path) -> None:
     """Find out before a long computation what would go wrong after it."""
     if output.suffix not in _KINDS:
         raise InputError(
