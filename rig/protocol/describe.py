@@ -222,7 +222,7 @@ def _consequences(protocol: Protocol) -> list[str]:
     if protocol.two_chains:
         first = next(iter(protocol.chains))
         share = sum(run.impact == first for run in planned)
-        lines.append(f"order {plan.order}: chain {first} strikes in {share} runs of {len(planned)}")
+        lines.append(f"order {plan.order}: chain {first} strikes in {share} of {len(planned)} runs")
         period = {"ABBA": 4, "alternate": 2, "fixed": 1}[plan.order]
         if plan.repeats % period:
             lines.append(
@@ -245,8 +245,9 @@ def _consequences(protocol: Protocol) -> list[str]:
         f"recorded for {seconds:g} s; the longest fall takes {longest_fall(protocol):.2g} s"
     )
     lines += _boards(protocol)
-    minutes = len(planned) * (plan.settle + seconds) / 60
-    lines.append(f"about {minutes:.0f} min, settling {plan.settle:g} s before each drop; "
+    whole = len(planned) * (plan.settle + seconds)
+    time = f"{whole:.0f} s" if whole < 60 else f"{whole / 60:.0f} min"
+    lines.append(f"about {time}, settling {plan.settle:g} s before each drop; "
                  "hanging the chains comes on top")  # fmt: skip
     return lines
 

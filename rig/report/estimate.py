@@ -151,11 +151,11 @@ def _coefficient_words(told: Coefficients, *, free_chain: bool) -> Iterator[str]
         "has the protocol's ± as prior."
     )
     if told.drag is not None:
-        seen = abs(told.drag.value) > told.drag.expanded
-        yield (
-            f"Air: κ = ({plus_minus(told.drag, 1e6)})·10⁻⁶ /m in g − κv², "
-            + ("which slows the chains." if seen else "none to be seen.")
-        )
+        value, expanded = told.drag.value, told.drag.expanded
+        said = "none to be seen"
+        if abs(value) > expanded:
+            said = "which slows the chains" if value > 0 else "which no air does"
+        yield f"Air: κ = ({plus_minus(told.drag, 1e3)})·10⁻³ /m in g − κv², {said}."
     elif free_chain:
         yield "Air drag is not fitted: it takes a free chain, and rods that are all alike."
 
