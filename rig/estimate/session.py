@@ -21,7 +21,7 @@ from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -154,7 +154,8 @@ class SessionEstimate:
     drops, edges
         How many it rests on.
     left_out
-        A sentence on each coefficient that the edges do not tell; `None` where that is not known.
+        A sentence on each good run that nothing here rests on, and on each coefficient that the
+        edges do not tell; `None` where that is not known.
     failed
         A sentence on each section that could not be worked out.
     """
@@ -213,7 +214,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     Raises
     ------
     InputError
-        Where no chain strikes anything, or no drop is good.
+        Where no chain strikes anything, or no drop is good and fits a motion.
     """
     if protocol.surface is None:
         raise InputError(
@@ -223,7 +224,8 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     good = {(one.run.number, one.attempt): one.run for one in analysis.runs if one.verdict in GOOD}
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
-        raise InputError("no good drop in this session", "rig analyze SESSION says why")
+        none = "no motion fits the edges of any good drop" if good else "no good drop"
+        raise InputError(f"{none} in this session", "rig analyze SESSION says why")
     shared = (
         analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
     )
@@ -234,7 +236,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     found, outcome = None, None
     with sections.alone("The coefficients"):
         found = of.coefficient_problem(protocol, like)
-        said.left_out = tuple(found.left_out)
+        said.left_out = (*_runs_left_out(good.keys() - drops.keys()), *found.left_out)
         if found.forms:
             outcome = of.best(protocol, found)
             said.coefficients = _coefficients(protocol, found, outcome)
@@ -257,6 +259,14 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         )
     said.failed = tuple(sections.failed.values())
     return said
+
+
+def _runs_left_out(keys: Iterable[tuple[int, int]]) -> Iterator[str]:
+    for run, _ in sorted(keys):
+        yield (
+            f"run {run} is left out: no motion fits its edges, or not together with the other "
+            "runs; rig analyze SESSION says which"
+        )
 
 
 def _coefficients(

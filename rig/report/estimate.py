@@ -51,7 +51,7 @@ class _Rods(NamedTuple):
 def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool) -> str:
     """Write everything for a terminal; what cannot be written is noted in `sections`."""
     lines = ["SIMULATED DATA"] if simulated else []
-    lines.append(f"{found.drops} good drops, {found.edges} edges")
+    lines.append(f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges")
     for heading, make in _PARTS.items():
         lines += (
             sections.make(f'The section "{heading}"', partial(_lines, heading, make, found)) or ()

@@ -214,6 +214,21 @@ def test_where_nothing_strikes_there_is_nothing_to_estimate():
         estimate(FENCE, analyzed(cases((1, 2), scene="fence")))
 
 
+def test_good_drops_that_no_motion_fits_are_left_out_and_named():
+    """They count, with the ± that they have, and tell no coefficient."""
+    drops = analysis(SURFACE)
+    (out, _), *_ = drops.adjusted
+    fewer = {key: drop for key, drop in drops.adjusted.items() if key[0] != out}
+    found = estimate(UNIFORM, replace(drops, adjusted=fewer))
+    assert found.drops == len(drops.runs) - 1
+    assert [one for one in found.left_out if one.startswith("run ")] == [
+        f"run {out} is left out: no motion fits its edges, or not together with the other runs; "
+        "rig analyze SESSION says which"
+    ]
+    with pytest.raises(InputError, match="no motion fits the edges of any good drop"):
+        estimate(UNIFORM, replace(drops, adjusted={}))
+
+
 def dropped(protocol, numbers):
     """Drops of a scene of its own, analysed."""
     drops = [case(protocol, Dials(skew_sd=1e-3), run=number) for number in numbers]

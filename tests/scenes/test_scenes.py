@@ -16,10 +16,9 @@ if TYPE_CHECKING:
 
     from tests.scenes.draw import Scene
 
-SOME = (0, 1, 4, 6, 7, 8, 9, 10, 12, 13, 14, 15, 16, 20, 21, 22, 25, 27, 28, 30)
-"""Of the first 32 seeds those that reach what no other of them reaches, or cost next to nothing."""
-VOID = 17
-"""A scene in which every drop is void, and each command seeks the causes anew: with few drops."""
+DEAR = (18, 23, 24, 56)
+"""Scenes that take several times as long as others."""
+SOME = [seed for seed in range(60) if seed not in DEAR]
 MANY = 240
 
 
@@ -46,10 +45,6 @@ def _assert_sound(drawn: Scene, folder: Path) -> None:
 @pytest.mark.parametrize("seed", SOME)
 def test_a_scene_goes_through_every_command(seed, tmp_path):
     _assert_sound(scene(seed), tmp_path)
-
-
-def test_so_does_one_in_which_every_drop_is_void(tmp_path):
-    _assert_sound(scene(VOID, drops=2), tmp_path)
 
 
 @pytest.mark.slow

@@ -240,8 +240,12 @@ class _Journey:
         return found
 
     def estimated(self, found: Any) -> None:
-        able = self.scene.protocol.surface is not None and found["summary"]
-        promised = (DONE,) if able else (BAD_INPUT,)
+        told = [
+            run
+            for run in found["runs"]
+            if run["verdict"] in GOOD and not any("did not settle" in why for why in run["reasons"])
+        ]
+        promised = (DONE,) if self.scene.protocol.surface is not None and told else (BAD_INPUT,)
         done = self.call("estimate", self.session, promised=promised)
         if done.code == DONE:
             self.read("estimate", done.out)
