@@ -31,6 +31,7 @@ class SpanView(Widget):
         """Show these instead."""
         before, self._rows = self._rows, rows
         if len(rows) != len(before):
+            self._layout_updates += 1  # or a height is kept that was found since the last wish
             self.refresh(layout=bool(self.styles.is_auto_height))
         elif other := [y for y, row in enumerate(rows) if row != before[y]]:
             self.refresh(*(Region(0, y, self.size.width, 1) for y in other))

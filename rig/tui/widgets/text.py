@@ -74,6 +74,8 @@ class Words(Static):
             same = self._said is not None and self._fits(self._said) and self._fits(content)
             same = same and _lines(self._said) == _lines(content)
             self._said = content
+            if not same:
+                self._layout_updates += 1  # or a height is kept that was found since the last wish
             self.update(content, layout=not same)
 
     def _fits(self, content: Content) -> bool:
