@@ -14,7 +14,7 @@ import pytest
 RUN = Path(__file__).parents[2] / "run"
 
 
-def _again(folder: Path, runs: int, tests: str) -> tuple[int, str]:
+def _again(folder: Path, runs: object, tests: str) -> tuple[int, str]:
     """Run the function that is in ``run`` over tests that are a line of shell."""
     lines = re.findall(
         r"^(?:(?:say|die)\(\).*|again\(\) \((?:\n.*)*?\n\))$", RUN.read_text(), re.MULTILINE
@@ -55,3 +55,11 @@ def test_the_first_that_fails_is_told_with_what_it_said(tmp_path, run):
     assert code == 1
     assert f"its words\nrun: run {run} of 4 failed" in told
     assert told.count("its words") == 1
+
+
+@pytest.mark.parametrize("runs", ["x", 0, -1])
+def test_what_is_no_number_of_runs_is_refused(tmp_path, runs):
+    code, told = _again(tmp_path, runs, "exit 0")
+    assert code == 2
+    assert f"found {runs}, where a number of runs is wanted" in told
+    assert "whole" not in told
