@@ -11,7 +11,7 @@ from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import FEW_GATES, silent
 from rig.analysis.drop_model import DropModel
-from rig.analysis.edge_classes import unmatched_edges
+from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise, faults
 from rig.analysis.fit import timed
@@ -106,7 +106,7 @@ def _fitted(
     lost = 0
     if drop.certificate is not None:
         lost = drop.certificate.overflows
-    blank = Audit(received, 0, expected, received, lost)
+    blank = Audit(received, 0, expected, received, lost, received)
     job, rough = Job(drop.run, drop.attempt), scale.rounded()
     one = known.get(job)
     if one is None or one.scale != rough:
@@ -132,10 +132,11 @@ def _fitted(
         del known[job]
         return _fitted(protocol, run, drop, scale, components, known, explain=explain)
     fit = timed(model, one.begun, scale.hz / rough.hz)
-    audit = blank.after(fit.matched)
+    unmatched = unmatched_edges(fit)
+    audit = blank.count(fit.matched, count_unexplained(unmatched))
     found = quantities(fit.model, fit.estimate)
     alone = last_passages(fit)
-    end = judge(protocol, run, drop, (), audit, found, fit, alone)
+    end = judge(protocol, run, drop, (), audit, found, fit, alone, unmatched)
     verdict, reasons = end.verdict, end.reasons
     if not end.known and (explain or verdict != "void"):
         weigh = _explainer(protocol, run, drop, scale, components, end.suspects)
@@ -153,7 +154,7 @@ def _fitted(
         found,
         fit.rods,
         fit.estimate.scatter,
-        unmatched=unmatched_edges(fit),
+        unmatched=unmatched,
         last_passages=alone,
         gates=gate_passages(fit, fit.x, partial(measured, fit.model, fit.estimate)),
     )

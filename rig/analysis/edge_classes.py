@@ -2,7 +2,8 @@
 
 What an edge is depends on its neighbours: an expected one that nobody reported left no trace, or
 drowned in a shadow that ran into the next; a reported one that belongs to no rod is part of a
-flicker, a string in a gap, a rod that bounced back, or something else.
+flicker, a string in a gap, a rod that bounced back, a later passage of what came back, or
+unexplained.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import numpy as np
 
 from rig.analysis.align import EXTRA, MISSED
 from rig.analysis.chain_records import QUICK
+from rig.analysis.later_passages import later_passages
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -28,7 +30,11 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
-EdgeClass = Literal["missed", "merged", "dead gate", "chatter", "string", "bounce", "extra"]
+EdgeClass = Literal[
+    "missed", "merged", "dead gate", "chatter", "string", "bounce", "later passage", "extra"
+]
+UNEXPLAINED: EdgeClass = "extra"
+"""The class of what nothing explains; ``accept`` of a protocol limits it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +47,8 @@ class UnmatchedEdge:
         ``missed``: the rod left no trace; ``merged``: its shadow ran into a neighbour's; ``dead
         gate``: nothing came from there. ``chatter``: of a flicker about a rod's edge; ``string``: a
         flicker between rods; ``bounce``: a shadow in the lowest beam after a rod has struck;
-        ``extra``: none of these.
+        ``later passage``: what had passed came back, and perhaps fell once more; ``extra``: none of
+        these, so nothing explains it.
     channel
         Of the gate.
     time_s
@@ -93,8 +100,14 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
             if train.times.size > (match >= 0).sum():
                 # Only the lowest beam is near enough to what bounces.
                 after = _first_hit(record, path) / clock if gate.height == lowest else np.inf
-                found += _surplus(gate.channel, train, match, after)
+                back = later_passages(record, train, match, path, model.protocol.gravity.value)
+                found += _surplus(gate.channel, train, match, after, back)
     return tuple(sorted(found, key=lambda edge: edge.time_s))
+
+
+def count_unexplained(unmatched: Iterable[UnmatchedEdge]) -> int:
+    """Count the received edges that nothing explains."""
+    return sum(edge.kind == UNEXPLAINED for edge in unmatched)
 
 
 def _first_hit(record: ChainRecord, path: Trajectory) -> float:
@@ -125,7 +138,9 @@ def _why(train: EdgeTrain, when: float) -> EdgeClass:
     return "merged" if dark else "missed"
 
 
-def _surplus(channel: int, train: EdgeTrain, match: Index, hit: float) -> Iterator[UnmatchedEdge]:
+def _surplus(
+    channel: int, train: EdgeTrain, match: Index, hit: float, back: set[int]
+) -> Iterator[UnmatchedEdge]:
     """Reported edges that belong to no rod."""
     rods = np.full(train.times.size, -1)
     rods[match[match >= 0]] = train.rods[match >= 0]
@@ -134,11 +149,13 @@ def _surplus(channel: int, train: EdgeTrain, match: Index, hit: float) -> Iterat
     for at in np.flatnonzero(rods < 0).tolist():
         when, blocked = float(train.times[at]), bool(train.blocked[at])
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
-        kind: EdgeClass = "extra"
+        kind = UNEXPLAINED
         if near.size:
             kind = "chatter"
         elif train.burst[at] > 0.0:
             kind = "string"
+        elif at in back:
+            kind = "later passage"
         elif when > hit:
             kind = "bounce"
         rod = int(near[0]) if near.size else None

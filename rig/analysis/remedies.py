@@ -65,6 +65,11 @@ _REMEDIES: tuple[tuple[str, str], ...] = (
         "align the gates' beams with the chains; rig report SESSION shows which gate misses most",
     ),
     (
+        "edges unexplained",
+        "see that nothing else crosses the beams and that each gate has its own channel; rig "
+        "report SESSION draws every edge",
+    ),
+    (
         "release skew",
         "adjust the releases until both chains leave together, or allow more skew in accept:",
     ),

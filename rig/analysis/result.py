@@ -105,6 +105,8 @@ class Audit:
         Received edges that belong to no rod.
     lost
         Edges the device saw and could not keep.
+    unexplained
+        Of the spurious ones, those that are not of a known kind either.
     """
 
     received: int
@@ -112,15 +114,22 @@ class Audit:
     missed: int
     spurious: int
     lost: int
+    unexplained: int = 0
 
-    def after(self, matched: int) -> Audit:
-        """Count again, with another number of edges that belong to a rod."""
-        expected = self.matched + self.missed
-        return Audit(self.received, matched, expected - matched, self.received - matched, self.lost)
+    @property
+    def expected(self) -> int:
+        """Edges that a perfect rig would report."""
+        return self.matched + self.missed
+
+    def count(self, matched: int, unexplained: int) -> Audit:
+        """Count again, with other edges that belong to a rod."""
+        missed, spurious = self.expected - matched, self.received - matched
+        return Audit(self.received, matched, missed, spurious, self.lost, unexplained)
 
     def json(self) -> dict[str, int]:
-        """As `rig analyze --json` prints it."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        """``edges`` of a run as `rig analyze --json` prints it."""
+        names = ("received", "matched", "missed", "spurious", "lost")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +184,7 @@ class DropResult:
         found["edges"] = self.audit.json()
         if self.matches:
             found["causes"] = [edge.json() for edge in self.unmatched]
+        found["unexplained_edges"] = self.audit.unexplained
         if self.scatter is not None:
             found["scatter"] = self.scatter
         if self.last_passages:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.drop import fit_drop
-from rig.analysis.edge_classes import unmatched_edges
+from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.joint_fit import FEWEST, joint_fit
 from rig.analysis.likeness import likeness
 from rig.analysis.pairs import Effects, effects
@@ -236,13 +236,14 @@ def _fit_jointly(
         return found, None, dict(zip(keys, good.values(), strict=True))
     budgets = Budgets(joint)
     for n, drop in zip(good, joint.drops, strict=True):
+        unmatched = unmatched_edges(drop)
         found[n] = replace(
             found[n],
-            audit=found[n].audit.after(drop.matched),
+            audit=found[n].audit.count(drop.matched, count_unexplained(unmatched)),
             quantities=budgets.measured(drop),
             gates=budgets.gates(drop),
             matches=drop.rods,
             learned=True,
-            unmatched=unmatched_edges(drop),
+            unmatched=unmatched,
         )
     return found, joint, dict(zip(keys, joint.drops, strict=True))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from rig.analysis.adjust import Estimate
+    from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.fit import Fit
     from rig.analysis.identify import Identification
     from rig.analysis.result import Audit, Measured, Verdict
@@ -35,6 +36,7 @@ LATE = 0.2
 """Share of stamps so close behind another that they may be late which a drop may have without
 remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
 
+_PULSE = 2  # edges
 _SURE = 4.0  # standard uncertainties
 _BEYOND = 3.0  # prior standard uncertainties of κ
 
@@ -74,6 +76,7 @@ def judge(
     found: Mapping[str, Measured],
     fit: Fit | None,
     alone: Mapping[str, Measured] = MappingProxyType({}),
+    unmatched: Collection[UnmatchedEdge] = (),
 ) -> Judgement:
     """Judge a drop; without a `fit`, only whether it can be analysed at all.
 
@@ -81,6 +84,8 @@ def judge(
     ----------
     alone
         What its last passages say by themselves.
+    unmatched
+        Edges that are missing or belong to no rod.
     """
     void = [*drop.faults]
     doubts: list[str] = []
@@ -103,7 +108,7 @@ def judge(
         void += _blown(fit)
         estimate, missed = (
             fit.estimate,
-            audit.missed > _most_missed(audit.matched + audit.missed, protocol.accept.missed_edges),
+            audit.missed > _most_missed(audit.expected, protocol.accept.missed_edges),
         )
         if void:
             void += faults.doubts  # which may be why
@@ -120,6 +125,7 @@ def judge(
         return Judgement("void", tuple(void), accused, odd, suspects)
     # A drop is as good where the model's α is not its own: that is what is measured.
     verdict: Verdict = "marginal" if doubts else "accepted"
+    remarks += _later_passages(unmatched)
     return Judgement(verdict, (*doubts, *remarks), accused, odd, suspects)
 
 
@@ -157,9 +163,10 @@ def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> 
     """Return what is beyond the protocol's ``accept``."""
     accept = protocol.accept
     void = []
-    expected = audit.matched + audit.missed
-    if audit.missed > _most_missed(expected, accept.missed_edges):
+    if audit.missed > _most_missed(audit.expected, accept.missed_edges):
         void.append(_many_missed(audit, accept.missed_edges))
+    if audit.unexplained > _most_unexplained(audit.received, accept.unexplained_edges):
+        void.append(_many_unexplained(audit, accept.unexplained_edges))
     skew = found.get("release_skew_s")
     if skew is not None and _too_late(skew, accept.release_skew):
         void.append(
@@ -186,9 +193,27 @@ def _most_missed(expected: int, limit: float) -> float:
 
 
 def _many_missed(audit: Audit, limit: float) -> str:
-    expected = audit.matched + audit.missed
-    share = audit.missed / expected
-    return f"{audit.missed} of {expected} edges missed ({share:.1%}), more than {limit:.1%}"
+    share = audit.missed / audit.expected
+    return f"{audit.missed} of {audit.expected} edges missed ({share:.1%}), more than {limit:.1%}"
+
+
+def _most_unexplained(received: int, limit: float) -> float:
+    """Return how many edges may be unexplained before a drop is void: always one stray pulse."""
+    return max(limit * received, _PULSE)
+
+
+def _many_unexplained(audit: Audit, limit: float) -> str:
+    share = audit.unexplained / audit.received
+    return (
+        f"{audit.unexplained} of {audit.received} edges unexplained ({share:.1%}), more than "
+        f"{limit:.1%}"
+    )
+
+
+def _later_passages(unmatched: Collection[UnmatchedEdge]) -> tuple[str, ...]:
+    """Say how many edges of later passages a result is without."""
+    later = sum(edge.kind == "later passage" for edge in unmatched)
+    return (f"{later} edges after the passage were left out: it came back",) if later else ()
 
 
 def _doubts(
@@ -200,9 +225,11 @@ def _doubts(
 ) -> list[str]:
     """Return what makes a drop marginal."""
     doubts = []
-    expected, missed = audit.matched + audit.missed, protocol.accept.missed_edges
-    if missed * expected < audit.missed <= _most_missed(expected, missed):
+    missed, unexplained = protocol.accept.missed_edges, protocol.accept.unexplained_edges
+    if missed * audit.expected < audit.missed <= _most_missed(audit.expected, missed):
         doubts.append(f"{_many_missed(audit, missed)}, which of so few edges may be chance")
+    if unexplained * audit.received < audit.unexplained <= _PULSE:
+        doubts.append(f"{_many_unexplained(audit, unexplained)}, which may be one stray pulse")
     skew = found.get("release_skew_s")
     limit = protocol.accept.release_skew
     near = skew is not None and abs(abs(skew.value) - limit) < skew.expanded

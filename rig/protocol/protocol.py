@@ -212,10 +212,21 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Accept:
-    """Limits beyond which a run is void; fixed before any result is seen."""
+    """Limits beyond which a run is void; fixed before any result is seen.
+
+    Attributes
+    ----------
+    release_skew
+        Between both chains, s.
+    missed_edges
+        Share of the expected edges that may be missing.
+    unexplained_edges
+        Share of the received edges that may belong to no rod and to no known disturbance.
+    """
 
     release_skew: float = 0.005
     missed_edges: float = 0.05
+    unexplained_edges: float = 0.10
 
 
 GUESSED = 8.0

@@ -259,8 +259,11 @@ KEYS: tuple[Key, ...] = (
     Key("accept", _MAP, "", "limits beyond which a run is void, fixed beforehand", ""),
     Key("accept.release_skew", settings.RELEASE_SKEW, _said(_ACCEPT.release_skew, "ms"),
         "between the two releases", "3 ms"),
-    Key("accept.missed_edges", settings.MISSED_EDGES, _said(_ACCEPT.missed_edges, "%"),
+    Key("accept.missed_edges", settings.SHARE_OF_EDGES, _said(_ACCEPT.missed_edges, "%"),
         "of all expected edges", "2 %"),
+    Key("accept.unexplained_edges", settings.SHARE_OF_EDGES,
+        _said(_ACCEPT.unexplained_edges, "%"),
+        "of all received edges, those of no rod and no known disturbance", "5 %"),
 
     Key("priors", _MAP, "", "what nobody measured, as standard deviations; see docs/priors.md", ""),
     *(

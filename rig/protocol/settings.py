@@ -23,7 +23,7 @@ MOST_REPEATS = 10_000
 MOST_RUNS = 100_000
 LARGEST_SEED = 2**63 - 1
 RELEASE_SKEW = Range(Dimension.TIME, 0.0, 10.0, "ms", open_low=True)
-MISSED_EDGES = Range(Dimension.NUMBER, 0.0, 1.0, "%")
+SHARE_OF_EDGES = Range(Dimension.NUMBER, 0.0, 1.0, "%")
 
 
 def read_settings(
@@ -59,11 +59,19 @@ def _accept(node: Node, key: str, faults: FieldFaults) -> Accept | None:
     inner = fields.mapping(node, key, faults)
     if inner is None:
         return None
-    section = Section(inner, key, faults, ("release_skew", "missed_edges"))
+    ranges = {
+        "release_skew": RELEASE_SKEW,
+        "missed_edges": SHARE_OF_EDGES,
+        "unexplained_edges": SHARE_OF_EDGES,
+    }
+    section = Section(inner, key, faults, tuple(ranges))
     usual = Accept()
-    skew = section.take("release_skew", fields.exact(RELEASE_SKEW), usual.release_skew)
-    missed = section.take("missed_edges", fields.exact(MISSED_EDGES), usual.missed_edges)
-    return None if skew is None or missed is None else Accept(skew, missed)
+    limits = {
+        name: section.take(name, fields.exact(accepted), getattr(usual, name))
+        for name, accepted in ranges.items()
+    }
+    sound = {name: limit for name, limit in limits.items() if limit is not None}
+    return Accept(**sound) if len(sound) == len(ranges) else None
 
 
 def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:

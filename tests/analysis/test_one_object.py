@@ -13,6 +13,7 @@ from rig.analysis.gate_passages import _moment
 from rig.analysis.session import analyze
 from rig.protocol import reader
 from rig.protocol.plan import runs
+from rig.records import Edge
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import PROTOCOLS, case
@@ -119,3 +120,108 @@ def test_runs_are_averaged_gate_by_gate():
     assert len(since) == line.n - 1
     assert at[2].mean.interval.value == pytest.approx(np.mean(since))
     assert at[2].interval_sd == pytest.approx(np.std(since, ddof=1))
+
+
+LOWEST = BALL.gates.gates[-1]
+ONE_GATE = replace(BALL, gates=replace(BALL.gates, gates=(LOWEST,)))
+
+
+def crossings(protocol, falls):
+    """Edges of an object in free flight from rest, then after each bounce, until the last one.
+
+    Without air. The floor is the zero of the heights; a fall is the speed (m/s) with which a flight
+    begins there, the first one `None`.
+    """
+    g, start = protocol.gravity.value, protocol.drop.value
+    half = next(iter(protocol.chains.values())).widths[0] / 2.0
+    edges, began = [], 0.0
+    for speed in falls:
+        for gate in protocol.gates.gates:
+            for level, inner in ((gate.height - half, False), (gate.height + half, True)):
+                dark = not inner
+                if speed is None:
+                    edges.append((np.sqrt(2.0 * (start - level) / g), gate.channel, not dark))
+                elif (square := speed**2 - 2.0 * g * level) > 0.0:
+                    edges.append((began + (speed - np.sqrt(square)) / g, gate.channel, dark))
+                    edges.append((began + (speed + np.sqrt(square)) / g, gate.channel, not dark))
+        began += np.sqrt(2.0 * start / g) if speed is None else 2.0 * speed / g
+    return edges
+
+
+def imported(protocol, edges):
+    """A drop of another timer's file, which knows no release."""
+    one = case(protocol, QUIET, run=1)
+    return replace(one, drop=replace(one.drop, fire_tick=None, certificate=None)).with_edges(
+        Edge(round(when * one.scale.hz), channel, dark) for when, channel, dark in edges
+    )
+
+
+@BOTH
+@pytest.mark.parametrize("gates", ["all", "one"])
+@pytest.mark.parametrize("restitution", [0.95, 0.8])
+def test_what_came_back_is_left_out_and_said_so(protocol, gates, restitution):
+    """A ball that bounces, a glider that returns from the end of its track."""
+    if gates == "one":
+        lowest = min(protocol.gates.gates, key=lambda gate: gate.height)
+        protocol = replace(protocol, gates=replace(protocol.gates, gates=(lowest,)))
+    protocol = replace(protocol, drag=None)
+    arrival = np.sqrt(2.0 * protocol.gravity.value * protocol.drop.value)
+    bounces = [arrival * restitution**n for n in (1, 2, 3)]
+    result = imported(protocol, crossings(protocol, [None, *bounces])).analyze()
+    once = imported(protocol, crossings(protocol, [None])).analyze()
+    later = result.audit.received - once.audit.received
+    assert later > 0
+    assert result.verdict == once.verdict == "accepted"
+    assert (result.audit.unexplained, result.audit.spurious) == (0, later)
+    assert [reason.split()[0] for reason in result.reasons] == [str(later)]
+    assert accelerated(result).value == pytest.approx(accelerated(once).value, rel=1e-9)
+
+
+@pytest.mark.parametrize("amplitude_deg", [10.0, 45.0, 60.0])
+def test_a_pendulum_is_no_fall(amplitude_deg):
+    """Its bob passes the lowest point every half period, here as fast as the ball would fall."""
+    g, width = BALL.gravity.value, next(iter(BALL.chains.values())).widths[0]
+    speed = np.sqrt(2.0 * g * (BALL.drop.value - LOWEST.height))
+    length = speed**2 / (2.0 * g * (1.0 - np.cos(np.radians(amplitude_deg))))
+    half_period = np.pi * np.sqrt(length / g)
+    edges = [
+        (0.3 + n * half_period + late, LOWEST.channel, dark)
+        for n in range(20)
+        for late, dark in ((0.0, True), (width / speed, False))
+    ]
+    result = imported(ONE_GATE, edges).analyze()
+    assert result.verdict == "void"
+    assert result.audit.matched == 2
+    assert result.audit.unexplained == 40 - 4  # the last one may be a turn in the beam
+
+
+def test_all_gates_on_one_channel_are_no_fall_past_one_gate():
+    edges = [(when, LOWEST.channel, dark) for when, _, dark in crossings(BALL, [None])]
+    result = imported(ONE_GATE, edges).analyze()
+    assert result.verdict == "void"
+    assert result.audit.unexplained >= 2 * (len(BALL.gates.gates) - 1)
+
+
+@pytest.mark.parametrize("channels", [(0,), (1,), (3,), (0, 2), (0, 1, 2)])
+def test_the_edges_of_silent_gates_are_missed(channels):
+    one = case(BALL, Dials(), run=1, seed=1)
+    result = one.with_edges(e for e in one.drop.edges if e.channel not in channels).analyze()
+    assert result.audit.missed >= 2 * len(channels)
+    assert result.verdict == ("marginal" if len(channels) == 1 else "void")
+
+
+@pytest.mark.parametrize(("pulses", "verdict"), [(0, "accepted"), (1, "marginal"), (3, "void")])
+def test_stray_pulses_are_counted_against_the_limit(pulses, verdict):
+    one = case(BALL, Dials(), run=1, seed=1)
+    last = one.drop.edges[-1].tick
+    # Both too quick for what fell, and before it passed.
+    strays = [
+        Edge(last // 2 + n * 16_000 + late, LOWEST.channel, dark)
+        for n in range(pulses)
+        for late, dark in ((0, True), (8_000, False))
+    ]
+    result = one.with_edges([*one.drop.edges, *strays]).analyze()
+    assert (result.audit.unexplained, result.verdict) == (2 * pulses, verdict)
+    limit = replace(BALL, accept=replace(BALL.accept, unexplained_edges=1.0))
+    loose = replace(one, protocol=limit).with_edges([*one.drop.edges, *strays]).analyze()
+    assert loose.verdict == "accepted"
