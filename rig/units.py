@@ -115,11 +115,12 @@ _ALIASES = {
 _RELATIVE = ("%", "ppm")
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_PER = r"(?:/(?P<per>0*[1-9][0-9]*))?"
 _UNIT = r"(?:(?<=\s)1|[^\s0-9.,±+()-][^±+()]*?)"
 _PLUS_MINUS = r"(?:±|\+/-|\+-)"
 _LAST_DIGITS = r"(?:\((?P<last>[0-9]+)\))?"
 _PLAIN = re.compile(
-    rf"(?P<value>{_NUMBER}){_LAST_DIGITS}\s*(?P<unit>{_UNIT})?\s*"
+    rf"(?P<value>{_NUMBER})(?:{_PER}|{_LAST_DIGITS})\s*(?P<unit>{_UNIT})?\s*"
     rf"(?:{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*(?P<u_unit>{_UNIT})?)?"
 )
 _BRACKETED = re.compile(
@@ -146,8 +147,8 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     Parameters
     ----------
     text
-        ``180 mm``, ``180 ± 2 mm``, ``1.2 m +/- 2 mm``, ``(180 ± 2) mm``, ``180(2) mm``. A number
-        without a unit is accepted only where a plain number is wanted.
+        ``180 mm``, ``180 ± 2 mm``, ``1.2 m +/- 2 mm``, ``(180 ± 2) mm``, ``180(2) mm``, ``1/12``.
+        A number without a unit is accepted only where a plain number is wanted.
     dimension
         What the text must measure.
 
@@ -177,7 +178,7 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     if found["u"] is not None and match.re is _PLAIN:
         unit, u_unit = _shared_unit(clean, unit, u_unit)
     factor = _factor(unit, dimension, clean)
-    value = _scaled(found["value"], factor, clean)
+    value = _scaled(found["value"], factor / int(found.get("per") or 1), clean)
     if found.get("last"):
         if found["u"] is not None:
             raise UnitError(f"found {quoted(text)} with two uncertainties; {wanted}")

@@ -40,6 +40,19 @@ def air(protocol: Protocol, drag: float) -> dict[str, list[float]]:
     }
 
 
+def stated_air(protocol: Protocol, rods: RodChain) -> list[float]:
+    """κ of each rod by itself in the air that a protocol states, 1/m; 0 where it states none."""
+    stated = protocol.drag
+    if stated is None or stated.coefficient is None:
+        speed = stated.terminal_speed.value if stated and stated.terminal_speed else math.inf
+        return [protocol.gravity.value / speed**2] * rods.chain.rods
+    drag, density, tilt = stated.coefficient.value, stated.air_density, rods.tilt_deg
+    return [
+        cylinder_drag(drag, density, diameter, rods.rod_length, tilt) / mass
+        for diameter, mass in zip(rods.diameters, rods.chain.masses, strict=True)
+    ]
+
+
 def _legs(rods: RodChain, *, known: bool, sized: bool, weighed: bool) -> list[float]:
     """Drag over mass of what falls on each leg, for C ρ = 1."""
     if not known:

@@ -11,9 +11,10 @@ import numpy as np
 
 from rig.errors import InputError
 from rig.link.messages import pack_label, unpack_label
-from rig.protocol.protocol import Contact
+from rig.model.chain import XI
 from sim import fall_cache
 from sim.ahead import Ahead
+from sim.air import stated_air
 from sim.beam import SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
 from sim.film import film
@@ -117,8 +118,7 @@ class ResolvedLab(ChainLab):
             _bounce(protocol.surface, dials, world)
         self._key = fall_cache.key(
             protocol.chains, protocol.surface, protocol.drop, protocol.gravity, self.gates,
-            protocol.plan, asdict(dials), world, seed,
-            *([] if protocol.contact == Contact() else [protocol.contact]),
+            protocol.plan, protocol.contact, protocol.drag, asdict(dials), world, seed,
         )  # fmt: skip
         self._ahead = Ahead(self._make)
         kinds = {
@@ -237,6 +237,7 @@ class ResolvedLab(ChainLab):
         return Rods(
             masses, np.array(spec.chain.heights), diameters,
             signs * math.radians(spec.tilt_deg), zero, zero, length, self.world.roll > 0.0,
+            spec.chain.inertia / XI,
         )  # fmt: skip
 
     def _hang(
@@ -256,7 +257,7 @@ class ResolvedLab(ChainLab):
         spin = world.spin_sd * float(now.normal())
         hung = Rods(
             nominal.masses, body.offsets, nominal.diameters, tilts, yaws, aside,
-            nominal.length, nominal.rolling,
+            nominal.length, nominal.rolling, nominal.inertia,
         )  # fmt: skip
         return hung, swing, spin
 
@@ -279,6 +280,7 @@ class ResolvedLab(ChainLab):
         masses = rods.masses
         # What air takes from a rod goes with its width over its mass; `drag` is the chain's own.
         drag = dials.drag * thin * masses.sum() / float((masses * thin).sum())
+        drag += stated_air(self.protocol, spec)
         return Chain(
             rods, Strings(world.string_restitution, world.string_strain), self.hang_height + hang,
             self.protocol.gravity.value, board, touching, drag, swing, spin,
@@ -400,11 +402,13 @@ def _bounce(surface: Surface, dials: Dials, world: ResolvedDials) -> Bounce:
 
 
 def _check(spec: RodChain) -> None:
-    if spec.chain.alpha is not None:
-        raise InputError(
-            f"dynamics=resolved: chain {spec.name} has a given α, so it is no chain of rods",
-            "describe its rods: diameter, rod_length, tilt",
-        )
+    for key in ("alpha", "gamma"):
+        if getattr(spec.chain, key) is not None:
+            raise InputError(
+                f"dynamics=resolved: chains.{spec.name}.{key} is stated, which follows from rods, "
+                "strings and board there",
+                f"leave {key} out, and describe the rods: diameter, rod_length, tilt, inertia",
+            )
     if not spec.diameters or min(spec.diameters) <= 0.0:
         raise InputError(
             f"dynamics=resolved: the diameter of chain {spec.name}'s rods is unknown",

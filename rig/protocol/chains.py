@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.model.chain import THIN_ROD, XI, Chain
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.protocol import RodChain
@@ -27,7 +27,8 @@ LENGTH = Range(Dimension.LENGTH, 1e-3, 100.0, "m")
 ROD_LENGTH = Range(Dimension.LENGTH, 1e-6, 10.0, "m")
 UNCERTAINTY = Range(Dimension.LENGTH, 0.0, 0.1, "mm")
 TILT = Range(Dimension.ANGLE, 0.0, 80.0, "deg")
-INERTIA = Range(Dimension.NUMBER, 0.0, 1.0, "1", open_low=True)
+INERTIA = Range(Dimension.NUMBER, 0.0, 0.25, "1", open_low=True)
+"""In units of m L²: all mass in the middle, to half of it at each end."""
 ALPHA = Range(Dimension.NUMBER, 0.0, 1.0, "1")
 GAMMA = Range(Dimension.NUMBER, 0.0, 1e6, "1")
 _LONGEST_NAME = 32
@@ -174,7 +175,7 @@ def _chain(name: str, section: Section, *, seen_by_gates: bool, struck: bool) ->
         length = section.take("length", fields.exact(LENGTH), required="1165 mm")
     rod_length = section.take("rod_length", fields.exact(ROD_LENGTH), math.nan)
     tilt = section.take("tilt", fields.exact(TILT), 0.0)
-    inertia = section.take("inertia", fields.exact(INERTIA), UNIFORM_ROD_INERTIA)
+    inertia = section.take("inertia", fields.exact(INERTIA), THIN_ROD)
     alpha = section.take("alpha", fields.quantity(ALPHA), Quantity(math.nan))
     gamma = section.take("gamma", fields.exact(GAMMA), math.nan)
     alone = length == 0.0  # and is where its drop says
@@ -197,7 +198,7 @@ def _chain(name: str, section: Section, *, seen_by_gates: bool, struck: bool) ->
     chain = Chain(
         masses=masses,
         heights=heights,
-        inertia=inertia,
+        inertia=XI * inertia,
         alpha=None if math.isnan(alpha.value) else alpha,
         gamma=None if math.isnan(gamma) else gamma,
     )

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
+from rig.model.chain import XI
 from rig.protocol.contact import touching_heights
 from rig.protocol.measurable import lacking, longest_fall, record_ms, too_long, unmeasurable
 from rig.protocol.plan import runs
@@ -65,7 +66,8 @@ def _scene(protocol: Protocol) -> list[str]:
         lines = [f"two chains, {names}: one strikes the surface, the other falls beside it"]
     else:
         lines = [f"one chain, {names}, strikes the surface"]
-    lines += [_chain(chain) for chain in protocol.chains.values()]
+    struck = protocol.surface is not None
+    lines += [_chain(chain, struck=struck) for chain in protocol.chains.values()]
     surface = protocol.surface
     if surface is not None and _uses_surface(protocol):
         restitution = format_quantity(surface.restitution, "1")
@@ -104,7 +106,7 @@ def _drag(drag: Drag) -> str:
     return f"coefficient {format_quantity(drag.coefficient, '1')} in air of {density}"
 
 
-def _chain(rods: RodChain) -> str:
+def _chain(rods: RodChain, *, struck: bool) -> str:
     """Describe one chain on one line."""
     chain = rods.chain
     text = f"{rods.name}: {chain.rods} rods, {_number(chain.length, 'mm')} long"
@@ -125,6 +127,8 @@ def _chain(rods: RodChain) -> str:
         text += f", graded: heaviest rod {ratio:.3g} times the lightest"
     if chain.alpha is not None:
         text += f", α given as {format_quantity(chain.alpha, '1')}"
+    elif struck:
+        text += f", inertia {chain.inertia / XI:.3g} m L²"
     return text
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from rig.model.batch import Impacts, falls, given_impacts, surface_impacts
+from rig.model.chain import XI
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -173,7 +174,7 @@ def _impacts(layout: Layout, values: dict[str, _Numbers]) -> Impacts:
         values["incline"],
         values["restitution"],
         values["friction"],
-        values["inertia"],
+        XI * values["inertia"],
         inertia_z=layout.chain.inertia_z,
         gamma=values.get("gamma"),
         pile=layout.pile,

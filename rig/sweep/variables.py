@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
+from rig.model.chain import XI
 from rig.protocol.chains import ALPHA, GAMMA, INERTIA
 from rig.protocol.reader import DROP, GRAVITY, INITIAL_SPEED
 from rig.protocol.settings import INCLINE
@@ -39,7 +40,7 @@ VARIABLES = {
     "incline": Variable(INCLINE, "incline_deg", "inclination of the surface (°)"),
     "restitution": Variable(RESTITUTION, "restitution", "restitution β"),
     "friction": Variable(FRICTION, "friction", "friction μ"),
-    "inertia": Variable(INERTIA, "inertia", "rotational inertia of the rods, ξ"),
+    "inertia": Variable(INERTIA, "inertia", "moment of inertia of the rods, I/(m L²)"),
     "alpha": Variable(ALPHA, "alpha", "impact coefficient α"),
     "gamma": Variable(GAMMA, "gamma", "impact coefficient γ"),
     "drop": Variable(DROP, "drop_m", "drop (m)"),
@@ -76,7 +77,7 @@ def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
         values["incline"] = protocol.plan.inclines
         values["restitution"] = (protocol.surface.restitution.value,)
         values["friction"] = (protocol.surface.friction.value,)
-        values["inertia"] = (chain.inertia,)
+        values["inertia"] = (chain.inertia / XI,)
         if chain.gamma is not None:
             values["gamma"] = (chain.gamma,)
     else:

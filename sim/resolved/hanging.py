@@ -11,7 +11,7 @@ from sim.resolved.contact_law import damping
 from sim.resolved.motion import AIR, Bodies, Ground, Neighbours, Record, StringPairs, World, rim
 
 if TYPE_CHECKING:
-    from sim.resolved.scene import Board, Bounce, Chain, Numbers
+    from sim.resolved.scene import Board, Bounce, Chain, Numbers, Rods
 
 _FIXED = 1e6  # kg: in a second 10 kN move it by 5 mm
 _SOUND = 0.5  # of 2, where the leapfrog of the stiffest string would break
@@ -40,8 +40,8 @@ def stable_step(chain: Chain) -> float:
     both = np.zeros((2, bodies.mass.size))
     both[:, :-1] += stiffness
     both[:, 1:] += stiffness
-    # A rod's end weighs a quarter of the rod; its two strings pull one against the other.
-    fastest = np.sqrt(2.0 * both * 4.0 / bodies.mass).max()
+    # A rod's end weighs a share of the rod; its two strings pull one against the other.
+    fastest = np.sqrt(2.0 * both / chain.rods.end_mass / bodies.mass).max()
     strings = _SOUND / float(fastest) if fastest else math.inf
     bounces = [chain.board.bounce] if chain.board is not None else []
     bounces += [chain.touching] if chain.touching is not None else []
@@ -79,7 +79,7 @@ def _bodies(chain: Chain) -> Bodies:
     gravity = np.full(mass.size, chain.gravity)
     mass[: chain.held], gravity[: chain.held] = _FIXED, 0.0
     half = np.full(mass.size, rods.length / 2.0)
-    across = mass * (half**2 / 3.0 + radius**2 / 4.0)
+    across = mass * (half**2 * (12.0 * rods.inertia) / 3.0 + radius**2 / 4.0)
     axis = np.stack(
         [np.cos(rods.tilts) * np.cos(rods.yaws), np.cos(rods.tilts) * np.sin(rods.yaws),
          np.sin(rods.tilts)], axis=1,
@@ -96,6 +96,7 @@ def _bodies(chain: Chain) -> Bodies:
         foreseen, turns, mass, radius, half, across,
         float(rods.rolling) / (mass * radius**2 / 2.0) - 1.0 / across,
         np.zeros(mass.size) if chain.drag is None else np.array(chain.drag, float), gravity,
+        2.0 + 1.0 / rods.end_mass,
     )  # fmt: skip
 
 
@@ -105,9 +106,9 @@ def _strings(chain: Chain, bodies: Bodies) -> StringPairs:
     return StringPairs(rest, chain.strings.stiffness / rest, np.zeros_like(rest), d)
 
 
-def _stiffness(mass: Numbers, bounce: Bounce) -> Numbers:
-    """Of a point at the end of a rod, which weighs a quarter of it when it strikes, N/m."""
-    return np.asarray(mass / 4.0 * (math.pi / bounce.time_s) ** 2)
+def _stiffness(rods: Rods, mass: Numbers, bounce: Bounce) -> Numbers:
+    """Of what an end of a rod of so much mass strikes, N/m."""
+    return np.asarray(rods.end_mass * mass * (math.pi / bounce.time_s) ** 2)
 
 
 def _ground(chain: Chain, bodies: Bodies) -> Ground:
@@ -118,7 +119,8 @@ def _ground(chain: Chain, bodies: Bodies) -> Ground:
     bounce = chain.board.bounce
     return Ground(
         _normal(chain.board), -_contact(chain, chain.board), bounce.friction,
-        damping(bounce.restitution), _stiffness(bodies.mass, bounce), np.zeros((count, 2)),
+        damping(bounce.restitution), _stiffness(chain.rods, bodies.mass, bounce),
+        np.zeros((count, 2)),
     )  # fmt: skip
 
 
@@ -148,7 +150,7 @@ def _neighbours(chain: Chain, bodies: Bodies) -> Neighbours:
     if chain.touching is None:
         return Neighbours(one, other, both, *rest, 0.0, 0.0)
     bounce = chain.touching
-    stiffness = _stiffness(both, bounce)
+    stiffness = _stiffness(chain.rods, both, bounce)
     return Neighbours(one, other, stiffness, *rest, bounce.friction, damping(bounce.restitution))
 
 

@@ -54,6 +54,8 @@ class Bodies(NamedTuple):
     mass, radius, half, across, roll, drag, gravity
         kg, m, m, moment of inertia about the middle in kg m², 1/(own axis' moment) − 1/across with
         0 for the former where rods do not roll, κ of the air in 1/m, and m/s²; shape (N,).
+    ease
+        How many times as easily as a whole rod its end gives way, which can also turn and roll.
     """
 
     place: Numbers
@@ -71,6 +73,7 @@ class Bodies(NamedTuple):
     roll: Numbers
     drag: Numbers
     gravity: Numbers
+    ease: float
 
 
 class StringPairs(NamedTuple):
@@ -232,11 +235,12 @@ def push(
 
 
 @compiled
-def _rubbing(slip: Vector, force: float, friction: float, mass: float, step: float) -> Vector:
+def _rubbing(
+    slip: Vector, force: float, friction: float, ease: float, mass: float, step: float
+) -> Vector:
     """Coulomb friction against a slip; one step must not do more than end it."""
     most = friction * force
-    # An end that can also turn and roll gives way up to six times as easily as the whole rod.
-    least = max(STICKS_BELOW, 6.0 * most * step / mass)
+    least = max(STICKS_BELOW, ease * most * step / mass)
     return _times(-most / max(math.sqrt(_dot(slip, slip)), least), slip)
 
 
@@ -356,7 +360,7 @@ def _strike(bodies: Bodies, ground: Ground, record: Record, step: float) -> None
                 overlap, rate, ground.fastest[k, side], ground.stiffness[k], ground.damping
             )
             slip = _plus(moving, _times(rate, normal))
-            rub = _rubbing(slip, force, ground.friction, bodies.mass[k], step)
+            rub = _rubbing(slip, force, ground.friction, bodies.ease, bodies.mass[k], step)
             whole = _plus(_times(force, normal), rub)
             _add(bodies, k, whole, arm)
             _touches(record, k, overlap, rate)
@@ -428,7 +432,7 @@ def _collide(bodies: Bodies, neighbours: Neighbours, record: Record, step: float
         )
         slip = _plus(moving, _times(rate, normal))
         lighter = min(bodies.mass[one], bodies.mass[other]) / 2.0
-        rub = _rubbing(slip, force, neighbours.friction, lighter, step)
+        rub = _rubbing(slip, force, neighbours.friction, bodies.ease, lighter, step)
         whole = _plus(_times(force, normal), rub)
         _add(bodies, one, whole, arm)
         _add(bodies, other, _times(-1.0, whole), other_arm)

@@ -37,6 +37,8 @@ class Rods:
         Of every rod, m.
     rolling
         Whether a rod may turn about its own axis; Eqs. S7 to S10 leave that out.
+    inertia
+        Moment of inertia of a rod about its middle in units of m L², its thickness left out.
     """
 
     masses: Numbers
@@ -47,6 +49,12 @@ class Rods:
     aside: Numbers
     length: float
     rolling: bool = True
+    inertia: float = 1.0 / 12.0
+
+    @property
+    def end_mass(self) -> float:
+        """What an end of a rod weighs when it is struck, over the rod's mass: ¼ of a thin one."""
+        return 1.0 / (1.0 + 1.0 / (4.0 * self.inertia))
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,6 +82,12 @@ def test_a_table_runs_straight_between_its_points():
     assert (masses[0], masses[-1]) == (0.010, 0.003)
 
 
+@pytest.mark.parametrize(("inertia", "xi"), [("1/4", 1.0), ("1/12", 1 / 3), ("0.05", 0.2)])
+def test_inertia_is_in_units_of_m_times_length_squared(inertia, xi):
+    """Weights at the ends, a thin rod, and a ladder of 1/20 m L²: ξ = 4I/(m L²)."""
+    assert chains(f"rods: 2, length: 1 m, inertia: {inertia}")["A"].chain.inertia == xi
+
+
 def test_listed_spacing_places_the_rods():
     a = chains("rods: 5, spacing: [40 mm, 5 cm, 60 mm, 0.07 m]")["A"]
     exact = [sum(map(Fraction, ("0.04", "0.05", "0.06", "0.07")[:k])) for k in range(5)]
@@ -108,6 +114,8 @@ def test_what_a_chain_says_itself_displaces_what_it_inherits():
          "f:3:37: chains.A.masses: found 2 masses for 3 rods"),
         ("rods: 2, length: 1 m, masses: [1 g, 2 mm]",
          "f:3:43: chains.A.masses[1]: 2 mm is a length; a mass"),
+        ("rods: 2, length: 1 m, inertia: 0.26",
+         "f:3:38: chains.A.inertia: found 0.26; accepted: above 0, up to 0.25"),
         ("rods: 2, length: 1 m, masses: [1 g, 0 g]", "f:3:43: chains.A.masses[1]: found 0 g"),
         ("rods: 2, length: 1 m, masses: 3 g", "f:3:37: chains.A.masses: found '3 g'; a mapping"),
         ("rods: 2, length: 1 m, masses: {}", "f:3:37: chains.A.masses: one profile is wanted"),
@@ -144,7 +152,7 @@ def test_check_describes_it():
     (line,) = [line for line in text.splitlines() if line.startswith("  A: ")]
     assert line == (
         "  A: 3 rods, 90 mm long, rods 40.0 to 50.0 mm apart, 33 g, "
-        "graded: heaviest rod 1.2 times the lightest"
+        "graded: heaviest rod 1.2 times the lightest, inertia 0.0833 m L²"
     )
 
 

@@ -292,14 +292,6 @@ def test_quiet_hangs_chains_still_and_keeps_the_materials():
         assert getattr(quiet, name) == wanted
 
 
-def test_beads_are_no_rods(tmp_path):
-    path = tmp_path / "beads.yaml"
-    text = SCENE.replace("tilt: 12 deg", "tilt: 12 deg, alpha: 0.12, gamma: 0")
-    path.write_text(text)
-    with pytest.raises(InputError, match="no chain of rods"):
-        set_scene("sim", {"protocol": str(path), "dynamics": "resolved"})
-
-
 def test_air_takes_from_a_chain_what_the_dial_says(scene):
     lab = ResolvedLab(
         reader.read(scene), replace(Dials.quiet(), drag=0.05), 3, world=ResolvedDials()

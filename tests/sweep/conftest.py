@@ -23,7 +23,7 @@ drop: 180 mm
 gravity: 9.81 m/s^2
 plan: {incline: [0 deg, 10 deg, 40 deg]}
 """
-VARY = ("restitution=-1..1:5", "inertia=0.001..0.2:6", "friction=0..1:6")
+VARY = ("restitution=-1..1:5", "inertia=0.00025..0.05:6", "friction=0..1:6")
 """With the scene's inclines: points on the pile, not sliding, with α above ½ and without one."""
 
 

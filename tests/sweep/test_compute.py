@@ -46,7 +46,7 @@ def test_points_are_single_falls_with_the_notes_of_single_impacts():
     seen = 0
     for at, separation, speed, in_domain, notes in points(protocol, VARY):
         seen |= notes
-        one = replace(chain, inertia=at["inertia"])
+        one = replace(chain, inertia=4.0 * at["inertia"])  # ξ = 4I/(mL²)
         surface = Surface(
             Quantity(at["restitution"]), Quantity(at["friction"]), protocol.surface.pile
         )
