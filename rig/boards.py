@@ -5,6 +5,7 @@ A board that is there says the same of itself (`rig.link.messages.Identity`), an
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 GATES = 16
@@ -39,6 +40,11 @@ class Capabilities:
     longest_pulse: float
     events: int
     streams: bool
+
+    @property
+    def most_edges(self) -> float:
+        """How many edges a drop may have."""
+        return math.inf if self.streams else self.events
 
     @property
     def one(self) -> str:

@@ -9,15 +9,23 @@ from typing import TYPE_CHECKING
 from rig.boards import BOARDS
 from rig.model.chain import XI
 from rig.protocol.contact import touching_heights
-from rig.protocol.measurable import lacking, longest_fall, record_ms, too_long, unmeasurable
+from rig.protocol.measurable import (
+    lacking,
+    longest_fall,
+    most_edges,
+    passing_rods,
+    record_ms,
+    too_long,
+    unmeasurable,
+)
 from rig.protocol.plan import runs
-from rig.protocol.protocol import AT_REST, SIDES, Priors
+from rig.protocol.protocol import AT_REST, Priors
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.protocol import Drag, Gate, InclinedTrack, Protocol, RodChain
+    from rig.protocol.protocol import Drag, InclinedTrack, Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
 
@@ -132,22 +140,12 @@ def _chain(rods: RodChain, *, struck: bool) -> str:
     return text
 
 
-def _passing(protocol: Protocol, gate: Gate) -> dict[str, int]:
-    """Return for each chain how many rods pass a gate: those that hang above it."""
-    drop = protocol.drop.value
-    return {
-        name: sum(drop + height > gate.height for height in rods.chain.heights)
-        for name, rods in protocol.chains.items()
-    }
-
-
 def _gates(protocol: Protocol) -> list[str]:
     """List the gates with the rods that pass each."""
     lines = []
     for gate in protocol.gates.gates if protocol.gates else ():
-        passing = _passing(protocol, gate)
         rods = []
-        for name, number in passing.items():
+        for name, number in passing_rods(protocol, gate).items():
             if protocol.one_object:
                 continue
             total = protocol.chains[name].chain.rods
@@ -239,11 +237,7 @@ def _consequences(protocol: Protocol) -> list[str]:
     lines += [f"note: only predicted, not run: {reason}" for reason in unmeasurable(protocol)]
     if (problem := too_long(protocol)) is not None:
         lines.append(f"note: not run: {problem}")
-    edges = 0
-    for side in SIDES:
-        per_chain = [_passing(protocol, gate) for gate in protocol.gates.on(side)]
-        edges += 2 * max(sum(each[name] for each in per_chain) for name in protocol.chains)
-    lines.append(f"at most {edges} edges a drop; {_memory(edges)}")
+    lines.append(f"at most {most_edges(protocol)} edges a drop")
     seconds = record_ms(protocol) / 1e3
     lines.append(
         f"recorded for {seconds:g} s; the longest fall takes {longest_fall(protocol):.2g} s"
@@ -262,23 +256,13 @@ def _boards(protocol: Protocol) -> list[str]:
     able = [word for word, problems in wants.items() if not problems]
     lines = [f"boards that can do it: {', '.join(able)}"] if able else []
     for word, problems in wants.items():
-        gates = [problem for problem in problems if problem.key.startswith("gates")]
+        gates = [problem for problem in problems if problem.key.startswith("gates.")]
         others = [problem for problem in problems if problem not in gates]
         lines += [f"note: not with board {word}: {problem}" for problem in others]
         if gates:  # of many alike the first will do
             more = f" (and {len(gates) - 1} more)" if len(gates) > 1 else ""
             lines.append(f"note: not with board {word}: {gates[0]}{more}")
     return lines
-
-
-def _memory(edges: int) -> str:
-    """Say whether so many edges fit those boards that keep them all."""
-    kept = [board for board in BOARDS.values() if not board.streams]
-    return "; ".join(
-        f"{'fits' if edges <= board.events else 'too many for'} the {board.events} that "
-        f"{board.one} keeps"
-        for board in kept
-    )
 
 
 def _uses_surface(protocol: Protocol) -> bool:

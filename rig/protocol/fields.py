@@ -189,6 +189,17 @@ def choice(*accepted: str) -> Converter[str]:
     return convert
 
 
+BOOLEANS = dict.fromkeys(("true", "True", "TRUE"), True)
+BOOLEANS |= dict.fromkeys(("false", "False", "FALSE"), False)
+"""As YAML 1.2 writes them (core schema, section 10.3.2)."""
+
+
+def boolean(node: Node, key: str, faults: FieldFaults) -> bool | None:
+    """Convert to true or false."""
+    word = choice(*BOOLEANS)(node, key, faults)
+    return None if word is None else BOOLEANS[word]
+
+
 def whole(low: int, high: int) -> Converter[int]:
     """Return a converter to a whole number from `low` to `high`."""
 

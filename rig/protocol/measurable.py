@@ -16,7 +16,7 @@ from rig.protocol.yamltree import load, place_of
 
 if TYPE_CHECKING:
     from rig.boards import Capabilities
-    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Gate, Protocol
 
 LEAST_RECORD_MS = 1500
 """Long enough for the drops of most labs, and then the same for all."""
@@ -92,6 +92,25 @@ def too_long(protocol: Protocol) -> Problem | None:
     return Problem(protocol.source, place.line, place.column, "drop", message)
 
 
+def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
+    """Count for each chain the rods that pass a gate: those that hang above it."""
+    drop = protocol.drop.value
+    return {
+        name: sum(drop + height > gate.height for height in rods.chain.heights)
+        for name, rods in protocol.chains.items()
+    }
+
+
+def most_edges(protocol: Protocol) -> int:
+    """Count the edges of a drop whose rods all pass, with the chain on each side that has more."""
+    edges = 0
+    for side in SIDES:
+        gates = protocol.gates.on(side) if protocol.gates else ()
+        passing = [passing_rods(protocol, gate) for gate in gates]
+        edges += 2 * max(sum(rods[name] for rods in passing) for name in protocol.chains)
+    return edges
+
+
 def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     """Say what a protocol wants of a board that it does not have, in the order of the file."""
     found = []
@@ -113,6 +132,8 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     want("releases", release.channel + 1, str(release.channel), has, "release", "channel")
     has = f"pulses of at most {board.longest_pulse * 1e3:g} ms"
     want("longest_pulse", release.pulse, f"{release.pulse * 1e3:g} ms", has, "release", "pulse")
+    edges = most_edges(protocol)
+    want("most_edges", edges, f"{edges} edges a drop", f"memory for {board.events}", "gates")
     has = f"gates 0 to {board.gates - 1}"
     for side in SIDES:
         for n, gate in enumerate(protocol.gates.on(side) if protocol.gates else ()):

@@ -157,7 +157,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     contact = top.take("contact", _contact(chains, struck=has_surface), Contact())
     reference = top.take("reference", fields.exact(REFERENCE), PPS_U)
     release, plan, accept = _settings(top, turns=kept or count > 1)
-    blind = top.take("blind", fields.choice("true", "false"), "false")
+    blind = top.take("blind", fields.boolean, default=False)
     gates = _gates(top, chains, drop, contact, plan) if has_gates else None
     priors = top.take("priors", _priors, Priors())
     if title is None or chains is None or gravity is None or drop is None:
@@ -182,7 +182,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
         contact=contact,
         reference_u=reference,
         priors=priors,
-        blind=blind == "true",
+        blind=bool(blind),
         text=text,
         source=faults.source,
     )

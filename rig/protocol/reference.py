@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from rig.boards import GATES, RELEASES
 from rig.protocol import chains, drag, gates, masses, reader, rods, settings, spacing, surface
-from rig.protocol.fields import Range
+from rig.protocol.fields import BOOLEANS, Range
 from rig.protocol.priors import PRIORS
 from rig.protocol.protocol import DATUM_U, Accept, Contact, Drag, Plan, Priors, ReleasePulse
 from rig.units import Dimension, Quantity, format_quantity
@@ -123,7 +123,7 @@ KEYS: tuple[Key, ...] = (
     Key("protocol", Whole(1, 1), "", "version of this format", "1", required=True),
     Key("title", _TEXT, "the file's name", "of the session and its reports", "Two like chains"),
     Key("notes", _TEXT, "", "for people; kept with the session", "Chains weighed in May."),
-    Key("blind", OneOf(("true", "false")), "false",
+    Key("blind", OneOf(tuple(BOOLEANS)), "false",
         "whether what is measured is kept back until `rig unblind`", "true"),
     Key("gravity", reader.GRAVITY, "",
         "local acceleration of free fall, ± its standard uncertainty; or `site`",
@@ -342,7 +342,7 @@ def _kind(path: str, accepted: Accepted) -> dict[str, Any]:
             found = {"type": "integer", "minimum": low, "maximum": high}
         case OneOf(words):
             # YAML reads a bare true as a boolean.
-            plain = [word == "true" for word in words] if "true" in words else []
+            plain = dict.fromkeys(BOOLEANS[word] for word in words if word in BOOLEANS)
             found = {"enum": [*words, *plain]}
         case OneOrMore(each):
             one = _quantity(each)

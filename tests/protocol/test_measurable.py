@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
 
-from rig.boards import GATES, LONGEST_RECORD_MS, MEGA, RELEASES, UNO
+from rig.boards import BOARDS, GATES, LONGEST_RECORD_MS, MEGA, RELEASES, UNO
+from rig.cli import main
 from rig.errors import InputError
 from rig.model.fall import free_fall
 from rig.protocol.describe import describe
@@ -20,6 +22,7 @@ from rig.protocol.measurable import (
     record_ms,
 )
 from rig.protocol.reader import parse, read
+from rig.protocol.rods import MOST_RODS
 from rig.protocol.yamltree import load, place_of
 from tests.protocol.test_protocol_reader import GOOD, READY
 
@@ -105,6 +108,41 @@ def test_what_a_board_lacks_is_said_at_its_place():
     for word, board in (("uno", UNO), ("mega", MEGA)):
         for problem in lacking(protocol, board):
             assert f"note: not with board {word}: {problem}" in said
+
+
+def up_to(limit, board):
+    """A protocol that asks as much of a board as there is, and what asks for more."""
+    pulsed = GOOD + "release: {channel: %d, pulse: %d us}\n"
+    if limit == "releases":
+        return [pulsed % (n, 80_000) for n in (board.releases - 1, board.releases)]
+    if limit == "longest_pulse":
+        longest = round(1e6 * board.longest_pulse)
+        return [pulsed % (0, pulse) for pulse in (longest, longest + 1)]
+    if limit == "gates":
+        channels = [n for n in (board.gates - 1, board.gates) if n < GATES]
+        return [GOOD.replace("channel: 8", f"channel: {n}") for n in channels]
+    # Two gates, and two edges a rod at each.
+    rods = [n for n in (board.events // 4, board.events // 4 + 1) if n <= MOST_RODS]
+    thin = GOOD.replace("12.7 mm", "0.1 mm")
+    return [thin.replace("rods: 25", f"rods: {n}") for n in rods]
+
+
+@pytest.mark.parametrize("limit", ["releases", "longest_pulse", "gates", "events"])
+@pytest.mark.parametrize("word", BOARDS)
+def test_all_judge_alike_what_a_board_can_do(word, limit, tmp_path, capsys):
+    path, board = tmp_path / "p.yaml", BOARDS[word]
+    for more, text in enumerate(up_to(limit, board)):
+        path.write_text(text)
+        protocol, able = read(path), not more or (limit == "events" and board.streams)
+        said = describe(protocol)
+        (listed,) = re.findall("boards that can do it: (.*)", said) or [""]
+        assert (word in listed.split(", ")) == able
+        assert (f"note: not with board {word}: {path}:" in said) != able
+        if able:
+            check_recordable(protocol, board)
+        else:
+            assert main(["check", str(path), "--board", word]) == 2
+            assert f"the board ({board.name}) has " in capsys.readouterr().err
 
 
 def test_what_every_board_has_is_not_remarked_on():

@@ -53,6 +53,11 @@ def test_yaml_1_2_scalars():
     protocol = parse(changed)
     assert protocol.surface.restitution.value == 1e-3
     assert protocol.plan.repeats == 15
+    for word in ("true", "True", "TRUE", "false", "False", "FALSE"):
+        assert parse(f"{GOOD}blind: {word}\n").blind is (word.lower() == "true")
+    for word in ("yes", "on", "tRUE", "1", ""):
+        (problem,) = problems(f"{GOOD}blind: {word}\n")
+        assert "accepted: true, True, TRUE, false, False, FALSE" in problem
 
 
 def test_a_reference_is_a_gps_receivers_unless_it_says_otherwise():
