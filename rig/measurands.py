@@ -5,13 +5,17 @@ A new measurand is a row here and the function that computes it in `rig.analysis
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator
 
-_SUFFIXES = ("_m_s2", "_m_s", "_m", "_s")
+_UNIT = re.compile(
+    r"(_(m|kg|s|A|K|mol|cd|rad|sr|Hz|N|Pa|J|W|C|V|F|Ohm|S|Wb|T|H|lm|lx|Bq|Gy|Sv|kat)[1-9]?)+$"
+)
+"""The SI unit at a name's end: base units and those with names of their own (SI brochure, 2.3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +64,7 @@ class Measurand:
     @property
     def stem(self) -> str:
         """The name without its unit."""
-        return next(self.name.removesuffix(end) for end in _SUFFIXES if self.name.endswith(end))
+        return _UNIT.sub("", self.name)
 
     def key(self, what: str) -> str:
         """Name something of it: ``sd`` of ``speed_m_s`` is ``speed_sd_m_s``."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.boards import DRIVE
-from rig.usb.listing import serial_ports
+from rig.usb.listing import known, serial_ports
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -117,7 +117,12 @@ def new_port(before: set[str], patience_s: float = 10.0) -> str:
 
 def pico_ports() -> set[str]:
     """List the ports that are a Pico's by their numbers."""
-    return {port.path for port in serial_ports() if port.kind == DRIVE.board.name}
+    name = DRIVE.board.name
+    return {
+        port.path
+        for port in serial_ports()
+        if any(kind.name == name for kind in known(port.vid, port.pid))
+    }
 
 
 def _mounted(mounts: Path) -> Iterator[Path]:

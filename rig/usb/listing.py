@@ -17,51 +17,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A kind of USB device.
+    """A kind of USB device; several kinds may have the same numbers.
 
     Attributes
     ----------
-    vid, pid
-        USB vendor and product.
     name
         What it is.
+    numbers
+        USB vendor and product, as often as it has others.
     board
         Whether the numbers belong to a board. A chip that is on cheap copies of boards is on
         other instruments too, so it says only that there may be one.
     """
 
-    vid: int
-    pid: int
     name: str
-    board: bool
+    numbers: tuple[tuple[int, int], ...]
+    board: bool = False
 
-
-_MEGA, _UNO = MEGA.name, UNO.name
 
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 KNOWN = (
-    Known(0x2E8A, 0x000A, PICO.name, board=True),
-    Known(0x2341, 0x0010, _MEGA, board=True),
-    Known(0x2341, 0x0042, _MEGA, board=True),
-    Known(0x2341, 0x0210, _MEGA, board=True),
-    Known(0x2341, 0x0242, _MEGA, board=True),
-    Known(0x2A03, 0x0010, _MEGA, board=True),
-    Known(0x2A03, 0x0042, _MEGA, board=True),
-    Known(0x2341, 0x0001, _UNO, board=True),
-    Known(0x2341, 0x0043, _UNO, board=True),
-    Known(0x2341, 0x0243, _UNO, board=True),
-    Known(0x2A03, 0x0043, _UNO, board=True),
-    Known(0x1A86, 0x5523, "CH341", board=False),
-    Known(0x1A86, 0x7523, "CH340", board=False),
-    Known(0x0403, 0x6001, "FTDI FT232R", board=False),
-    Known(0x0403, 0x6015, "FTDI FT231X", board=False),
-)
+    Known(PICO.name, ((0x2E8A, 0x000A),), board=True),
+    Known(
+        MEGA.name,
+        ((0x2341, 0x0010), (0x2341, 0x0042), (0x2341, 0x0210), (0x2341, 0x0242),
+         (0x2A03, 0x0010), (0x2A03, 0x0042)),
+        board=True,
+    ),
+    Known(
+        UNO.name,
+        ((0x2341, 0x0001), (0x2341, 0x0043), (0x2341, 0x0243), (0x2A03, 0x0043)),
+        board=True,
+    ),
+    Known("CH341", ((0x1A86, 0x5523),)),
+    Known("CH340", ((0x1A86, 0x7523),)),
+    Known("FTDI FT232R", ((0x0403, 0x6001),)),
+    Known("FTDI FT231X", ((0x0403, 0x6015),)),
+)  # fmt: skip
 
 
-def known(vid: int, pid: int) -> Known | None:
-    """Find a kind of device, or `None`."""
-    return next((kind for kind in KNOWN if (kind.vid, kind.pid) == (vid, pid)), None)
+def known(vid: int | None, pid: int | None) -> list[Known]:
+    """Find the kinds of device with these numbers."""
+    return [kind for kind in KNOWN if (vid, pid) in kind.numbers]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,17 +104,15 @@ def serial_ports() -> list[SerialPort]:
 
 def described(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
-    kind = None
+    kinds = known(info.vid, info.pid)
     if info.vid is None or info.pid is None:
         skipped = "no USB device"
+    elif not kinds:
+        skipped = "no board's USB numbers: name it with --port if it is one"
+    elif not any(kind.board for kind in kinds):
+        skipped = "a chip that boards and other instruments have: name it with --port"
     else:
-        kind = known(info.vid, info.pid)
-        if kind is None:
-            skipped = "no board's USB numbers: name it with --port if it is one"
-        elif not kind.board:
-            skipped = "a chip that boards and other instruments have: name it with --port"
-        else:
-            skipped = ""
+        skipped = ""
     return SerialPort(
         path=info.device,
         vid=info.vid,
@@ -124,7 +120,7 @@ def described(info: ListPortInfo) -> SerialPort:
         serial_number=info.serial_number,
         manufacturer=info.manufacturer,
         product=info.product,
-        kind=kind.name if kind else "",
+        kind=" or ".join(kind.name for kind in kinds),
         skipped=skipped,
     )
 

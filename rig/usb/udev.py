@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from rig.usb.listing import KNOWN, Known
+from typing import TYPE_CHECKING
+
+from rig.usb.listing import KNOWN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rig.usb.listing import Known
 
 _HEAD = """\
 # Boards of a chain rig. Put this into /etc/udev/rules.d/, then
@@ -24,15 +31,19 @@ _MODEM = """
 def rule() -> str:
     """Write the rule's file."""
     opened = [
-        f'SUBSYSTEM=="tty", {_match(kind)}, GROUP="dialout", MODE="0660", TAG+="uaccess"\n'
-        for kind in KNOWN
+        f'SUBSYSTEM=="tty", {match}, GROUP="dialout", MODE="0660", TAG+="uaccess"\n'
+        for match in _matches(KNOWN)
     ]
-    ignored = [f'{_match(kind)}, ENV{{ID_MM_DEVICE_IGNORE}}="1"\n' for kind in KNOWN if kind.board]
+    boards = [kind for kind in KNOWN if kind.board]
+    ignored = [f'{match}, ENV{{ID_MM_DEVICE_IGNORE}}="1"\n' for match in _matches(boards)]
     return "".join([_HEAD, _OPEN, *opened, _MODEM, *ignored, '\nLABEL="chainrig_end"\n'])
 
 
-def _match(kind: Known) -> str:
-    return f'ATTRS{{idVendor}}=="{kind.vid:04x}", ATTRS{{idProduct}}=="{kind.pid:04x}"'
+def _matches(kinds: Iterable[Known]) -> list[str]:
+    """Write what matches the numbers of some kinds, each once."""
+    numbers = dict.fromkeys(pair for kind in kinds for pair in kind.numbers)
+    match = 'ATTRS{{idVendor}}=="{:04x}", ATTRS{{idProduct}}=="{:04x}"'
+    return [match.format(*pair) for pair in numbers]
 
 
 if __name__ == "__main__":

@@ -10,11 +10,13 @@ from types import SimpleNamespace
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
+from rig.boards import PICO
 from rig.cli import main
 from rig.errors import DeviceError
+from rig.flash.drive import pico_ports
 from rig.recorder.board_locator import BoardLocator
 from rig.usb import udev
-from rig.usb.listing import KNOWN, path_of, serial_number_at, serial_ports
+from rig.usb.listing import KNOWN, Known, path_of, serial_number_at, serial_ports
 from tests.flash.pty_board import PtyBoard
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
@@ -148,18 +150,28 @@ def test_this_computer_can_be_looked_at():
     assert all(port.path for port in serial_ports())
 
 
-def test_no_kind_is_listed_twice():
-    numbers = [(kind.vid, kind.pid) for kind in KNOWN]
-    assert len(set(numbers)) == len(numbers)
+@pytest.mark.parametrize("first", KNOWN, ids=lambda kind: kind.name)
+def test_a_second_board_may_have_the_same_chip(plugged, monkeypatch, first):
+    """Once either may be there, the port is a board's, and no rule is written twice."""
+    other = Known("Teensy 9", first.numbers[:1], board=True)
+    monkeypatch.setattr("rig.usb.listing.KNOWN", (*KNOWN, other))
+    monkeypatch.setattr("rig.usb.udev.KNOWN", (*KNOWN, other))
+    plugged(info("/dev/ttyACM0", *first.numbers[0]))
+    (port,) = serial_ports()
+    assert (port.kind, port.candidate) == (f"{first.name} or Teensy 9", True)
+    assert pico_ports() == ({port.path} if first.name == PICO.name else set())
+    lines = [line for line in udev.rule().splitlines() if line.startswith(("SUBSYSTEM", "ATTRS"))]
+    assert len(set(lines)) == len(lines)
 
 
 def test_the_udev_rule_is_up_to_date():
     assert (PACKAGING / "60-chainrig.rules").read_text("ascii") == udev.rule()
 
 
-@pytest.mark.parametrize("kind", KNOWN, ids=str)
+@pytest.mark.parametrize("kind", KNOWN, ids=lambda kind: kind.name)
 def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(kind):
-    match = f'ATTRS{{idVendor}}=="{kind.vid:04x}", ATTRS{{idProduct}}=="{kind.pid:04x}", '
-    lines = [line for line in udev.rule().splitlines() if match in line]
-    assert sum(line.startswith('SUBSYSTEM=="tty"') and "uaccess" in line for line in lines) == 1
-    assert sum(line.endswith('ENV{ID_MM_DEVICE_IGNORE}="1"') for line in lines) == kind.board
+    for vid, pid in kind.numbers:
+        match = f'ATTRS{{idVendor}}=="{vid:04x}", ATTRS{{idProduct}}=="{pid:04x}", '
+        lines = [line for line in udev.rule().splitlines() if match in line]
+        assert sum(line.startswith('SUBSYSTEM=="tty"') and "uaccess" in line for line in lines) == 1
+        assert sum(line.endswith('ENV{ID_MM_DEVICE_IGNORE}="1"') for line in lines) == kind.board
