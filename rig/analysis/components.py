@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 _DEFAULT = Priors()
+SHARPEST = 1e-6
+"""Of an edge, m: no rod is round to less, and no beam's edge sharper, whatever is stated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,7 @@ def stated(protocol: Protocol) -> Components:
     """How much everything scatters by a protocol's priors."""
     priors = protocol.priors
     return Components(
-        priors.edge_floor,
+        max(priors.edge_floor, SHARPEST),
         priors.jitter,
         priors.hang,
         priors.beam_offset,

@@ -58,8 +58,6 @@ class DropModel:
         How much everything scatters; as the protocol states it if not given.
     sides
         Models of these same records: what was made of their trains need not be made again.
-    air
-        Whether κ is an unknown.
     """
 
     def __init__(
@@ -70,12 +68,9 @@ class DropModel:
         clock_u: float,
         components: Components | None = None,
         sides: Sequence[DropModel] = (),
-        *,
-        air: bool = True,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
-        self.air = air
         self._kappa, self._kappa_u = prior_air(protocol)
         self.records: dict[str, ChainRecord] = {record.role: record for record in records}
         self.guesses = guesses
@@ -120,8 +115,7 @@ class DropModel:
         unknowns.add("drop", "drop height", protocol.drop.u)
         if len(self.records) > 1:
             unknowns.add("side", "side", protocol.priors.side)
-        if self.air:
-            unknowns.add("drag", "air", self._kappa_u)
+        unknowns.add("drag", "air", self._kappa_u)
         datums = [protocol.gates.datum_u] * len(protocol.gates.posts)
         unknowns.add("datum", "datum", datums)
         unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
@@ -172,7 +166,7 @@ class DropModel:
 
     def stiff(self) -> DropModel:
         """Return the same drop with impulses that are nearly alike, the last one too."""
-        if "strings" not in self.unknowns:
+        if "impact" not in self.records:
             return self
         other = copy(self)
         tight = replace(self.protocol.priors, strings=0.0)

@@ -125,7 +125,7 @@ class Evidence:
         new: dict[str, float] = {}
         kinds, squares, counts = self._binned(parameters, struck)
         self._share(_EDGES, kinds, squares, counts, new)
-        parted = new["departure"] / self.stated.departure
+        parted = new["departure"] / self.stated.departure if self.stated.departure else 1.0
         if parted < 2.0 * LEAST_SHARE:
             # Where no rod is off its chain, few are not either: the least of it explains nothing.
             self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
@@ -133,6 +133,8 @@ class Evidence:
         # Where rods leave their chain, a few drops that happen to be alike show nothing of strings.
         parted = max(LEAST_SHARE, min(1.0, parted))
         for kind, found in self._squares.items():
+            if not getattr(self.stated, kind):
+                continue  # known exactly, so that nothing scatters
             stated = _member((getattr(self.stated, kind) / getattr(old, kind)) ** 2, 1.0)
             weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
             told = weight + self._determined[kind]
@@ -191,6 +193,10 @@ class Evidence:
         Variances Σ kinds·a² are fitted to sums of squares with so many degrees of freedom: the
         maximum of the χ² likelihood above the least a, by multiplicative steps.
         """
+        # What is known exactly has no share.
+        pairs = [pair for pair in zip(names, kinds, strict=True) if getattr(self.stated, pair[0])]
+        new.update(dict.fromkeys(names, 0.0))
+        names, kinds = [name for name, _ in pairs], np.array([sizes for _, sizes in pairs])
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
         found = np.array([getattr(self.components, name) ** 2 for name in names])
         # The stated member is spread over all sizes, so that it pulls no component alone.

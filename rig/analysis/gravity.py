@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.adjust import least_squares
+from rig.analysis.components import stated
 from rig.analysis.drop_model import prior_air
 from rig.analysis.equations import NormalEquations, plain_equations
 from rig.analysis.evidence import STATED_WEIGHT
@@ -132,7 +133,7 @@ def free_gravity(
     pairs = [(edge, rod) for edge, rod in pairs if edge.channel in gates]
     if name is None or protocol.gates is None or len(pairs) < _FEWEST:
         return None
-    chain, priors = protocol.chains[name], protocol.priors
+    chain = protocol.chains[name]
     rods = np.array([rod for _, rod in pairs])
     channel = np.array([edge.channel for edge, _ in pairs])
     side = np.array([0.5 if edge.blocked else -0.5 for edge, _ in pairs])
@@ -142,11 +143,12 @@ def free_gravity(
     height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
     design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
     top, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
-    sigma = np.hypot(priors.edge_floor, (speed - fall * time) * priors.jitter)
+    scatter = stated(protocol)
+    sigma = np.hypot(scatter.floor, (speed - fall * time) * scatter.jitter)
     # The parabola's vertex is the release: where and when the speed was zero.
     point = np.array([top + speed**2 / (2.0 * fall), speed / fall, fall, 0.0])  # h, t, g and κ
     turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
-    ripple = priors.beam_offset * math.tan(math.radians(chain.tilt_deg))
+    ripple = scatter.beam * math.tan(math.radians(chain.tilt_deg))
     # What edges have in common, one column each, in units of its standard uncertainty: with the
     # fit's own unknowns beside it, least squares need no covariance of all edges with all.
     beams = (channel[:, None] == np.array([*gates])).astype(float)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.result import Measured
+from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -108,19 +109,22 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
 def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) -> list[str]:
     """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
     said = []
-    for name, symbol, unit, scale in (
-        ("speed_m_s", "V", "m/s", 1.0),
-        ("separation_raw_m", "Δz as it fell", "mm", 1e3),
+    for name, symbol, unit in (
+        ("speed_m_s", "V", "m/s"),
+        ("separation_raw_m", "Δz as it fell", "mm"),
     ):
         if name not in found or name not in alone:
             continue
         one, other = found[name], alone[name]
         # They share their last edges and so the errors of these: they are nearer than that.
         if abs(one.value - other.value) > _APART * math.hypot(one.u, other.u):
+            last, whole = (
+                format_quantity(Quantity(measured.value, measured.expanded), unit)
+                for measured in (other, one)
+            )
             said.append(
-                f"the last passages alone have {symbol} = {other.value * scale:.3g} ± "
-                f"{other.expanded * scale:.2g} {unit}, the whole fall {one.value * scale:.3g} ± "
-                f"{one.expanded * scale:.2g} {unit}: its end does not fall as the model says"
+                f"the last passages alone have {symbol} = {last}, the whole fall {whole}: "
+                "its end does not fall as the model says"
             )
     return said
 
@@ -143,14 +147,17 @@ def _passages(fit: Fit, role: str) -> _Passages:
 def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[float, float], Array]:
     """Height and speed of a chain's top rod at a moment, and their covariance.
 
-    Generalized least squares of z(t) = z − v(t − t₀) − ½g(t − t₀)²: edges are off by themselves,
-    and together by their beam's height and aim, their rod's place, the rods' width, and what a rod
+    Generalized least squares of z(t) = z − v(t − t₀) − ½(g − κv²)(t − t₀)²: edges are off by
+    themselves, and together by their beam's height and aim, their rod's place, the rods' width, and what a rod
     that strikes early loses.
     """
     protocol, chain = fit.model.protocol, fit.model.records[role].chain
     assert protocol.gates is not None
     since = seen.times - when
-    fallen = seen.heights + 0.5 * protocol.gravity.value * since**2
+    path = fit.model.trajectory(role, fit.x)
+    (speed,), kappa = path.heights(np.array([when]))[1], np.ravel(path.kappas(np.array([-1])))[0]
+    pull = protocol.gravity.value - kappa * speed**2
+    fallen = seen.heights + 0.5 * pull * since**2
     design = np.stack([np.ones_like(since), -since], axis=1)
     ripple = fit.model.components.beam * math.tan(math.radians(chain.tilt_deg))
     turn = np.where(seen.rod % 2, -1.0, 1.0)  # a beam off the middle sees neighbours either way

@@ -73,4 +73,4 @@ def likeness(joint: JointFit) -> Likeness | None:
     if alpha <= 0.0 or told.get("departure", 0.0) < ENOUGH:
         return None
     scatter = math.hypot(found.impulse, found.impulse_floor / alpha)
-    return Likeness(found.departure, scatter if told["impulse"] >= ENOUGH else None)
+    return Likeness(found.departure, scatter if told.get("impulse", 0.0) >= ENOUGH else None)

@@ -68,7 +68,9 @@ class Unknowns:
         return self._blocks[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._blocks
+        """Whether anything of a block is unknown: what is known exactly is as if it were not."""
+        block = self._blocks.get(str(name))
+        return block is not None and any(self._sd[block])
 
     @property
     def blocks(self) -> dict[str, slice]:
@@ -163,8 +165,7 @@ def _path(
     """Derivatives of a trajectory's parameters by all unknowns."""
     found = np.zeros((COMMON + 2 * rods, size))
     found[RELEASE, at[f"{role} release"]] = found[GRAVITY, at["gravity"]] = 1.0
-    if "drag" in at:
-        found[DRAG, at["drag"]] = 1.0
+    found[DRAG, at["drag"]] = 1.0
     found[START, at["drop"]] = found[START, at[f"{role} hang"]] = 1.0
     if role == "free" and "side" in at:
         found[START, at["side"]] = 1.0

@@ -134,8 +134,8 @@ def _normal(
     size = len(at) + len(EXTRA)
     point = np.concatenate([x, np.zeros(len(EXTRA))])
     point[at["impulses"]], point[at["alpha"]] = alphas, 0.0
-    if "drag" in at:  # κ stands behind the rods here, free of what is known of it beforehand
-        point[-1], point[at["drag"]] = model.kappa(x), 0.0
+    # κ stands behind the rods here, free of what is known of it beforehand.
+    point[-1], point[at["drag"]] = model.kappa(x), 0.0
     matrix, vector, constant, edges = np.zeros((size, size)), np.zeros(size), 0.0, 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
@@ -145,8 +145,7 @@ def _normal(
         extra[1:] -= rows.told[1:, None] * extra[:-1]
         place = np.append(rows.columns, np.arange(len(at), size))
         slopes = np.column_stack([rows.slopes, extra])
-        if "drag" in at:
-            slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
+        slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
         sigma = rows.residuals.sigma * inflation
         weight = robust_weights(rows.residuals.values / sigma, STRAY) / sigma**2
         weighted = slopes * weight[:, None]

@@ -33,63 +33,62 @@ class Prior(NamedTuple):
     source: str
 
 
-def _length(*, zero: bool = False) -> Range:
-    return Range(Dimension.LENGTH, 0.0, 0.1, "mm", open_low=not zero)
+_LENGTH = Range(Dimension.LENGTH, 0.0, 0.1, "mm")
 
 
 PRIORS: dict[str, Prior] = {
     "edge_floor": Prior(
-        _length(),
+        _LENGTH,
         "what an edge may be off for reasons not in the equations",
         "rods made to ISO 2768-1 f, 30 to 120 mm: ±0.15 mm, evenly likely, is 0.09 mm",
     ),
     "jitter": Prior(
-        Range(Dimension.TIME, 0.0, 0.1, "µs", open_low=True),
+        Range(Dimension.TIME, 0.0, 0.1, "µs"),
         "scatter of one time stamp",
         "an edge that waits for another one's interrupt on a 16 MHz AVR: some µs",
     ),
     "hang": Prior(
-        _length(),
+        _LENGTH,
         "scatter of a chain's hanging height from run to run",
         "hung by hand against a mark: ±0.5 mm evenly likely, 0.29 mm (GUM 4.3.7)",
     ),
     "side": Prior(
-        _length(zero=True),
+        _LENGTH,
         "how much lower one side hangs than the other, in every run",
         "two marks, each read to the nearest mm: √2 · 0.29 mm, rounded up (GUM 4.3.7)",
     ),
     "beam_offset": Prior(
-        _length(),
+        _LENGTH,
         "how far off a rod's middle a beam runs; times tan(tilt) it shifts edges rod by rod",
         "a beam of 3 mm aimed by eye: ±1.7 mm evenly likely (GUM 4.3.7)",
     ),
     "swing": Prior(
-        Range(Dimension.SPEED, 0.0, 1.0, "m/s", open_low=False),
+        Range(Dimension.SPEED, 0.0, 1.0, "m/s"),
         "how fast the bottom rod swings as a chain is let go",
         "a chain of a metre that swings 3 cm to and fro, which one sees",
     ),
     "departure": Prior(
-        _length(),
+        _LENGTH,
         "how far off its chain a rod may be once rods have struck",
         "resolved falls: 0.2 mm with dead strings to 0.4 mm with lively ones",
     ),
     "last_rods": Prior(
-        _length(),
+        _LENGTH,
         "and besides where few rods still fall: times one over their number",
         "resolved falls: 0.2 mm with damped strings to 2.4 mm with lively ones",
     ),
     "impulses": Prior(
-        Range(Dimension.NUMBER, 0.0, 1.0, "%", open_low=True),
+        Range(Dimension.NUMBER, 0.0, 1.0, "%"),
         "scatter of single impulses, relative to α",
         "resolved falls: 18 to 22 %, whatever the strings",
     ),
     "impulse_floor": Prior(
-        Range(Dimension.NUMBER, 0.0, 0.5, "1", open_low=True),
+        Range(Dimension.NUMBER, 0.0, 0.5, "1"),
         "and at least, as α",
         "a guess: about 1 % of α at level ground",
     ),
     "last_impulse": Prior(
-        Range(Dimension.NUMBER, 0.0, 10.0, "%", open_low=True),
+        Range(Dimension.NUMBER, 0.0, 10.0, "%"),
         "and of the last one besides, relative to α: one rod alone goes as its own string does",
         "a guess; resolved falls with lively strings have up to 200 %",
     ),
@@ -99,7 +98,7 @@ PRIORS: dict[str, Prior] = {
         "a guess: 30 % is the restitution of a damped string",
     ),
     "drag": Prior(
-        Range(Dimension.NUMBER, 0.0, 10.0, "1", open_low=False),
+        Range(Dimension.NUMBER, 0.0, 10.0, "1"),
         "κ of the air, 1/m, where no drag is stated: 0 ± this",
         "½ρCd/(¼π ρ_rod d²) of 12.7 mm rods: 0.025 of aluminium, 0.06 of acrylic, 0.09 of oak",
     ),

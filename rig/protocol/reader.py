@@ -49,7 +49,7 @@ LATITUDE = Range(Dimension.ANGLE, -90.0, 90.0, "deg")
 HEIGHT = Range(Dimension.LENGTH, -500.0, 9000.0, "m")
 INCLINE = Range(Dimension.ANGLE, 0.1, 90.0, "deg")
 ROLLING = Range(Dimension.NUMBER, 0.0, 1.0, "1")
-REFERENCE = Range(Dimension.NUMBER, 0.0, 1e-3, "ppm", open_low=True)
+REFERENCE = Range(Dimension.NUMBER, 0.0, 1e-3, "ppm")
 
 
 def read(path: str | os.PathLike[str]) -> Protocol:

@@ -36,7 +36,7 @@ def test_every_prior_has_a_key_and_what_is_left_out_is_as_by_default():
     [
         ("{hnag: 1 mm}", "did you mean hang?"),
         ("{hang: 1 s}", "a length"),
-        ("{hang: 0 mm}", "above 0 mm"),
+        ("{hang: -1 mm}", "0 mm to 100 mm"),
         ("{hang: 1 mm ± 1 mm}", "±"),
         ("3", "a mapping"),
     ],
