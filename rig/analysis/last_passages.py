@@ -148,8 +148,8 @@ def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[floa
     """Height and speed of a chain's top rod at a moment, and their covariance.
 
     Generalized least squares of z(t) = z − v(t − t₀) − ½(g − κv²)(t − t₀)²: edges are off by
-    themselves, and together by their beam's height and aim, their rod's place, the rods' width, and what a rod
-    that strikes early loses.
+    themselves, and together by their beam's height and aim, their rod's place, the rods' width,
+    and what a rod that strikes early loses.
     """
     protocol, chain = fit.model.protocol, fit.model.records[role].chain
     assert protocol.gates is not None

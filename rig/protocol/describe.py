@@ -19,7 +19,7 @@ from rig.protocol.measurable import (
     unmeasurable,
 )
 from rig.protocol.plan import runs
-from rig.protocol.protocol import AT_REST, Priors
+from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Priors
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
@@ -90,6 +90,9 @@ def _scene(protocol: Protocol) -> list[str]:
         lines.append(_track(protocol.track))
     pull = "gravity" if protocol.track is None else "acceleration without friction"
     lines.append(f"{pull}: {format_quantity(protocol.gravity, 'm/s^2')}")
+    along = protocol.track.along(STANDARD_GRAVITY) if protocol.track else STANDARD_GRAVITY
+    if protocol.gravity == along:
+        lines[-1] += ", by standard gravity: the fit only begins there"
     if surface is not None or protocol.gates is not None:
         lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {protocol.zero}")
     if protocol.initial_speed != AT_REST:

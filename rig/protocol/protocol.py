@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 Side = Literal["impact", "free"]
 Order = Literal["ABBA", "alternate", "fixed"]
 AT_REST = Quantity(0.0)
+STANDARD_GRAVITY = Quantity(9.80665, 0.025)
+"""m/s², where none is stated: that of the CGPM of 1901; on the ground anywhere g is from 9.764 to
+9.834 (C. Hirt et al., 2013), so at most 0.043 off and evenly likely so (GUM 4.3.7)."""
 PPS_U = 1e-7
 """Of a GPS receiver's pulse per second, relative: modules state 0.1 ppm or better with a fix."""
 DATUM_U = 0.3e-3

@@ -15,6 +15,7 @@ from rig.protocol.fields import FieldFaults, Range, Section
 from rig.protocol.protocol import (
     AT_REST,
     PPS_U,
+    STANDARD_GRAVITY,
     Accept,
     Contact,
     InclinedTrack,
@@ -320,17 +321,17 @@ def _count(node: Node | None) -> int:
 
 
 def _gravity(top: Section) -> Quantity | None:
-    """Read ``gravity`` or ``site``, exactly one of which is wanted."""
+    """Read ``gravity`` or ``site``; a scene without a surface measures it, and needs neither."""
     if "gravity" in top and "site" in top:
         first, second = sorted(("gravity", "site"), key=lambda key: top.keys[key])
         message = f"{first} is given too, on line {top.keys[first].line}; keep one of them"
         top.fault(second, message, at_key=True)
-    elif "gravity" not in top and "site" not in top:
+    elif "surface" in top and "gravity" not in top and "site" not in top:
         message = "missing; write gravity: 9.81 m/s^2, or site: {latitude: 61.19 deg, height: 30 m}"
         top.fault("gravity", message)
     site = top.take("site", _site)
-    given = top.take("gravity", fields.quantity(GRAVITY))
-    return given if "gravity" in top else site
+    given = top.take("gravity", fields.quantity(GRAVITY), STANDARD_GRAVITY)
+    return site if "site" in top and "gravity" not in top else given
 
 
 def _site(node: Node, key: str, faults: FieldFaults) -> Quantity | None:

@@ -12,7 +12,16 @@ from rig.boards import GATES, RELEASES
 from rig.protocol import chains, drag, gates, masses, reader, rods, settings, spacing, surface
 from rig.protocol.fields import BOOLEANS, Range
 from rig.protocol.priors import PRIORS
-from rig.protocol.protocol import DATUM_U, Accept, Contact, Drag, Plan, Priors, ReleasePulse
+from rig.protocol.protocol import (
+    DATUM_U,
+    STANDARD_GRAVITY,
+    Accept,
+    Contact,
+    Drag,
+    Plan,
+    Priors,
+    ReleasePulse,
+)
 from rig.units import Dimension, Quantity, format_quantity
 
 ANY = "*"
@@ -125,8 +134,10 @@ KEYS: tuple[Key, ...] = (
     Key("notes", _TEXT, "", "for people; kept with the session", "Chains weighed in May."),
     Key("blind", OneOf(tuple(BOOLEANS)), "false",
         "whether what is measured is kept back until `rig unblind`", "true"),
-    Key("gravity", reader.GRAVITY, "",
-        "local acceleration of free fall, ± its standard uncertainty; or `site`",
+    Key("gravity", reader.GRAVITY,
+        f"{STANDARD_GRAVITY.value} ± {STANDARD_GRAVITY.u} m/s^2",
+        "local acceleration of free fall, ± its standard uncertainty; or `site`. With a surface "
+        "one of them must be there; else the drop measures g, and the fit only begins there",
         "9.8124 m/s^2 ± 0.0002 m/s^2"),
     Key("site", _MAP, "", "gravity from where the lab is, by WGS 84", ""),
     Key("site.latitude", reader.LATITUDE, "", "geodetic latitude", "61.19 deg", required=True),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,6 +13,7 @@ from rig.analysis.drop import fit_drop
 from rig.analysis.gate_passages import _moment
 from rig.analysis.session import analyze
 from rig.protocol import reader
+from rig.protocol.describe import describe
 from rig.protocol.plan import runs
 from rig.records import Edge
 from rig.units import Quantity
@@ -21,6 +23,22 @@ from tests.analysis.drops import PROTOCOLS, case
 BALL, GLIDER = (reader.read(PROTOCOLS / f"{name}.yaml") for name in ("falling-ball", "glider"))
 BOTH = pytest.mark.parametrize("protocol", [BALL, GLIDER], ids=["ball", "glider"])
 QUIET = Dials.quiet()
+
+
+@pytest.mark.parametrize("name", ["falling-ball", "glider", "picket-fence"])
+def test_where_gravity_is_measured_none_need_be_stated(name):
+    """The least that is measured on the ground is found all the same, and as surely."""
+    text = re.sub(r"(?m)^(gravity|site):.*\n", "", (PROTOCOLS / f"{name}.yaml").read_text("utf-8"))
+    there, unsaid = reader.parse(f"{text}gravity: 9.764 m/s^2\n"), reader.parse(text)
+    assert unsaid.gravity != there.gravity
+    assert "by standard gravity" in describe(unsaid)
+    assert "by standard gravity" not in describe(there)
+    drop = case(there, QUIET, run=1)
+    wanted, found = drop.analyze(), replace(drop, protocol=unsaid).analyze()
+    assert found.verdict == wanted.verdict == "accepted"
+    (wanted,), (found,) = wanted.quantities.values(), found.quantities.values()
+    assert found.value == pytest.approx(wanted.value, abs=0.01 * wanted.u)
+    assert found.u == pytest.approx(wanted.u, rel=0.01)
 
 
 def accelerated(result):

@@ -37,9 +37,10 @@ def around(path: str) -> dict:
         data["gates"] = {side: [{"channel": 0, "height": "40 mm"}] for side in sides}
     if "surface" in data:
         data["drop"] = "100 mm"
-    if path.startswith("site"):
+    if path.startswith(("gravity", "site")):
         del data["gravity"]
-        data["site"] = {"latitude": "50 deg", "height": "0 m"}
+        site = {"latitude": "50 deg", "height": "0 m"}
+        data |= {"site": site} if path.startswith("site") else {}
     if ".rods.[]" in path:
         chain["rods"] = [{"count": 8, "mass": "3 g"}]
         if path.endswith("diameter"):
