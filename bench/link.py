@@ -39,11 +39,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
 _HEAD = """\
-# What the way from the port to a client bears
+# Speed of the link
 
-Written by `./run bench link`: edges a second decoded and delivered, how late they are, beside
-reading alone and a decoder that takes single bytes; and what an idle daemon costs. Times are of the
-machine and its load of that day."""
+`./run bench link`: edges a second, their delay, and the cost of an idle daemon. Times are of one
+machine."""
 _FRAMES = 65_000 // EVENTS_PER_FRAME  # the number of an event is a u16
 _RATE = 5000.0  # edges a second, where latency is measured
 _STEADY_FRAMES = 500

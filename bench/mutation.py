@@ -172,9 +172,8 @@ def page(outcomes: list[Outcome], seed: int) -> str:
     lines = [
         "# Faults put into the source",
         "",
-        "Written by `./run bench mutation --page docs/results/mutation.md`: "
-        f"{len(outcomes)} faults drawn by seed {seed}, one at a time, each tried by the tests of "
-        "its room that run through its line.",
+        f"`./run bench mutation`: {len(outcomes)} faults drawn by seed {seed}, one at a time, each "
+        "tried by the tests that run through its line.",
         "",
         "| room | faults | noticed | |",
         "|---|---|---|---|",

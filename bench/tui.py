@@ -40,10 +40,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 _HEAD = """\
-# What the terminal costs
+# Speed of the terminal
 
-Written by `./run bench tui`: the real program in a real terminal, from its first paint to chains
-that fall on its screen. Times are of the machine and its load of that day."""
+`./run bench tui`: the real program in a real terminal. Times are of one machine."""
 RATE = 5000.0
 """Edges a second."""
 SIZE = (120, 36)

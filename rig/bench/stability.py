@@ -160,7 +160,7 @@ def _naive(scene: Extreme, impact: Impact, exact: Exact) -> str:
     except ArithmeticError as error:
         return type(error).__name__
     errors = relative_error(separation, exact.separation), relative_error(arrival, exact.speed)
-    return f"Δz off by {errors[0]:.0e}, V by {errors[1]:.0e}"
+    return f"{errors[0]:.0e} {errors[1]:.0e}"
 
 
 @dataclass(frozen=True, slots=True)

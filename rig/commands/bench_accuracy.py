@@ -26,11 +26,11 @@ RIGS = 260
 """Short sessions for each dial: with 4 drops each, more than a thousand."""
 
 _HEAD = """\
-# Errors and intervals where chains fall by the model
+# Errors in the model's world
 
-Written by `rig bench accuracy`: simulated sessions go through device, line and file, and each
-result is set beside the truth that the simulation hides: errors of one run, their mean, how often
-± U holds the truth (95 % is meant), and the error beside its bound of Cramér and Rao."""
+`./run bench accuracy`: simulated sessions through board, line and file, compared with the true
+values. *In U95*: how often ± U holds the true value (95 % is intended). *× bound*: error over the
+smallest possible (Cramér and Rao)."""
 
 
 def main(arguments: Namespace) -> int:

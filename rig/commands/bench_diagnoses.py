@@ -25,14 +25,11 @@ _HEADINGS = (
 
 
 _HEAD = """\
-# Which faults of a rig are named rightly
+# Which faults of a rig are named
 
-Written by `rig bench diagnoses --drops {drops} --clean {clean}`: falls of the simulated rig with
-its default disturbances, on each layout {drops} of a rig that is wrong in one thing, by a size, and
-{clean} of rigs that are wrong in nothing. What the protocol's own uncertainties allow is rightly
-not noticed, and the air is an unknown of every drop; what no edge tells from another fault is among
-the likeliest. Figures by layout, and what was said instead, are in `diagnoses.csv` and
-`diagnoses.json`."""
+`./run bench diagnoses --drops {drops} --clean {clean}`: on each layout, {drops} drops of a rig
+with one fault, and {clean} without a fault. A fault within the protocol's own ± is rightly not
+noticed. By layout: `diagnoses.csv`."""
 
 
 def main(arguments: Namespace) -> int:

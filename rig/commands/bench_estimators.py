@@ -27,12 +27,10 @@ _COLUMNS: tuple[Column[dict[str, Any]], ...] = (
 )  # fmt: skip
 
 _HEAD = """\
-# Every way from edges to Δz and V
+# Error against time of each method
 
-Written by `rig bench estimators`: the same simulated drops read by a camera's frames, by two gates,
-by a straight line, by the adjustment alone and together, and by Monte Carlo with up to a million
-draws. Errors are against the hidden truth; times are of the machine of that day, so compare them
-with one another. Every number is in `estimators.csv`.
+`./run bench estimators`: the same simulated drops read by each method, compared with the true
+values. Times are of one machine: compare them with each other.
 
 ![Error against time](estimators.svg)"""
 

@@ -16,15 +16,11 @@ if TYPE_CHECKING:
     from argparse import Namespace
 
 _HEAD = """\
-# Is a layout as good as it was said to be?
+# Does a session reach the u that was predicted?
 
-Written by `rig bench foretold`: for each of several protocols the standard uncertainties that
-`rig design` foretells, by the scatter that the protocol states (before anything has fallen) and by
-that which a session of the rig taught (`--learned`), beside what a simulated session on the same
-layout then states: of one run, root mean square, and of the coefficients by `rig estimate`. The
-last column is the session's over what was foretold from the learned scatter; 1 is agreement. Where
-the protocol states more scatter than the rig has, the first forecast is the larger one, as it
-should be. SI units are in `foretold.csv`."""
+`./run bench foretold`: u of one run by `rig design`, from the stated and from the learned
+scatter, beside u of a simulated session. The last column is session over prediction from the
+learned scatter; 1 is agreement."""
 
 
 def main(arguments: Namespace) -> int:

@@ -23,15 +23,11 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-_SHOWN_REASONS = 8
 _HEAD = """\
-# On which layouts of gates drops are read
+# Which gate layouts can be read
 
-Written by `rig bench layouts --drops {drops}`: falls of the simulated rig without disturbances,
-with the default ones, and with all of them doubled, {drops} on each layout with each. Every drop
-is on a rig of its own and judged against the hidden truth; drops that truly miss more edges than
-the protocol accepts are left out. Every number is in `layouts.csv` and `layouts.json`, to which
-`--more` adds further rigs.
+`./run bench layouts --drops {drops}`: {drops} drops on each layout, without disturbances, with
+the usual ones, and with all doubled. Left out: drops that truly miss more edges than accepted.
 
 ![Map of layouts](layouts.svg)"""
 
@@ -78,16 +74,12 @@ def _lines(whole: Record) -> list[str]:
         by_layout.setdefault((cell["chain"], cell["heights_mm"]), []).append(cell)
     rows = [{"of": cells[0], "cells": cells} for cells in by_layout.values()]
     names = " / ".join(DISTURBANCES)
-    lines = [
+    return [
         f"void, marginal, drops with a wrong rod, error and its ratio to u: {names}",
         *_table(_COLUMNS, rows),
         "",
         *_table(_TOTALS, whole["totals"]),
     ]
-    if whole["reasons"]:
-        lines += ["", "why drops were void:"]
-        lines += [f"{n:6}  {why}" for why, n in [*whole["reasons"].items()][:_SHOWN_REASONS]]
-    return lines
 
 
 def _table(columns: Sequence[Column[Record]], records: Sequence[Record]) -> list[str]:

@@ -20,11 +20,10 @@ if TYPE_CHECKING:
     from rig.bench.precision import Cheapest, Gap, Precision
 
 _HEAD = """\
-# Error against run time of every way to compute the model
+# Cheapest way to compute the model
 
-Written by `rig bench precision`, which saves as it goes: every method at many tolerances, steps or
-nodes, its error against 50 digits of what it solves, its run time on the machine of that day. Times
-are therefore only good for comparing them with one another. Every point is in `precision.csv`."""
+`rig bench precision`: error against 50 digits, and run time, of every method and tolerance. Times
+are of one machine: compare them with each other. Every point is in `precision.csv`."""
 
 _PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
 """Contact times whose rows are printed; the others are in ``precision.json``, s."""
@@ -62,12 +61,8 @@ def summary(found: Precision) -> str:
             for gap in found.gaps
             if gap.scene == name and gap.contact_time_s in {None, *_PRINTED_CONTACTS}
         ]
-        gone: dict[str, list[str]] = {}
-        for out in found.left_out:
-            if out.scene == name:
-                what = out.method if out.setting == "all" else f"{out.method} at {out.setting}"
-                gone.setdefault(out.reason, []).append(what)
-        lines += [f"  left out: {'; '.join(what)}: {reason}" for reason, what in gone.items()]
+        gone = sum(out.scene == name for out in found.left_out)
+        lines += [f"  left out: {gone}, each with its reason in precision.json"] * (gone > 0)
     return "\n".join(lines)
 
 

@@ -22,25 +22,22 @@ if TYPE_CHECKING:
 
     Record = Mapping[str, Any]
 
-_SHOWN_REASONS = 16
 _TOLD = ("separation_m", "separation_strike_m", "speed_m_s", "speed_strike_m_s", "release_skew_s",
          "contact_height_m", "turning_rad_s", "slack")  # fmt: skip
 _HEAD = """\
-# Sessions that no model made
+# Sessions of the resolved world
 
-Written by `rig bench resolved`: chains of rigid rods fall in the resolved world, one
-rig a case, and the analysis reads them without knowing. Void shares are of the drops
-that are within the limit of skew; errors and 95 % intervals are those of drops that
-were not void, against the hidden truth. Every drop is in `resolved.csv`.
+`./run bench resolved`: rigid rods on strings, one rig a case, read as usual. Void shares are of
+drops within the limit of release skew; errors are of drops that were not void. Every drop is in
+`resolved.csv`.
 
 ![Errors against inclination](resolved.svg)"""
 
 _WORK_HEAD = """\
 # Error against run time of the resolved world
 
-Written by `rig bench resolved --work`: three rods, which are not chaotic, fall with many steps,
-methods, touches and strings; the error of Δz is against the finest of each kind. Every line is in
-`resolved-work.csv`; times are of the machine of that day.
+`./run bench resolved --work`: three rods fall with several steps, methods, contacts and strings.
+Errors are against the finest of each kind. Times are of one machine.
 
 ![Error against run time](resolved-work.svg)"""
 
@@ -62,7 +59,8 @@ def main(arguments: Namespace) -> int:
     folder = make_folder(arguments.output)
     found = study(arguments.protocols, arguments.drops or DROPS, chosen, say)
     whole = as_json(found)
-    lines = [*beside(before, found), "", *_lines(whole)] if before else _lines(whole)
+    lines = ["by case:", *_table(whole["cases"])]
+    lines = [*beside(before, found), "", *lines] if before else lines
     leave_study(
         folder, "resolved", _HEAD, lines, whole, _csv(found), resolved_figure(found),
         as_json=arguments.json,
@@ -123,39 +121,14 @@ def _csv(drops: Sequence[JudgedDrop]) -> str:
     return csv_text(dict.fromkeys(name for row in rows for name in row), rows)
 
 
-def _lines(whole: Record) -> list[str]:
-    """A table by case, one by incline of each case that has several, and why drops were void."""
-    lines = ["by case:", *_table(whole["cases"], lambda one: one["case"])]
-    for case in dict.fromkeys(one["case"] for one in whole["inclines"]):
-        some = [one for one in whole["inclines"] if one["case"] == case]
-        if len(some) > 1:
-            title = f"{case}, by incline; true means at level, at strike, V and contact height:"
-            lines += ["", title, *_table(some, _truths)]
-    reasons = [(one["case"], why, n) for one in whole["cases"] for why, n in one["reasons"].items()]
-    if reasons:
-        most = sorted(reasons, key=lambda one: -one[2])[:_SHOWN_REASONS]
-        lines += ["", "why drops within the limits were void:"]
-        lines += [f"{n:5}  {case}: {why}" for case, why, n in most]
-    return lines
-
-
-def _truths(one: Record) -> str:
-    true = one["true"]
-    return (
-        f"{one['incline_deg']:g}°: {1e3 * true['separation_m']:.0f} mm, "
-        f"{1e3 * true['separation_strike_m']:.0f} mm, {true['speed_m_s']:.2f} m/s, "
-        f"{1e3 * true['contact_height_m']:.0f} mm"
-    )
-
-
-def _table(records: Sequence[Record], name: Any) -> list[str]:
+def _table(records: Sequence[Record]) -> list[str]:
     shown = [row for row in told() if any(row.name in one["quantities"] for one in records)]
     head = ["", "drops", "void", "wrong"]
     for row in shown:
         head += [f"{row.label} rms ({row.fine})", "bias", "in U95", "× bound"]
     rows = [head]
     for one in records:
-        cells = [name(one), str(one["drops"]), f"{one['void_share']:.0%}", str(one["wrong"])]
+        cells = [one["case"], str(one["drops"]), f"{one['void_share']:.0%}", str(one["wrong"])]
         for row in shown:
             errors = one["quantities"].get(row.name)
             cells += (

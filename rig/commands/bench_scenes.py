@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from rig.bench.scenes import Cost, Quartiles
 
 _HEAD = """\
-# What each scene leaves out, and what it costs
+# What each scene costs
 
-Written by `rig bench scenes`: what a scene does not have (a surface, friction, air, an uncertainty)
-is neither loaded nor computed. Modules, peak memory, bytecodes and evaluations are counted and are
-the same again on one version of Python; times are of the machine of that day, so compare their
-ratios. Every number is in `scenes.csv`.
+`rig bench scenes`: what a scene does not have is neither loaded nor computed. Counts are
+reproducible; times are of one machine, so compare their ratios.
 
 ![Costs of scenes](scenes.svg)"""
 

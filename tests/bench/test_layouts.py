@@ -117,7 +117,7 @@ def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
     assert "SIMULATED" in (tmp_path / "layouts.svg").read_text("utf-8")
     page = (tmp_path / "layouts.md").read_text("utf-8")
     assert "36, 117 + 32.4, 108" in page
-    assert "`rig bench layouts --drops 2`" in page
+    assert "bench layouts --drops 2`" in page
 
 
 @pytest.mark.parametrize("text", [None, "", "{}", '{"layouts": [{"chain": "3 rods"}]}'])

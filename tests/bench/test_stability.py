@@ -49,7 +49,7 @@ def test_naive_evaluation_breaks_where_ours_does_not():
     tiny = next(scene for scene in SMALL if (scene.group, scene.value) == ("α", "1e-15"))
     row = bench.examine(tiny)
     assert row.separation_error < 1e-15
-    assert "Δz off by 1e+00" in row.naive or "Δz off by 9e-01" in row.naive
+    assert row.naive.startswith(("1e+00 ", "9e-01 "))
 
 
 def test_the_shortest_supersonic_chain_is_the_shortest():

@@ -37,8 +37,7 @@ _FALL_S = 0.5
 _HEAD = """\
 # Both boards in their emulators
 
-Written by `./run bench boards`: times are of the emulated clocks, and so the same everywhere.
-[What boards do](../boards.md) says what follows, and what no emulator shows.
+`./run bench boards`, in emulated time. [Which board to buy](../boards.md), and what is unproven.
 
 """
 
