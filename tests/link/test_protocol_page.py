@@ -16,7 +16,9 @@ from rig.link.transcript import Transcript
 from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
 from rig.records import Drop
 
-PAGE = (Path(__file__).parents[2] / "firmware/PROTOCOL.md").read_text("utf-8")
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+PAGE = (FIRMWARE / "PROTOCOL.md").read_text("utf-8")
+TALK_TEXT = (FIRMWARE / "examples/conversation.txt").read_text("utf-8")
 
 
 def page_name(kind: type) -> str:
@@ -116,16 +118,15 @@ class Said(NamedTuple):
 def conversation() -> list[Said]:
     """Read what each frame of the example is said to be, and its bytes."""
     found = []
-    for block in re.findall(r"(?sm)^```text\n(.*?)^```", section("## A conversation")):
-        for part in re.split(r"^(?=host|device)", block, flags=re.MULTILINE)[1:]:
-            head, *lines = part.splitlines()
-            who, seq, ack = re.fullmatch(r"(\w+) +seq (\d+)(?: ack (\d+))?", head).groups()
-            told = " ".join(line.strip() for line in lines if re.match(r" {4}\S", line))
-            data = bytes.fromhex(" ".join(line for line in lines if re.match(r" {6}\S", line)))
-            message = spoken(told)
-            code, payload = wire.pack(message)
-            frame = Frame(code, int(seq), int(ack or 0), payload)
-            found.append(Said("tx" if who == "host" else "rx", frame, message, data))
+    for part in re.split(r"^(?=host|device)", TALK_TEXT, flags=re.MULTILINE)[1:]:
+        head, *lines = part.splitlines()
+        who, seq, ack = re.fullmatch(r"(\w+) +seq (\d+)(?: ack (\d+))?", head).groups()
+        told = " ".join(line.strip() for line in lines if re.match(r" {4}\S", line))
+        data = bytes.fromhex(" ".join(line for line in lines if re.match(r" {6}\S", line)))
+        message = spoken(told)
+        code, payload = wire.pack(message)
+        frame = Frame(code, int(seq), int(ack or 0), payload)
+        found.append(Said("tx" if who == "host" else "rx", frame, message, data))
     return found
 
 
