@@ -39,43 +39,43 @@ _LENGTH = Range(Dimension.LENGTH, 0.0, 0.1, "mm")
 PRIORS: dict[str, Prior] = {
     "edge_floor": Prior(
         _LENGTH,
-        "what an edge may be off for reasons not in the equations",
-        "rods made to ISO 2768-1 f, 30 to 120 mm: ±0.15 mm, evenly likely, is 0.09 mm",
+        "unmodelled scatter of an edge",
+        "rods made to ISO 2768-1 f: ±0.15 mm, uniform, is 0.09 mm",
     ),
     "jitter": Prior(
         Range(Dimension.TIME, 0.0, 0.1, "µs"),
         "scatter of one time stamp",
-        "an edge that waits for another one's interrupt on a 16 MHz AVR: some µs",
+        "an edge that waits for another interrupt of a 16 MHz AVR: some µs",
     ),
     "hang": Prior(
         _LENGTH,
         "scatter of a chain's hanging height from run to run",
-        "hung by hand against a mark: ±0.5 mm evenly likely, 0.29 mm (GUM 4.3.7)",
+        "hung by hand against a mark: ±0.5 mm, uniform, is 0.29 mm (GUM 4.3.7)",
     ),
     "side": Prior(
         _LENGTH,
-        "how much lower one side hangs than the other, in every run",
-        "two marks, each read to the nearest mm: √2 · 0.29 mm, rounded up (GUM 4.3.7)",
+        "height difference of the two sides, the same in every run",
+        "two marks, each read to 1 mm: √2 · 0.29 mm, rounded up",
     ),
     "beam_offset": Prior(
         _LENGTH,
-        "how far off a rod's middle a beam runs; times tan(tilt) it shifts edges rod by rod",
-        "a beam of 3 mm aimed by eye: ±1.7 mm evenly likely (GUM 4.3.7)",
+        "distance of a beam from the rods' middle; matters where rods are tilted",
+        "a beam of 3 mm aimed by eye: ±1.7 mm, uniform",
     ),
     "swing": Prior(
         Range(Dimension.SPEED, 0.0, 1.0, "m/s"),
-        "how fast the bottom rod swings as a chain is let go",
-        "a chain of a metre that swings 3 cm to and fro, which one sees",
+        "speed of the lowest rod as the chain is released",
+        "a chain of 1 m that visibly swings by 3 cm",
     ),
     "departure": Prior(
         _LENGTH,
-        "how far off its chain a rod may be once rods have struck",
-        "resolved falls: 0.2 mm with dead strings to 0.4 mm with lively ones",
+        "distance of a rod from its place in the chain after impacts",
+        "resolved falls: 0.2 mm with dead, 0.4 mm with lively strings",
     ),
     "last_rods": Prior(
         _LENGTH,
-        "and besides where few rods still fall: times one over their number",
-        "resolved falls: 0.2 mm with damped strings to 2.4 mm with lively ones",
+        "the same for the last rods: added, divided by their number",
+        "resolved falls: 0.2 mm with damped, 2.4 mm with lively strings",
     ),
     "impulses": Prior(
         Range(Dimension.NUMBER, 0.0, 1.0, "%"),
@@ -84,23 +84,23 @@ PRIORS: dict[str, Prior] = {
     ),
     "impulse_floor": Prior(
         Range(Dimension.NUMBER, 0.0, 0.5, "1"),
-        "and at least, as α",
-        "a guess: about 1 % of α at level ground",
+        "smallest scatter of single impulses, as α",
+        "a guess: about 1 % of α on a level surface",
     ),
     "last_impulse": Prior(
         Range(Dimension.NUMBER, 0.0, 10.0, "%"),
-        "and of the last one besides, relative to α: one rod alone goes as its own string does",
-        "a guess; resolved falls with lively strings have up to 200 %",
+        "further scatter of the last impulse, relative to α",
+        "a guess; up to 200 % in resolved falls with lively strings",
     ),
     "strings": Prior(
         Range(Dimension.NUMBER, 0.0, 10.0, "%"),
-        "what strings may add to the last impulse in every run, relative to α",
-        "a guess: 30 % is the restitution of a damped string",
+        "pull of strings in the last impulse of every run, relative to α",
+        "a guess: a damped string has a restitution of 30 %",
     ),
     "drag": Prior(
         Range(Dimension.NUMBER, 0.0, 10.0, "1"),
         "κ of the air, 1/m, where no drag is stated: 0 ± this",
-        "½ρCd/(¼π ρ_rod d²) of 12.7 mm rods: 0.025 of aluminium, 0.06 of acrylic, 0.09 of oak",
+        "½ρCd/(¼π ρ_rod d²) of 12.7 mm rods: 0.025 aluminium, 0.06 acrylic, 0.09 oak",
     ),
 }
 

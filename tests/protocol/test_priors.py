@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict
-from pathlib import Path
 
 import pytest
 
@@ -14,10 +12,7 @@ from rig.protocol.describe import describe
 from rig.protocol.priors import PRIORS
 from rig.protocol.protocol import Priors
 from rig.protocol.reader import parse
-from rig.units import Quantity, format_quantity
 from tests.analysis.drops import FENCE, UNIFORM, case
-
-PAGE = (Path(__file__).parents[2] / "docs/priors.md").read_text("utf-8")
 
 
 def scene(priors: str):
@@ -61,16 +56,6 @@ def test_rig_check_lists_none_that_nothing_depends_on():
     """A fence falls freely, and its cards are level."""
     listed = {line.split()[0] for line in describe(FENCE).splitlines() if line.startswith("  ")}
     assert listed & {*PRIORS} == {"edge_floor", "jitter", "hang", "drag"}
-
-
-def test_the_page_has_the_same_table():
-    page = re.sub(r"\[([^]]+)\]\([^)]+\)", r"\1", PAGE)  # links to where a figure stands
-    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| `")]
-    usual = asdict(Priors())
-    assert rows[: len(PRIORS)] == [
-        [f"`{n}`", format_quantity(Quantity(usual[n]), r.accepted.unit), r.words, r.source]
-        for n, r in PRIORS.items()
-    ]
 
 
 def test_an_adjustment_takes_what_the_protocol_states():
