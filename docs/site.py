@@ -19,19 +19,21 @@ from mkdocs.config import load_config
 
 ROOT = Path(__file__).resolve().parents[1]
 NAV: dict[str, tuple[str, ...]] = {
-    "Learn": ("docs/tutorial.md", "docs/glossary.md"),
-    "Do": ("docs/shopping.md", "docs/one-object.md", "docs/recipes.md", "firmware/README.md",
-           "docs/timers.md", "docs/daemon.md", "docs/python.md", "docs/notebook.ipynb",
-           "docs/troubleshooting.md"),
-    "Look up": ("docs/boards.md", "docs/protocol.md", "docs/priors.md", "firmware/PROTOCOL.md",
-                "rig/daemon/API.md", "docs/tui/README.md"),
-    "Understand": ("docs/method.md", "docs/benchmarks.md", "docs/resolved-world.md",
-                   "docs/threats.md"),
-    "Results": ("docs/results/README.md", "docs/results/*/*.md", "docs/results/[a-z]*.md"),
-    "Work on it": ("docs/architecture.md", "CONTRIBUTING.md", "docs/decisions/*.md",
-                   "CHANGELOG.md"),
+    "Measure": ("docs/one-object.md", "docs/tutorial.md", "docs/timers.md", "docs/python.md"),
+    "Set up": ("docs/boards.md", "firmware/README.md", "docs/daemon.md",
+               "docs/troubleshooting.md"),
+    "Understand": ("docs/method.md", "docs/accuracy.md", "docs/glossary.md"),
 }  # fmt: skip
-"""What a reader wants, and the pages for it: tutorial, how-to, reference, explanation."""
+"""The menu: by heading, pages that each answer one question of a user."""
+REFERENCE = (
+    "docs/protocol.md", "docs/tui/README.md", "docs/notebook.ipynb", "docs/resolved-world.md",
+    "firmware/PROTOCOL.md", "rig/daemon/API.md", "docs/results/README.md",
+    "docs/results/[a-z]*.md", "docs/results/*/*.md", "docs/architecture.md",
+    "docs/decisions.md", "CONTRIBUTING.md",
+)  # fmt: skip
+"""Pages to look something up in: one group of the menu, folded until it is opened."""
+_LETTER = re.compile(r"[^\W\d_]")
+_NUMBER = re.compile(r"[-+−]?[\d.]+e[-+]?\d+")
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -39,8 +41,20 @@ def pages() -> dict[str, list[Path]]:
     """Return all pages by heading, as paths from the project's root."""
     return {
         heading: [path.relative_to(ROOT) for name in names for path in sorted(ROOT.glob(name))]
-        for heading, names in NAV.items()
+        for heading, names in (NAV | {"Reference": REFERENCE}).items()
     }
+
+
+def count_words(folder: Path) -> dict[Path, int]:
+    """Count the words of each staged page: tokens with a letter, code included, numbers not."""
+    return {
+        page.relative_to(folder): sum(map(_is_word, page.read_text("utf-8").split()))
+        for page in sorted(folder.rglob("*.md"))
+    }
+
+
+def _is_word(token: str) -> bool:
+    return bool(_LETTER.search(token)) and not _NUMBER.fullmatch(token.strip(".,;:()"))
 
 
 def stage(folder: Path) -> None:
@@ -91,7 +105,7 @@ def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> 
     listed = sorted(one for one in known if one.parent == inside)
     if listed:  # a folder of pages: the first of them, and the menu has the rest
         return f"[{words}]({place.rstrip('/')}/{listed[0].name}{hash_}{anchor})"
-    if picture or source.suffix in {".svg", ".png", ".csv", ".json", ".yaml"}:
+    if picture or source.suffix in {".svg", ".png", ".csv", ".json", ".yaml", ".txt"}:
         (folder / inside).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, folder / inside)
         return link[0]
@@ -101,7 +115,10 @@ def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> 
 def settings(source: Path, site: Path) -> dict[str, Any]:
     """Make MkDocs' settings, with every doubtful link a warning."""
     nav: list[dict[str, Any]] = [{"chainrig": "README.md"}]
-    nav += [{heading: [str(as_page(page)) for page in found]} for heading, found in pages().items()]
+    for heading, group in pages().items():
+        entries: list[Any] = [str(as_page(page)) for page in group]
+        # A section within a section is folded.
+        nav.append({heading: [{"All pages": entries}] if heading == "Reference" else entries})
     doubts = {"not_found": "warn", "anchors": "warn", "unrecognized_links": "warn"}
     return {
         "site_name": "chainrig",

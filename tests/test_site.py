@@ -9,6 +9,8 @@ import pytest
 from mkdocs.exceptions import Abort
 
 ROOT = Path(__file__).parents[1]
+MOST_WORDS = 18_000
+MOST_MENU_PAGES = 12
 
 
 @pytest.fixture
@@ -24,9 +26,8 @@ def test_all_pages_are_in_the_site(site, tmp_path):
     built = {page for found in site.pages().values() for page in found}
     wanted = {path.relative_to(ROOT) for path in ROOT.glob("docs/*.md")}
     wanted |= {path.relative_to(ROOT) for path in ROOT.glob("docs/*.ipynb")}
-    for folder in ("decisions", "results"):
-        wanted |= {path.relative_to(ROOT) for path in ROOT.glob(f"docs/{folder}/**/*.md")}
-    assert wanted <= built, "a new page takes its place in NAV of docs/site.py"
+    wanted |= {path.relative_to(ROOT) for path in ROOT.glob("docs/results/**/*.md")}
+    assert wanted <= built, "a new page takes its place in NAV or REFERENCE of docs/site.py"
     for page in built:
         name = "index.html" if page.name == "README.md" else f"{page.stem}.html"
         assert (tmp_path / "site" / page.parent / name).is_file(), page
@@ -35,8 +36,27 @@ def test_all_pages_are_in_the_site(site, tmp_path):
     assert "session.analyze()" in notebook
     assert 'href="notebook.html"' in (tmp_path / "site/docs/python.html").read_text("utf-8")
     assert 'src="docs/figure-3.svg"' in text
+    assert "All pages" in text  # the folded group
     assert 'src="https:' not in text
     assert 'rel="stylesheet" href="https:' not in text
+
+
+def test_it_is_short_enough_to_be_read(site, tmp_path):
+    site.stage(tmp_path)
+    words = site.count_words(tmp_path)
+    assert words[Path("README.md")] > 300
+    assert sum(words.values()) <= MOST_WORDS, sorted(words.items(), key=lambda row: -row[1])
+    menu = {page for heading, found in site.pages().items() for page in found
+            if heading != "Reference"} | {Path("README.md")}  # fmt: skip
+    assert len(menu) <= MOST_MENU_PAGES, menu
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("Δz ± 1.5e-3 mm", 2), ("`rig run` 12 | 1e-16, –", 2), ("3.3 V", 1)]
+)
+def test_a_word_has_a_letter_and_is_no_number(text, words, site, tmp_path):
+    (tmp_path / "page.md").write_text(text, "utf-8")
+    assert site.count_words(tmp_path) == {Path("page.md"): words}
 
 
 @pytest.mark.parametrize(
@@ -48,5 +68,6 @@ def test_a_dead_link_ends_it(link, error, site, tmp_path, monkeypatch):
     (tmp_path / "docs/b.md").write_text("# B\n", "utf-8")
     monkeypatch.setattr(site, "ROOT", tmp_path)
     monkeypatch.setattr(site, "NAV", {"Learn": ("docs/b.md",)})
+    monkeypatch.setattr(site, "REFERENCE", ())
     with pytest.raises(error):
         site.main(tmp_path / "site")
