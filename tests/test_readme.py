@@ -21,9 +21,9 @@ PAGES = [
 
 def commands(page: Path, language: str = "sh") -> list[str]:
     """Lines of a page's code blocks; those of ``shell`` need a board, those of ``sh`` do not."""
-    block = rf"^ *```{language}\n(.*?)^ *```"
+    block = rf"^```{language}\n(.*?)^```"
     blocks = re.findall(block, page.read_text("utf-8"), re.MULTILINE | re.DOTALL)
-    return [line.strip() for block in blocks for line in block.splitlines()]
+    return [line for block in blocks for line in block.splitlines()]
 
 
 def test_every_command_of_the_readme_works(tmp_path):
