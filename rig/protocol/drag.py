@@ -6,58 +6,54 @@ import math
 from typing import TYPE_CHECKING
 
 from rig.protocol import fields
-from rig.protocol.fields import Range, Section
+from rig.protocol.fields import Range
 from rig.protocol.protocol import Drag
 from rig.units import Dimension
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.protocol.fields import FieldFaults
+    from rig.protocol.fields import Converter, Section
     from rig.protocol.protocol import RodChain
-    from rig.protocol.yamltree import Node
 
 COEFFICIENT = Range(Dimension.NUMBER, 0.0, 10.0, "1", open_low=True)
 DENSITY = Range(Dimension.DENSITY, 0.0, 100.0, "kg/m^3", open_low=True)
 TERMINAL_SPEED = Range(Dimension.SPEED, 0.01, 1e4, "m/s")
 
 
-def read_drag(node: Node, chains: Iterable[RodChain], faults: FieldFaults) -> Drag | None:
-    """Read the ``drag`` mapping.
+def read_drag(chains: Iterable[RodChain]) -> Converter[Drag]:
+    """Return the converter to the air.
 
     Parameters
     ----------
-    node
-        The value of ``drag``.
     chains
         All chains that could be read: a coefficient needs their rods' masses and sizes.
-    faults
-        Where problems go.
     """
-    inner = fields.mapping(node, "drag", faults)
-    if inner is None:
-        return None
-    section = Section(inner, "drag", faults, ("coefficient", "air_density", "terminal_speed"))
-    usual = Drag()
-    coefficient = section.take("coefficient", fields.quantity(COEFFICIENT))
-    density = section.take("air_density", fields.exact(DENSITY), usual.air_density)
-    terminal = section.take("terminal_speed", fields.quantity(TERMINAL_SPEED))
-    if ("coefficient" in section) == ("terminal_speed" in section):
-        message = "one of coefficient: 1.1 ± 0.2 and terminal_speed: 25 m/s is wanted"
-        if not section.strange:
-            faults.add(inner.place, "drag", message)
-        return None
-    if terminal is not None:
-        if "air_density" in section:
-            message = "the terminal speed says it all; leave air_density out"
-            section.fault("air_density", message, at_key=True)
-        return Drag(terminal_speed=terminal)
-    for rods in chains:
-        missing = _missing(rods)
-        if missing and "coefficient" in section:
-            message = f"chain {rods.name} lacks {missing}, on which its drag depends"
-            section.fault("coefficient", f"{message}; or give a terminal_speed")
-    return None if coefficient is None or density is None else Drag(coefficient, density)
+
+    @fields.of_keys("coefficient", "air_density", "terminal_speed")
+    def convert(section: Section) -> Drag | None:
+        usual = Drag()
+        coefficient = section.take("coefficient", fields.quantity(COEFFICIENT))
+        density = section.take("air_density", fields.exact(DENSITY), usual.air_density)
+        terminal = section.take("terminal_speed", fields.quantity(TERMINAL_SPEED))
+        if ("coefficient" in section) == ("terminal_speed" in section):
+            message = "one of coefficient: 1.1 ± 0.2 and terminal_speed: 25 m/s is wanted"
+            if not section.strange:
+                section.refuse(message)
+            return None
+        if terminal is not None:
+            if "air_density" in section:
+                message = "the terminal speed says it all; leave air_density out"
+                section.fault("air_density", message, at_key=True)
+            return Drag(terminal_speed=terminal)
+        for rods in chains:
+            missing = _missing(rods)
+            if missing and "coefficient" in section:
+                message = f"chain {rods.name} lacks {missing}, on which its drag depends"
+                section.fault("coefficient", f"{message}; or give a terminal_speed")
+        return None if coefficient is None or density is None else Drag(coefficient, density)
+
+    return convert
 
 
 def _missing(rods: RodChain) -> str:

@@ -89,6 +89,10 @@ class Section:
         place = self.keys[key] if at_key else self.place(key)
         self.faults.add(place, self.key(key), message)
 
+    def refuse(self, message: str) -> None:
+        """Note a problem with the mapping as a whole."""
+        self.faults.add(self.node.place, self.path, message)
+
     def take(
         self,
         key: str,
@@ -149,6 +153,19 @@ def mapping(node: Node, key: str, faults: FieldFaults) -> Mapping | None:
         return node
     faults.add(node.place, key, f"found {node}; a mapping {{key: value, …}} is wanted")
     return None
+
+
+def of_keys(*accepted: str) -> Callable[[Callable[[Section], T | None]], Converter[T]]:
+    """Make the converter of a mapping from what reads its section, which may have these keys."""
+
+    def make(read: Callable[[Section], T | None]) -> Converter[T]:
+        def convert(node: Node, key: str, faults: FieldFaults) -> T | None:
+            inner = mapping(node, key, faults)
+            return None if inner is None else read(Section(inner, key, faults, accepted))
+
+        return convert
+
+    return make
 
 
 def sequence(node: Node, key: str, faults: FieldFaults) -> Sequence | None:

@@ -48,7 +48,7 @@ def read_masses(heights: tuple[float, ...]) -> Converter[Masses]:
         if len(given) != 1:
             wanted = "exponential: {bottom: 12 g, top: 3 g} or table: [{height: 0 mm, mass: 12 g}]"
             if not section.strange:
-                faults.add(node.place, key, f"one profile is wanted, {wanted}")
+                section.refuse(f"one profile is wanted, {wanted}")
             return None
         if given == ["exponential"]:
             return section.take("exponential", _exponential(len(heights)))
@@ -72,11 +72,8 @@ def _listed(node: Sequence, key: str, faults: FieldFaults, rods: int) -> Masses 
 def _exponential(rods: int) -> Converter[Masses]:
     """Return the converter from the masses of the two end rods."""
 
-    def convert(node: Node, key: str, faults: FieldFaults) -> Masses | None:
-        inner = fields.mapping(node, key, faults)
-        if inner is None:
-            return None
-        section = Section(inner, key, faults, ("bottom", "top"))
+    @fields.of_keys("bottom", "top")
+    def convert(section: Section) -> Masses | None:
         bottom = section.take("bottom", fields.exact(MASS), required="12 g")
         top = section.take("top", fields.exact(MASS), required="3 g")
         if bottom is None or top is None:
@@ -116,12 +113,9 @@ def _table(heights: tuple[float, ...]) -> Converter[Masses]:
     return convert
 
 
-def _point(node: Node, key: str, faults: FieldFaults) -> tuple[float, float] | None:
+@fields.of_keys("height", "mass")
+def _point(section: Section) -> tuple[float, float] | None:
     """Convert one line of the table."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    section = Section(inner, key, faults, ("height", "mass"))
     height = section.take("height", fields.exact(HEIGHT), required="0 mm")
     mass = section.take("mass", fields.exact(MASS), required="12 g")
     return None if height is None or mass is None else (height, mass)

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.protocol import Priors
 from rig.units import Dimension
-
-if TYPE_CHECKING:
-    from rig.protocol.fields import FieldFaults
-    from rig.protocol.yamltree import Node
 
 
 class Prior(NamedTuple):
@@ -105,12 +101,9 @@ PRIORS: dict[str, Prior] = {
 }
 
 
-def read_priors(node: Node, key: str, faults: FieldFaults) -> Priors | None:
+@fields.of_keys(*PRIORS)
+def read_priors(section: Section) -> Priors | None:
     """Convert to what is known beforehand; what is left out is as it is by default."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    section = Section(inner, key, faults, tuple(PRIORS))
     found = {
         name: section.take(name, fields.exact(row.accepted))
         for name, row in PRIORS.items()

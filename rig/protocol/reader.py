@@ -225,21 +225,17 @@ def _surface(top: Section, chains: dict[str, RodChain] | None) -> Surface | None
 def _drag(top: Section, chains: dict[str, RodChain] | None) -> Drag | None:
     from rig.protocol.drag import read_drag  # noqa: PLC0415 - see above
 
-    return read_drag(top.values["drag"], chains.values() if chains else (), top.faults)
+    return top.take("drag", read_drag(chains.values() if chains else ()))
 
 
 def _contact(chains: dict[str, RodChain] | None, *, struck: bool) -> Converter[Contact]:
     """Return the converter to where rods strike."""
 
-    def convert(node: Node, key: str, faults: FieldFaults) -> Contact | None:
-        inner = fields.mapping(node, key, faults)
-        if inner is None:
-            return None
+    @fields.of_keys("datum", "level", "strike")
+    def convert(section: Section) -> Contact | None:
         if not struck:
-            message = "the scene has no surface, so nothing strikes; leave it out"
-            faults.add(node.place, key, message)
+            section.refuse("the scene has no surface, so nothing strikes; leave it out")
             return None
-        section = Section(inner, key, faults, ("datum", "level", "strike"))
         usual = Contact()
         datum = section.take("datum", fields.choice(*DATUMS), DATUMS[0])
         level = section.take("level", fields.quantity(CONTACT), usual.level)
@@ -288,15 +284,11 @@ def _gates(
 def _track(chains: dict[str, RodChain] | None, *, struck: bool) -> Converter[InclinedTrack]:
     """Return the converter to what one object goes down."""
 
-    def convert(node: Node, key: str, faults: FieldFaults) -> InclinedTrack | None:
-        inner = fields.mapping(node, key, faults)
-        if inner is None:
-            return None
+    @fields.of_keys("incline", "rolling_inertia")
+    def convert(section: Section) -> InclinedTrack | None:
         if struck or (chains is not None and any(c.chain.rods > 1 for c in chains.values())):
-            message = "only one object that strikes nothing goes down a track; leave it out"
-            faults.add(node.place, key, message)
+            section.refuse("only one object that strikes nothing goes down a track; leave it out")
             return None
-        section = Section(inner, key, faults, ("incline", "rolling_inertia"))
         incline = section.take("incline", fields.quantity(INCLINE), required="5 deg ± 0.1 deg")
         rolling = section.take("rolling_inertia", fields.exact(ROLLING), 0.0)
         return None if incline is None or rolling is None else InclinedTrack(incline, rolling)
@@ -334,12 +326,9 @@ def _gravity(top: Section) -> Quantity | None:
     return site if "site" in top and "gravity" not in top else given
 
 
-def _site(node: Node, key: str, faults: FieldFaults) -> Quantity | None:
+@fields.of_keys("latitude", "height")
+def _site(section: Section) -> Quantity | None:
     """Convert latitude and height to gravity."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    section = Section(inner, key, faults, ("latitude", "height"))
     latitude = section.take("latitude", fields.exact(LATITUDE), required="61.19 deg")
     height = section.take("height", fields.exact(HEIGHT), required="30 m")
     if latitude is None or height is None:

@@ -96,12 +96,9 @@ def _groups(node: Node, key: str, faults: FieldFaults) -> list[_Group] | None:
     return found if len(found) == len(groups) else None
 
 
-def _group(node: Node, key: str, faults: FieldFaults) -> _Group | None:
+@fields.of_keys("count", "diameter", "mass")
+def _group(section: Section) -> _Group | None:
     """Convert one group."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    section = Section(inner, key, faults, ("count", "diameter", "mass"))
     count = section.take("count", fields.whole(1, MOST_RODS), 1)
     diameter = section.take("diameter", fields.exact(DIAMETER))
     mass = section.take("mass", fields.exact(MASS))

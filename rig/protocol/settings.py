@@ -42,47 +42,39 @@ def read_settings(
     )
 
 
-def _release(node: Node, key: str, faults: FieldFaults) -> ReleasePulse | None:
+@fields.of_keys("channel", "pulse")
+def _release(section: Section) -> ReleasePulse | None:
     """Convert to the release actuator."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    section = Section(inner, key, faults, ("channel", "pulse"))
     usual = ReleasePulse()
     channel = section.take("channel", fields.whole(0, RELEASES - 1), usual.channel)
     pulse = section.take("pulse", fields.exact(PULSE), usual.pulse)
     return None if channel is None or pulse is None else ReleasePulse(channel, pulse)
 
 
-def _accept(node: Node, key: str, faults: FieldFaults) -> Accept | None:
+_ACCEPT = {
+    "release_skew": RELEASE_SKEW,
+    "missed_edges": SHARE_OF_EDGES,
+    "unexplained_edges": SHARE_OF_EDGES,
+}
+
+
+@fields.of_keys(*_ACCEPT)
+def _accept(section: Section) -> Accept | None:
     """Convert to the limits of a valid run."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    ranges = {
-        "release_skew": RELEASE_SKEW,
-        "missed_edges": SHARE_OF_EDGES,
-        "unexplained_edges": SHARE_OF_EDGES,
-    }
-    section = Section(inner, key, faults, tuple(ranges))
     usual = Accept()
     limits = {
         name: section.take(name, fields.exact(accepted), getattr(usual, name))
-        for name, accepted in ranges.items()
+        for name, accepted in _ACCEPT.items()
     }
     sound = {name: limit for name, limit in limits.items() if limit is not None}
-    return Accept(**sound) if len(sound) == len(ranges) else None
+    return Accept(**sound) if len(sound) == len(_ACCEPT) else None
 
 
 def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:
     """Return the converter to the plan."""
 
-    def convert(node: Node, key: str, faults: FieldFaults) -> Plan | None:
-        inner = fields.mapping(node, key, faults)
-        if inner is None:
-            return None
-        accepted = ("incline", "repeats", "order", "randomize", "seed", "settle")
-        section = Section(inner, key, faults, accepted)
+    @fields.of_keys("incline", "repeats", "order", "randomize", "seed", "settle")
+    def convert(section: Section) -> Plan | None:
         if "incline" in section and not surface:
             message = "the scene has no surface, so nothing is inclined; leave it out"
             section.fault("incline", message, at_key=True)

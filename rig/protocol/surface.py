@@ -52,12 +52,9 @@ def read_surface(node: Node, faults: FieldFaults, *, needs_restitution: bool) ->
     return Surface(restitution, friction, pile)
 
 
-def _pile(node: Node, key: str, faults: FieldFaults) -> Pile | None:
+@fields.of_keys("below", "restitution")
+def _pile(section: Section) -> Pile | None:
     """Convert the rule for rods that gather on a nearly level surface."""
-    inner = fields.mapping(node, key, faults)
-    if inner is None:
-        return None
-    section = Section(inner, key, faults, ("below", "restitution"))
     below = section.take("below", fields.exact(BELOW), required="30 deg")
     restitution = section.take("restitution", fields.quantity(RESTITUTION), required="-0.37")
     return None if below is None or restitution is None else Pile(below, restitution)
