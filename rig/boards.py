@@ -5,7 +5,6 @@ A board that is there says the same of itself (`rig.link.messages.Identity`), an
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 GATES = 16
@@ -44,7 +43,7 @@ class Capabilities:
     @property
     def most_edges(self) -> float:
         """How many edges a drop may have."""
-        return math.inf if self.streams else self.events
+        return float("inf") if self.streams else self.events
 
     @property
     def one(self) -> str:

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator
 
-_UNIT = re.compile(
-    r"(_(m|kg|s|A|K|mol|cd|rad|sr|Hz|N|Pa|J|W|C|V|F|Ohm|S|Wb|T|H|lm|lx|Bq|Gy|Sv|kat)[1-9]?)+$"
-)
+_UNIT = re.compile(r"(_(m|kg|s|A|K|mol|cd|rad|sr|Hz|N|Pa|J|W|C|V|F|Ohm|S|Wb|T|H|lm|lx)[1-9]?)+$")
 """The SI unit at a name's end: base units and those with names of their own (SI brochure, 2.3)."""
 
 

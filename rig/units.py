@@ -115,12 +115,12 @@ _ALIASES = {
 _RELATIVE = ("%", "ppm")
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_PER = r"(?:/(?P<per>0*[1-9][0-9]*))?"
 _UNIT = r"(?:(?<=\s)1|[^\s0-9.,±+()-][^±+()]*?)"
 _PLUS_MINUS = r"(?:±|\+/-|\+-)"
-_LAST_DIGITS = r"(?:\((?P<last>[0-9]+)\))?"
+# Behind a value: how far off its last digits are, or what it is divided by.
+_LAST_DIGITS = r"(?:\((?P<last>[0-9]+)\)|/(?P<per>0*[1-9][0-9]*))?"
 _PLAIN = re.compile(
-    rf"(?P<value>{_NUMBER})(?:{_PER}|{_LAST_DIGITS})\s*(?P<unit>{_UNIT})?\s*"
+    rf"(?P<value>{_NUMBER}){_LAST_DIGITS}\s*(?P<unit>{_UNIT})?\s*"
     rf"(?:{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*(?P<u_unit>{_UNIT})?)?"
 )
 _BRACKETED = re.compile(

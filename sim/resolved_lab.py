@@ -255,10 +255,7 @@ class ResolvedLab(ChainLab):
         above = nominal.heights[-1] - nominal.heights
         swing = world.swing_sd * float(now.normal()) * above / max(float(above[0]), 1e-9)
         spin = world.spin_sd * float(now.normal())
-        hung = Rods(
-            nominal.masses, body.offsets, nominal.diameters, tilts, yaws, aside,
-            nominal.length, nominal.rolling, nominal.inertia,
-        )  # fmt: skip
+        hung = replace(nominal, heights=body.offsets, tilts=tilts, yaws=yaws, aside=aside)
         return hung, swing, spin
 
     def _chain(

@@ -249,8 +249,7 @@ class DropModel:
 
     def kappa(self, x: Array) -> float:
         """κ of the first chain as a whole, 1/m."""
-        at = self.unknowns
-        return self._kappa + (float(x[at["drag"]][0]) if "drag" in at else 0.0)
+        return self._kappa + float(x[self.unknowns["drag"]][0])
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Path of one side for given unknowns."""

@@ -125,7 +125,7 @@ class Evidence:
         new: dict[str, float] = {}
         kinds, squares, counts = self._binned(parameters, struck)
         self._share(_EDGES, kinds, squares, counts, new)
-        parted = new["departure"] / self.stated.departure if self.stated.departure else 1.0
+        parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
         if parted < 2.0 * LEAST_SHARE:
             # Where no rod is off its chain, few are not either: the least of it explains nothing.
             self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
@@ -193,10 +193,6 @@ class Evidence:
         Variances Σ kinds·a² are fitted to sums of squares with so many degrees of freedom: the
         maximum of the χ² likelihood above the least a, by multiplicative steps.
         """
-        # What is known exactly has no share.
-        pairs = [pair for pair in zip(names, kinds, strict=True) if getattr(self.stated, pair[0])]
-        new.update(dict.fromkeys(names, 0.0))
-        names, kinds = [name for name, _ in pairs], np.array([sizes for _, sizes in pairs])
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
         found = np.array([getattr(self.components, name) ** 2 for name in names])
         # The stated member is spread over all sizes, so that it pulls no component alone.
@@ -215,7 +211,7 @@ class Evidence:
 
 def _member(stated: Size, found: Size) -> Size:
     """Square of the member that a stated variance counts for, where so large a one was found."""
-    return 2.0 * stated * found / (stated + found)
+    return 2.0 * stated * found / (stated + found + np.finfo(float).tiny)  # 0 of what is exact
 
 
 def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:

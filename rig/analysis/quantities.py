@@ -158,8 +158,7 @@ class Adjusted:
         pull = path.gravity - path.kappa * speed**2
         d_pull = -2.0 * path.kappa * speed * d_speed
         d_pull[at["gravity"]] += 1.0
-        if "drag" in at:
-            d_pull[at["drag"]] -= speed**2
+        d_pull[at["drag"]] -= speed**2
         squared = speed**2 - 2.0 * pull * above
         if squared <= 0.0:
             return None

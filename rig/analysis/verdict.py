@@ -255,10 +255,8 @@ def _doubts(
 def _blown(fit: Fit) -> list[str]:
     """Air that nobody would expect explains much; where edges do not fit even so, it is no fall."""
     model, estimate = fit.model, fit.estimate
-    if "drag" not in model.unknowns or estimate.scatter <= RESTLESS:
-        return []
     at = model.unknowns["drag"].start
-    if abs(estimate.x[at]) <= _BEYOND * estimate.sd[at]:
+    if estimate.scatter <= RESTLESS or abs(estimate.x[at]) <= _BEYOND * estimate.sd[at]:
         return []
     return [
         "this does not look like this chain falling: even with what air would have to take "
@@ -270,11 +268,9 @@ def _blown(fit: Fit) -> list[str]:
 def _other_air(fit: Fit) -> tuple[str, ...]:
     """Edges tell the air better than a protocol does: where it is not as stated, that is said."""
     model, estimate = fit.model, fit.estimate
-    if model.protocol.drag is None or "drag" not in model.unknowns:
-        return ()
     at = model.unknowns["drag"].start
     off, sd = float(estimate.x[at]), float(estimate.sd[at])
-    if abs(off) <= IMPLAUSIBLE * sd:
+    if model.protocol.drag is None or abs(off) <= IMPLAUSIBLE * sd:
         return ()
     # By the edges alone, without what the protocol makes of them.
     share = 1.0 / (1.0 - min(float(estimate.covariance[at, at]), 0.9))
@@ -285,12 +281,10 @@ def _other_air(fit: Fit) -> tuple[str, ...]:
 def _pushed(fit: Fit) -> tuple[str, ...]:
     """Air only holds back: where it seems to push, something is not as it is said to be."""
     model, estimate = fit.model, fit.estimate
-    if "drag" not in model.unknowns:
-        return ()
     at = model.unknowns["drag"].start
     kappa = model.kappa(estimate.x)
     u = math.sqrt(estimate.covariance[at, at]) * float(estimate.sd[at])
-    if kappa > -_SURE * u:
+    if kappa >= -_SURE * u:
         return ()
     return (
         f"these are edges of a fall that the air speeds up (κ = {kappa:.2g} ± {2 * u:.1g} per m): "

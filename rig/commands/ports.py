@@ -60,8 +60,8 @@ def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPor
 
 
 def _fields(port: SerialPort, asked: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
-    nobody = {"identity": None, "trouble": None}
-    return asdict(port) | {"candidate": port.candidate} | asked.get(port.path, nobody)
+    shown = {"kind": port.kind, "candidate": port.candidate, "identity": None, "trouble": None}
+    return asdict(port) | shown | asked.get(port.path, {})
 
 
 def _line(port: SerialPort, who: Mapping[str, Any] | None) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.boards import DRIVE
-from rig.usb.listing import known, serial_ports
+from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -117,12 +117,7 @@ def new_port(before: set[str], patience_s: float = 10.0) -> str:
 
 def pico_ports() -> set[str]:
     """List the ports that are a Pico's by their numbers."""
-    name = DRIVE.board.name
-    return {
-        port.path
-        for port in serial_ports()
-        if any(kind.name == name for kind in known(port.vid, port.pid))
-    }
+    return {port.path for port in serial_ports() if DRIVE.board.name in port.kinds}
 
 
 def _mounted(mounts: Path) -> Iterator[Path]:

@@ -9,11 +9,9 @@ if TYPE_CHECKING:
     from rig.units import Quantity
 
 XI = 4.0
-"""ξ over the moment of inertia, ξ = 4I/(mL²), with I in units of m L²."""
-THIN_ROD = 1.0 / 12.0
-"""Moment of inertia of a thin uniform rod about its middle, in units of m L²."""
-UNIFORM_ROD_INERTIA = XI * THIN_ROD
-"""ξ of a uniform rod (below Eq. 8)."""
+"""ξ over the moment of inertia in units of m L²."""
+UNIFORM_ROD_INERTIA = 1.0 / 3.0
+"""ξ = 4I/(mL²) of a uniform rod about its middle (below Eq. 8)."""
 
 
 @dataclass(frozen=True, slots=True)

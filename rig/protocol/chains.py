@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.model.chain import THIN_ROD, XI, Chain
+from rig.model.chain import UNIFORM_ROD_INERTIA, XI, Chain
 from rig.protocol import fields
 from rig.protocol.fields import Range, Section
 from rig.protocol.protocol import RodChain
@@ -175,7 +175,7 @@ def _chain(name: str, section: Section, *, seen_by_gates: bool, struck: bool) ->
         length = section.take("length", fields.exact(LENGTH), required="1165 mm")
     rod_length = section.take("rod_length", fields.exact(ROD_LENGTH), math.nan)
     tilt = section.take("tilt", fields.exact(TILT), 0.0)
-    inertia = section.take("inertia", fields.exact(INERTIA), THIN_ROD)
+    inertia = section.take("inertia", fields.exact(INERTIA), UNIFORM_ROD_INERTIA / XI)
     alpha = section.take("alpha", fields.quantity(ALPHA), Quantity(math.nan))
     gamma = section.take("gamma", fields.exact(GAMMA), math.nan)
     alone = length == 0.0  # and is where its drop says

@@ -24,42 +24,29 @@ class Known:
     name
         What it is.
     numbers
-        USB vendor and product, as often as it has others.
+        USB vendor and product in hexadecimal, as often as it has others.
     board
         Whether the numbers belong to a board. A chip that is on cheap copies of boards is on
         other instruments too, so it says only that there may be one.
     """
 
     name: str
-    numbers: tuple[tuple[int, int], ...]
+    numbers: str
     board: bool = False
 
 
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
+_MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
 KNOWN = (
-    Known(PICO.name, ((0x2E8A, 0x000A),), board=True),
-    Known(
-        MEGA.name,
-        ((0x2341, 0x0010), (0x2341, 0x0042), (0x2341, 0x0210), (0x2341, 0x0242),
-         (0x2A03, 0x0010), (0x2A03, 0x0042)),
-        board=True,
-    ),
-    Known(
-        UNO.name,
-        ((0x2341, 0x0001), (0x2341, 0x0043), (0x2341, 0x0243), (0x2A03, 0x0043)),
-        board=True,
-    ),
-    Known("CH341", ((0x1A86, 0x5523),)),
-    Known("CH340", ((0x1A86, 0x7523),)),
-    Known("FTDI FT232R", ((0x0403, 0x6001),)),
-    Known("FTDI FT231X", ((0x0403, 0x6015),)),
-)  # fmt: skip
-
-
-def known(vid: int | None, pid: int | None) -> list[Known]:
-    """Find the kinds of device with these numbers."""
-    return [kind for kind in KNOWN if (vid, pid) in kind.numbers]
+    Known(PICO.name, "2e8a:000a", board=True),
+    Known(MEGA.name, _MEGAS, board=True),
+    Known(UNO.name, "2341:0001 2341:0043 2341:0243 2a03:0043", board=True),
+    Known("CH341", "1a86:5523"),
+    Known("CH340", "1a86:7523"),
+    Known("FTDI FT232R", "0403:6001"),
+    Known("FTDI FT231X", "0403:6015"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +59,8 @@ class SerialPort:
         Device path.
     vid, pid, serial_number, manufacturer, product
         What USB says of it; `None` where it says nothing.
-    kind
-        What the numbers stand for, empty when nobody knows.
+    kinds
+        What the numbers may stand for, empty when nobody knows.
     skipped
         Why it is no candidate; empty for a candidate.
     """
@@ -84,8 +71,13 @@ class SerialPort:
     serial_number: str | None = None
     manufacturer: str | None = None
     product: str | None = None
-    kind: str = ""
+    kinds: tuple[str, ...] = ()
     skipped: str = ""
+
+    @property
+    def kind(self) -> str:
+        """All that the numbers may stand for."""
+        return " or ".join(self.kinds)
 
     @property
     def candidate(self) -> bool:
@@ -104,7 +96,8 @@ def serial_ports() -> list[SerialPort]:
 
 def described(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
-    kinds = known(info.vid, info.pid)
+    numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
+    kinds = [kind for kind in KNOWN if numbers in kind.numbers.split()]
     if info.vid is None or info.pid is None:
         skipped = "no USB device"
     elif not kinds:
@@ -120,7 +113,7 @@ def described(info: ListPortInfo) -> SerialPort:
         serial_number=info.serial_number,
         manufacturer=info.manufacturer,
         product=info.product,
-        kind=" or ".join(kind.name for kind in kinds),
+        kinds=tuple(kind.name for kind in kinds),
         skipped=skipped,
     )
 

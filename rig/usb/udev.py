@@ -41,9 +41,9 @@ def rule() -> str:
 
 def _matches(kinds: Iterable[Known]) -> list[str]:
     """Write what matches the numbers of some kinds, each once."""
-    numbers = dict.fromkeys(pair for kind in kinds for pair in kind.numbers)
-    match = 'ATTRS{{idVendor}}=="{:04x}", ATTRS{{idProduct}}=="{:04x}"'
-    return [match.format(*pair) for pair in numbers]
+    numbers = dict.fromkeys(pair for kind in kinds for pair in kind.numbers.split())
+    match = 'ATTRS{{idVendor}}=="{}", ATTRS{{idProduct}}=="{}"'
+    return [match.format(*pair.split(":")) for pair in numbers]
 
 
 if __name__ == "__main__":

@@ -74,6 +74,7 @@ def test_json_has_everything(plugged, never, capsys):
         "manufacturer": None,
         "product": "Mega",
         "kind": "Arduino Mega 2560",
+        "kinds": ["Arduino Mega 2560"],
         "skipped": "",
         "candidate": True,
         "identity": None,
@@ -153,10 +154,10 @@ def test_this_computer_can_be_looked_at():
 @pytest.mark.parametrize("first", KNOWN, ids=lambda kind: kind.name)
 def test_a_second_board_may_have_the_same_chip(plugged, monkeypatch, first):
     """Once either may be there, the port is a board's, and no rule is written twice."""
-    other = Known("Teensy 9", first.numbers[:1], board=True)
+    other = Known("Teensy 9", first.numbers[:9], board=True)
     monkeypatch.setattr("rig.usb.listing.KNOWN", (*KNOWN, other))
     monkeypatch.setattr("rig.usb.udev.KNOWN", (*KNOWN, other))
-    plugged(info("/dev/ttyACM0", *first.numbers[0]))
+    plugged(info("/dev/ttyACM0", *(int(part, 16) for part in first.numbers[:9].split(":"))))
     (port,) = serial_ports()
     assert (port.kind, port.candidate) == (f"{first.name} or Teensy 9", True)
     assert pico_ports() == ({port.path} if first.name == PICO.name else set())
@@ -170,8 +171,8 @@ def test_the_udev_rule_is_up_to_date():
 
 @pytest.mark.parametrize("kind", KNOWN, ids=lambda kind: kind.name)
 def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(kind):
-    for vid, pid in kind.numbers:
-        match = f'ATTRS{{idVendor}}=="{vid:04x}", ATTRS{{idProduct}}=="{pid:04x}", '
+    for vid, pid in (pair.split(":") for pair in kind.numbers.split()):
+        match = f'ATTRS{{idVendor}}=="{vid}", ATTRS{{idProduct}}=="{pid}", '
         lines = [line for line in udev.rule().splitlines() if match in line]
         assert sum(line.startswith('SUBSYSTEM=="tty"') and "uaccess" in line for line in lines) == 1
         assert sum(line.endswith('ENV{ID_MM_DEVICE_IGNORE}="1"') for line in lines) == kind.board
