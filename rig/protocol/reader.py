@@ -219,7 +219,7 @@ def _surface(top: Section, chains: dict[str, RodChain] | None) -> Surface | None
 
     # Of a chain that could not be read nobody knows whether it gives its α.
     needed = chains is not None and any(rods.chain.alpha is None for rods in chains.values())
-    return read_surface(top.values["surface"], top.faults, needs_restitution=needed)
+    return top.take("surface", read_surface(needs_restitution=needed))
 
 
 def _drag(top: Section, chains: dict[str, RodChain] | None) -> Drag | None:

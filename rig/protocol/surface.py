@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 from rig.model.surface import Pile, Surface
 from rig.protocol import fields
-from rig.protocol.fields import Range, Section
+from rig.protocol.fields import Range
 from rig.units import Dimension, Quantity
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import FieldFaults
-    from rig.protocol.yamltree import Node
+    from rig.protocol.fields import Converter, Section
 
 # An effective restitution below zero is a pile that gives way (the paper finds −0.37).
 RESTITUTION = Range(Dimension.NUMBER, -1.0, 1.0, "1")
@@ -19,37 +18,29 @@ FRICTION = Range(Dimension.NUMBER, 0.0, 10.0, "1")
 BELOW = Range(Dimension.ANGLE, 0.0, 90.0, "deg", open_low=True)
 
 
-def read_surface(node: Node, faults: FieldFaults, *, needs_restitution: bool) -> Surface | None:
-    """Read the ``surface`` mapping.
+def read_surface(*, needs_restitution: bool) -> Converter[Surface]:
+    """Return the converter to the surface.
 
     Parameters
     ----------
-    node
-        The value of ``surface``.
-    faults
-        Where problems go.
     needs_restitution
         Whether any chain's α must come from the surface. Otherwise ``surface: {}`` will do, and
         the restitution of the result is a zero that nothing reads.
-
-    Returns
-    -------
-    Surface or None
-        ``None`` if it is faulty.
     """
-    inner = fields.mapping(node, "surface", faults)
-    if inner is None:
-        return None
-    section = Section(inner, "surface", faults, ("restitution", "friction", "pile"))
     example = "0.50 ± 0.05" if needs_restitution else ""
-    restitution = section.take(
-        "restitution", fields.quantity(RESTITUTION), Quantity(0.0), required=example
-    )
-    friction = section.take("friction", fields.quantity(FRICTION), Quantity(0.0))
-    pile = section.take("pile", _pile)
-    if restitution is None or friction is None or ("pile" in section and pile is None):
-        return None
-    return Surface(restitution, friction, pile)
+
+    @fields.of_keys("restitution", "friction", "pile")
+    def convert(section: Section) -> Surface | None:
+        restitution = section.take(
+            "restitution", fields.quantity(RESTITUTION), Quantity(0.0), required=example
+        )
+        friction = section.take("friction", fields.quantity(FRICTION), Quantity(0.0))
+        pile = section.take("pile", _pile)
+        if restitution is None or friction is None or ("pile" in section and pile is None):
+            return None
+        return Surface(restitution, friction, pile)
+
+    return convert
 
 
 @fields.of_keys("below", "restitution")
