@@ -13,8 +13,10 @@ except (KeyboardInterrupt, RuntimeError):  # a class in the making turns what st
 
 def _leave(*_: object) -> None:
     """End at once: nothing is open yet, and a module half loaded is no place to come back from."""
-    os.write(2, b"rig: interrupted\n")
-    os._exit(_INTERRUPTED)
+    try:
+        os.write(2, b"rig: interrupted\n")
+    finally:  # also where nobody reads it
+        os._exit(_INTERRUPTED)
 
 
 _OURS = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -24,10 +26,14 @@ if _OURS:  # here, since what pip writes to call `start` is at work for a while 
 
 def start() -> None:
     """Run one command and end the process, by 130 and in a few words after Ctrl-C."""
-    from rig.cli import main  # noqa: PLC0415 - takes long enough to be interrupted
-
     try:
+        from rig.cli import main  # noqa: PLC0415 - takes long enough to be interrupted
+
         code = main()
+    except Exception as error:
+        from rig.commands.internal_error import report  # noqa: PLC0415 - no command needs it
+
+        code = report(error)
     finally:
         if _OURS:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done, and said

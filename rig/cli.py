@@ -8,16 +8,15 @@ import os
 import signal
 import sys
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import import_module
-from io import TextIOWrapper
 from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.boards import BOARDS, FLASHED
 from rig.command_help import Parser, overview
 from rig.errors import RigError
-from rig.printable import printable
+from rig.streams import open_streams, say, settle_streams
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,10 +30,18 @@ OPTIONAL = ("distributed", "mpmath")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
 
-    0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted. Results go to
-    stdout, everything else to stderr.
+    0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted; 1 comes from
+    `rig.__main__`, after an exception that is raised here. Results go to stdout, everything else to
+    stderr.
     """
-    _open_streams()
+    open_streams()
+    try:
+        return _run(argv)
+    finally:
+        settle_streams()
+
+
+def _run(argv: Sequence[str] | None) -> int:
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may follow; this does not return
         import argcomplete  # noqa: PLC0415 - nobody else needs it
 
@@ -53,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             code: int = command.main(arguments)
             sys.stdout.flush()
     except RigError as error:
-        _say(error)
+        say(str(error))
         return error.exit_code
     except (KeyboardInterrupt, RuntimeError) as error:
         # A class in the making turns what strikes it into a RuntimeError.
@@ -61,27 +68,24 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         # A command that has something to say of what comes next raises it with these words.
         words = error.args if isinstance(error, KeyboardInterrupt) else ()
-        _say("; ".join(["rig: interrupted", *map(str, words)]))
+        say("; ".join(["rig: interrupted", *map(str, words)]))
         # Where it struck while a module made a class from text, Python 3.11 would end by the signal
         # in spite of all; text that runs to its end makes it forget.
         exec("")  # noqa: S102
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has seen enough.
-        _silence_stdout()
-        return 0
+        return 0  # whoever read our output has seen enough
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in OPTIONAL:
             raise
         from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-        _say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
+        say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
         return BAD_INPUT
     except OSError as error:
         named = error.strerror and error.filename
-        _say(f"rig: {error.filename}: {error.strerror}" if named else f"rig: {error}")
-        _silence_stdout()
+        say(f"rig: {error.filename}: {error.strerror}" if named else f"rig: {error}")
         return BAD_INPUT
     return code
 
@@ -98,26 +102,6 @@ def _put_in_order() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _open_streams() -> None:
-    """Give a closed stdout or stderr a place to go, and an old terminal ``?`` for a Δ it lacks."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            setattr(sys, name, os.fdopen(nowhere, "w", encoding="utf-8", closefd=False))
-    if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")
-
-
-def _say(what: object) -> None:
-    with suppress(OSError):  # nobody listens any more
-        print(printable(str(what)), file=sys.stderr, flush=True)
-
-
-def _silence_stdout() -> None:
-    """Let what could not be written vanish: Python would try once more at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> Parser:

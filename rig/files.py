@@ -77,6 +77,21 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         ) from error
 
 
+def state_folder() -> Path:
+    """Name the folder for what must outlive a program that fails: logs, and data without a place.
+
+    Raises
+    ------
+    InputError
+        This user has no home.
+    """
+    try:
+        base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state"
+    except RuntimeError as error:
+        raise InputError(f"no folder for logs: {error}", "set XDG_STATE_HOME") from error
+    return Path(base) / "chainrig"
+
+
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder for several files, unless it is there.
 

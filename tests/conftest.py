@@ -19,8 +19,10 @@ from hypothesis.internal.conjecture import providers
 settings.register_profile("same", derandomize=True, database=None, deadline=None)
 settings.register_profile("search", max_examples=2000, deadline=None)
 settings.load_profile("same")
-# Tests start some thousand programs: their modules are compiled once, whatever this shell prefers.
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# A user's shell tells Python nothing: PYTHONUNBUFFERED, say, would hide what an exit loses. Modules
+# of the thousand programs that tests start are compiled once, whatever this shell prefers.
+for setting in [name for name in os.environ if name.startswith("PYTHON")]:
+    del os.environ[setting]
 sys.dont_write_bytecode = False
 
 _BY_THE_CLOCK = tuple(
@@ -51,6 +53,16 @@ def pytest_collection() -> Iterator[object]:
     finally:
         gc.freeze()
         gc.enable()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_report_teststatus(report: pytest.TestReport) -> Iterator[object]:
+    """Name a test when it fails, with the place, and not only at the end of all."""
+    category, letter, word = yield
+    if report.failed:
+        crash = getattr(report.longrepr, "reprcrash", None)
+        letter = f"\n{word} {report.nodeid}" + (f": {crash}" if crash else "") + "\n"
+    return category, letter, word
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.boards import BOARDS, GATES
-from rig.commands.output import print_results, say
+from rig.commands.output import print_results
 from rig.errors import InputError
 from rig.files import write_atomic
 from rig.predictions import notes
@@ -21,6 +21,7 @@ from rig.recorder.interrupts import Interrupts
 from rig.report.canvas import write_figure
 from rig.report.mounting import mounting_figure
 from rig.runner import Operator, run_protocol
+from rig.streams import ask, say
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -125,11 +126,7 @@ def _asked(
         say(f"  {word:14} {meaning}")
     choice = f" ({', '.join(question.accepted)})" if question.accepted and not explained else ""
     while True:
-        print(f"{question.words}{choice} [{question.usual}] ", end="", file=sys.stderr, flush=True)
-        line = sys.stdin.readline()
-        if not line:
-            raise KeyboardInterrupt
-        answer = line.strip() or question.usual
+        answer = ask(f"{question.words}{choice} [{question.usual}] ") or question.usual
         if not question.accepted or answer in question.accepted:
             return answer
         say(f"  accepted: {', '.join(question.accepted)}")

@@ -6,7 +6,7 @@ import json
 import os
 import re
 import sys
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from shutil import get_terminal_size
 from textwrap import wrap
 from types import MappingProxyType
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from rig.errors import InputError
 from rig.files import write_atomic
-from rig.printable import printable
+from rig.streams import say as narrate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,12 +23,7 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
 
 VOID = 3
-
-
-def say(line: str) -> None:
-    """Tell the user something that is no result."""
-    with suppress(OSError):  # a campaign does not end because nobody listens any more
-        print(printable(line), file=sys.stderr, flush=True)
+say = narrate
 
 
 @contextmanager

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.narration import narrator
-from rig.commands.output import goes_on, print_results, say
+from rig.commands.output import goes_on, print_results
 from rig.recorder.interrupts import Interrupts
 from rig.report.finding import counted, finding, raised
 from rig.runner import run_protocol
+from rig.streams import ask, say
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -38,7 +39,4 @@ def main(arguments: Namespace) -> int:
 
 
 def _ask(request: str) -> None:
-    print(f"{request}\n  then press Enter (Ctrl-C stops, the same command goes on) ", end="",
-          file=sys.stderr, flush=True)  # fmt: skip
-    if not sys.stdin.readline():
-        raise KeyboardInterrupt
+    ask(f"{request}\n  then press Enter (Ctrl-C stops, the same command goes on) ")

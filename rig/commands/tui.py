@@ -47,8 +47,13 @@ async def _shown(app: RigApp) -> None:
     ------
     asyncio.CancelledError
         Of which `asyncio.run` makes a `KeyboardInterrupt`.
+    Exception
+        Any that nobody foresaw: Textual would only print it.
     """
+    app.error_console.quiet = True
     await app.run_async()
+    if app._exception is not None:
+        raise app._exception
     task = asyncio.current_task()
     if task is not None and task.cancelling():
         raise asyncio.CancelledError

@@ -172,11 +172,8 @@ def known(error: Exception) -> RigError:
     """Put any failure into words."""
     if isinstance(error, RigError):
         return error
-    log.error("unexpected", exc_info=error)
-    return RigError(
-        "this failed in a way that nobody foresaw",
-        "a fault of this program: please report it, with what stands in the daemon's log",
-    )
+    log.error("internal error", exc_info=error)
+    return RigError("internal error", "this is a bug, please report it with the daemon's log")
 
 
 def error_to_data(error: RigError) -> dict[str, Any]:

@@ -79,7 +79,7 @@ class Server:
         self._left_at = 0.0  # when the last client went
         self._serving: set[asyncio.Task[None]] = set()
         self._over = asyncio.Event()
-        self._failed: RigError | None = None
+        self._failed: BaseException | None = None
 
     async def run(self, ready: Callable[[], None]) -> None:
         """Serve until a signal comes, or until nobody needs it.
@@ -93,8 +93,8 @@ class Server:
         ------
         InputError
             Another daemon is there, or the socket's folder cannot be trusted.
-        RigError
-            A part of it failed: clients that went on would see nothing any more.
+        BaseException
+            What a part of it failed by: clients that went on would see nothing any more.
         """
         # The worker may be busy with a burst of edges: clients wait no 5 ms for their turn.
         sys.setswitchinterval(_SWITCH_S)
@@ -153,12 +153,8 @@ class Server:
             self._fail(error)
 
     def _fail(self, error: BaseException) -> None:
-        log.error("a part of the daemon failed, so it ends", exc_info=error)
-        self._failed = RigError(
-            "a part of the daemon failed, so it ended",
-            "a fault of this program: please report it, with what stands above; start it again, "
-            "and the same commands go on",
-        )
+        log.error("a part of the daemon failed, so it ends; start it again to go on")
+        self._failed = error
         self.end()
 
     async def _accept(self, listener: socket.socket) -> None:

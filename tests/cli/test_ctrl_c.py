@@ -53,11 +53,14 @@ rig.__main__.start()
 
 @pytest.mark.parametrize(("program", "code"), [(BEFORE, 130), (LOADING, 130), (ENDING, 0)])
 def test_ctrl_c_where_no_command_is_at_work(program, code):
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == code
     assert "Traceback" not in done.stderr
+    ours, theirs = os.pipe()
+    os.close(ours)  # nobody reads what it says
+    assert subprocess.run(command, stderr=theirs, check=False).returncode == code
+    os.close(theirs)
 
 
 def test_ctrl_c_in_a_class_that_is_being_made(monkeypatch, capsys):

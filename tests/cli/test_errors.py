@@ -315,11 +315,29 @@ def test_streams_may_be_closed(finished, tmp_path, closed):
     assert done.stdout == ("" if closed == "1" else finished.table.out)
 
 
-def test_an_error_nobody_reads_keeps_its_code(tmp_path):
+@pytest.mark.parametrize("streams", [("stderr",), ("stdout", "stderr")])
+@pytest.mark.parametrize(
+    ("code", "arguments"),
+    [
+        (2, ("analyze", "PLACE/none")),
+        (2, ("check", "/none")),
+        (2, ("no-such-command",)),
+        (0, ("check", "FENCE")),
+        (0, ("run", "FENCE", "--port", "sim://", "--session", "PLACE/s", "--yes")),
+        (0, ("daemon", "--port", "sim://", "--socket", "PLACE/d/s", "--idle-timeout", "0.1")),
+        (0, ("new", "PLACE/new.yaml", "--scene", "object", "--yes")),
+    ],
+)
+def test_a_command_that_nobody_listens_to_keeps_its_exit_code(
+    tmp_path, fence, code, arguments, streams
+):
+    """As before ``| head -1``: Python tries to write once more as it ends, and exits with 120."""
+    names = {"PLACE": str(tmp_path), "FENCE": str(fence)}
+    words = [re.sub("PLACE|FENCE", lambda name: names[name[0]], word) for word in arguments]
     ours, theirs = os.pipe()
     os.close(ours)
     try:
-        assert rig("analyze", tmp_path / "none", stderr=theirs).returncode == 2
+        assert rig(*words, **dict.fromkeys(streams, theirs)).returncode == code
     finally:
         os.close(theirs)
 

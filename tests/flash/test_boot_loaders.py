@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import dataclass
 
 import pytest
 
@@ -13,7 +14,7 @@ from rig.cli import main
 from rig.flash.boards import TARGETS
 from rig.link.client import Device
 from rig.link.messages import Phase
-from rig.link.port import open_port, port_clock
+from rig.link.port import open_port
 from rig_emulator.bootloader import LOADERS, BoughtBoard
 from rig_emulator.wiring import BOARDS, Wiring
 from tests.firmware.toolchain import need
@@ -22,6 +23,20 @@ from tests.waiting import until
 
 WRITTEN = 3000
 """Bytes of a flash under way."""
+
+
+@dataclass(frozen=True)
+class BoardTime:
+    """An emulated board's own time, which runs slower beside busy programs."""
+
+    board: BoughtBoard
+
+    def now_ns(self) -> int:
+        return round(self.board.avr.cycle / self.board.avr.frequency * 1e9)
+
+    def sleep(self, seconds: float) -> None:
+        end = self.now_ns() + round(seconds * 1e9)
+        until(lambda: self.now_ns() >= end)
 
 
 @pytest.fixture
@@ -78,7 +93,7 @@ def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the
         until(lambda: not there.is_open)
         before = there.restarts
         with closing(open_port(there.path)) as port:
-            device = Device(port, port_clock(port))
+            device = Device(port, BoardTime(there))
             device.connect()
             assert device.status().phase is Phase.HOLDING
             assert device.fetch(LABEL) == fallen
@@ -101,7 +116,7 @@ def drop(there: BoughtBoard, wiring: Wiring):
         for pin in (*wiring.gates, wiring.stop):
             there.avr.edge(0, pin, False)
     with closing(open_port(there.path)) as port:
-        device = Device(port, port_clock(port))
+        device = Device(port, BoardTime(there))
         device.connect()
         order = {"release": 1, "pulse_us": 20_000, "timeout_ms": 2000, "record_ms": 200}
         device.fire(device.arm(label=LABEL, gates=1, **order))

@@ -1,0 +1,94 @@
+"""An exception that nobody foresaw: a short message, a log to report it with, and no traceback."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from textual.app import App
+
+from rig.commands import tui
+
+BROKEN = """
+import sys, rig.cli, rig.__main__
+def broken(_):
+    {}
+rig.cli.import_module = {}
+sys.argv[1:] = {!r}
+rig.__main__.start()
+"""
+AT_WORK = "lambda _: type('module', (), {'main': broken})"
+COMMANDS = {
+    "check": ["check", "x.yaml"],
+    "run": ["run", "x.yaml", "--port", "sim://", "--session", "s"],
+    "analyze": ["analyze", "s", "--json"],
+    "daemon": ["daemon", "--port", "sim://"],
+    "bench": ["bench", "stability"],
+}
+
+
+def ended(program: str, state: object, **options):
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {"XDG_STATE_HOME": str(state)},
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options},
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("when", [AT_WORK, "broken"], ids=["at work", "while it loads"])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_any_command_leaves_a_log_and_says_where(command, when, tmp_path):
+    done = ended(BROKEN.format("1 / 0", when, COMMANDS[command]), tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    told = r"rig: internal error \(ZeroDivisionError\); this is a bug, .* with the log at (.*)\n"
+    log = Path(re.fullmatch(told, done.stderr)[1])
+    assert log.parent == tmp_path / "chainrig"
+    text = log.read_text("utf-8")
+    assert " ".join(COMMANDS[command]) in text
+    assert sys.version.split()[0] in text
+    assert "in broken" in text
+    assert text.endswith("ZeroDivisionError: division by zero\n")
+
+
+@pytest.mark.parametrize("home", ["/proc/1", "/dev/null"])
+def test_where_no_log_can_be_written_that_is_said(home):
+    done = ended(BROKEN.format("1 / 0", AT_WORK, ["check", "x"]), home)
+    assert done.returncode == 1
+    assert "its log could not be written: cannot make the folder" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_exit_code_stays_when_nobody_reads_the_message(tmp_path):
+    ours, theirs = os.pipe()
+    os.close(ours)
+    done = ended(BROKEN.format("1 / 0", AT_WORK, ["check", "x"]), tmp_path, stderr=theirs)
+    os.close(theirs)
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("ends", "code"), [("raise SystemExit(7)", 7), ("raise KeyboardInterrupt", 130)]
+)
+def test_other_ends_are_no_internal_errors(ends, code, tmp_path):
+    done = ended(BROKEN.format(ends, AT_WORK, ["check", "x"]), tmp_path)
+    assert done.returncode == code
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_terminal_shows_no_traceback_either(capfd):
+    class Broken(App):
+        async def run_async(self):
+            return await super().run_async(headless=True)
+
+        def on_mount(self):
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        asyncio.run(tui._shown(Broken()))
+    assert "Traceback" not in "".join(capfd.readouterr())
