@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -12,6 +13,51 @@ from rig.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+_DESCRIPTORS = ("/dev/", "/proc/")
+"""Where a shell puts the pipe of ``<(...)`` or ``|``: somebody writes into it, and it ends."""
+
+
+def require_file(path: str | os.PathLike[str], *, descriptors: bool = False) -> None:
+    """Refuse what is no file: to open or to read it may never end.
+
+    Parameters
+    ----------
+    path
+        As the user named it.
+    descriptors
+        Whether a pipe that a shell has opened will do too.
+
+    Raises
+    ------
+    OSError
+        It is a folder, a pipe, a socket or a device, or nothing is there.
+    """
+    kind = _KINDS.get(stat.S_IFMT(Path(path).stat().st_mode))
+    opened = descriptors and kind == "a pipe" and os.fspath(path).startswith(_DESCRIPTORS)
+    if kind and not opened:
+        raise OSError(errno.EINVAL, f"it is {kind}; name a file", os.fspath(path))
+
+
+def read_input(path: str | os.PathLike[str], most: int = -1) -> bytes:
+    """Read a file, or a pipe as of ``<(...)``, that a user has named; at most so many bytes.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, or see `require_file`.
+    """
+    require_file(path, descriptors=True)
+    with Path(path).open("rb") as stream:
+        return stream.read(most)
 
 
 def write_atomic(path: str | os.PathLike[str], text: str) -> None:
@@ -64,11 +110,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     InputError
         As in `write_atomic`.
     """
-    target = Path(os.path.realpath(path))
+    given, target = Path(path), Path(os.path.realpath(path))  # a pipe has no real path
     try:
         check_place(path)
-        through = target.exists() and not target.is_file()
-        with target.open("wb") if through else _replacing(target) as stream:
+        through = given.exists() and not given.is_file()
+        with given.open("wb") if through else _replacing(target) as stream:
             yield stream
     except OSError as error:
         raise InputError(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rig.clock.host import SystemClock
 from rig.commands.output import say
 from rig.errors import InputError
+from rig.files import require_file
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
@@ -31,11 +32,8 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Make a session from an edge file."""
-    source = Path(arguments.events)
-    if source.exists() and not source.is_file():
-        raise InputError(
-            f"{source} is no file", "it is read more than once: write what it gives into one first"
-        )
+    if Path(arguments.events).exists():
+        require_file(arguments.events)  # and no pipe: it is read more than once
     protocol = reader.read(arguments.protocol)
     timer: dict[str, object] = {
         "source": "imported edges",

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
+from rig.files import require_file
 from rig.ports import check_name
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
@@ -28,8 +29,9 @@ def main(arguments: Namespace) -> int:
     if arguments.pictures:
         from rig.tui.pictures import draw  # noqa: PLC0415 - not for a session
 
-        if options.session is None or not options.session.is_file():
+        if options.session is None or not options.session.exists():
             raise InputError("--pictures needs --session FILE: what they show")
+        require_file(options.session)
         for path in draw(options.session, Path(arguments.pictures), keys, options.files):
             print(path)
         return 0

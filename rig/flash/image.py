@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError, Problem
+from rig.files import read_input
 from rig.flash.boards import DRIVE, FIRMWARE, TARGETS
 from rig.flash.uf2 import read_blocks
 
@@ -59,7 +60,7 @@ def read_image(path: Path, target: Target) -> Image:
         The file is damaged, is no firmware of this project, or is for another board.
     """
     try:
-        data = path.read_bytes()
+        data = read_input(path)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     flash = read_blocks(data, path) if target is DRIVE else _records(data, path)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
+from rig.files import read_input
 from rig.protocol import fields
 from rig.protocol.chains import read_chains
 from rig.protocol.fields import FieldFaults, Range, Section
@@ -73,13 +74,10 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     """
     source = str(path)
     try:
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+        data = read_input(path, MAX_BYTES + 1)
     except FileNotFoundError:
         hint = "ready protocols are in protocols/"
         raise InputError(f"{source}: there is no such file", hint) from None
-    except IsADirectoryError:
-        raise InputError(f"{source}: is a folder; name a file in it") from None
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{source!r}: cannot be read: {reason}") from None

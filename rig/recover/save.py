@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from rig.errors import SessionError
+from rig.files import read_input
 from rig.ports import is_simulated
 from rig.records import ClockSample, HostBreak, Pulse
 from rig.recover.examine import protocol_sound
@@ -68,9 +69,8 @@ def save(found: Examined, target: str | os.PathLike[str], protocol: str | None =
 
 def _protocol(found: Examined, given: str | None) -> tuple[str, str]:
     if given is not None:
-        path = Path(given)
         try:
-            return path.name, path.read_text("utf-8")
+            return Path(given).name, read_input(given).decode()
         except (OSError, UnicodeDecodeError) as error:
             raise SessionError(f"cannot read {given}: {error}") from error
     if found.rows.protocol is None or not protocol_sound(found.rows):

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rig.errors import SessionError
+from rig.files import require_file
 from rig.session.store import Session
 
 _TROUBLE = (sqlite3.Error, UnicodeDecodeError)
@@ -57,10 +58,9 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
         There is nothing that can be read.
     """
     place = Path(os.path.realpath(path))
-    if place.is_dir():
-        raise SessionError(f"{path} is a folder", "name a session file")
     writer, logged = _writer(place), None
     try:
+        require_file(place)
         with TemporaryDirectory(prefix="rig-recover-") as folder:
             copy = Path(folder) / "copy"
             if writer:

@@ -8,7 +8,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING
 
 from rig.errors import SessionError
-from rig.files import sync_directory
+from rig.files import require_file, sync_directory
 from rig.session.faults import not_a_session, translated
 from rig.session.foreign import check_schema, guard
 from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION, UPGRADES
@@ -78,11 +78,10 @@ def check_place(path: Path) -> None:
     Raises
     ------
     SessionError
-        For a missing file, a folder or an empty file.
+        For a missing file, an empty file, and what is no file.
     """
-    if path.is_dir():
-        raise not_a_session(path, "it is a folder")
     try:
+        require_file(path)
         size = path.stat().st_size
     except OSError as error:
         raise SessionError(

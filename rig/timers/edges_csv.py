@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from rig.boards import GATES
 from rig.errors import InputError
+from rig.files import read_input
 from rig.records import Drop, Edge
 from rig.timers.problems import Lines, ProblemList
 
@@ -64,9 +65,9 @@ def read_edges(path: str | os.PathLike[str]) -> list[Drop]:
             problems.add(1, 1, "", f"{size / 1e6:.0f} MB is more than {MAX_BYTES / 1e6:.0f} MB")
             problems.raise_if_any("is it the right file? otherwise split it by runs")
         # Wrong bytes inside comments harm nobody; inside values they are reported as such.
-        with Path(path).open(encoding="utf-8-sig", errors="replace", newline="") as stream:
-            for place, record in _records(Lines(stream), problems):
-                table.add(place, record)
+        text = read_input(path).decode("utf-8-sig", "replace")
+        for place, record in _records(Lines(io.StringIO(text, newline="")), problems):
+            table.add(place, record)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     if not table.runs:

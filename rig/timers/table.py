@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import InputError
+from rig.files import read_input
 from rig.timers.edges_csv import MAX_BYTES
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def lines_of(path: str | os.PathLike[str]) -> list[str]:
                 f"{path}:1:1: {size / 1e6:.0f} MB is more than {MAX_BYTES / 1e6:.0f} MB",
                 "is it the right file?",
             )
-        content = Path(path).read_bytes()
+        content = read_input(path)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     if content[:2] in {b"\xff\xfe", b"\xfe\xff"}:

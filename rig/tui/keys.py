@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from textual.keys import Keys
 
 from rig.errors import InputError
+from rig.files import read_input
 from rig.tui.actions import ACTIONS, BY_NAME
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
     if path is None and not place.is_file():
         return {action.name: action.keys for action in ACTIONS}
     try:
-        text = place.read_text("utf-8")
+        text = read_input(place).decode()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{place}: {reason}", _HOW) from None

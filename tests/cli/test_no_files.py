@@ -1,0 +1,129 @@
+"""What is no file is refused in words wherever a file is wanted: it might never end."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from rig.cli import _parser
+from rig.files import write_atomic
+from tests.cli.lab import ROOT, command
+from tests.waiting import PATIENCE_S
+
+COMMANDS = {
+    ("analyze", "session"): "X",
+    ("analyze", "video"): "SESSION --video X",
+    ("check", "protocol"): "X",
+    ("design", "learned"): "FENCE --learned X",
+    ("design", "protocol"): "X",
+    ("doctor", "session"): "--session X",
+    ("estimate", "session"): "X",
+    ("export", "session"): "X --csv OUT",
+    ("flash", "hex"): "--board mega --port /dev/null --avrdude /bin/true --hex X",
+    ("import", "events"): "X --protocol FENCE --session OUT",
+    ("import", "protocol"): "CSV --protocol X --session OUT",
+    ("predict", "protocol"): "X",
+    ("recover", "protocol"): "SESSION -o OUT --protocol X",
+    ("recover", "session"): "X",
+    ("replay", "session"): "X",
+    ("report", "session"): "X -o OUT",
+    ("run", "protocol"): "X --port sim:// --session OUT",
+    ("run", "session"): "FENCE --port sim:// --session X",
+    ("sweep", "protocol"): "X --vary drop=100mm..300mm:3 -o OUT.csv",
+    ("tui", "keys"): "--keys X",
+    ("tui", "session"): "--session X --pictures OUT",
+    ("unblind", "session"): "X",
+}
+WRITTEN = {("import", "session"), ("tui", "protocol")}
+"""A new file, and one that is only read on a terminal."""
+
+
+@pytest.fixture
+def places(tmp_path, finished, fence):
+    """What stands for the words of `COMMANDS`."""
+    session, csv = tmp_path / "session", tmp_path / "edges.csv"
+    shutil.copy(finished.session, session)
+    csv.write_text("run,channel,time_s,state\n1,0,0.1,1\n", "utf-8")
+    return {"SESSION": session, "CSV": csv, "FENCE": fence, "OUT": tmp_path / "out"}
+
+
+@pytest.fixture
+def thing(request, tmp_path):
+    """Make what is no file."""
+    path = tmp_path / "thing"
+    match request.param:
+        case "pipe":
+            os.mkfifo(path)
+        case "folder":
+            path.mkdir()
+        case "socket":
+            with socket.socket(socket.AF_UNIX) as made:
+                made.bind(str(path))
+        case "device":
+            path.symlink_to("/dev/zero")
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _patience():
+    """Let a read that never ends fail."""
+
+    def over(*_):
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.alarm(int(PATIENCE_S))
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_every_command_that_takes_a_file_is_tried():
+    (commands,) = (
+        action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
+    files = {"protocol", "session", "events", "video", "learned", "hex", "keys"}
+    taken = {
+        (name, action.dest)
+        for name, parser in commands.choices.items()
+        for action in parser._actions
+        if action.dest in files and action.nargs != 0
+    }
+    assert taken == COMMANDS.keys() | WRITTEN
+
+
+@pytest.mark.parametrize("thing", ["pipe", "folder", "socket", "device"], indirect=True)
+@pytest.mark.parametrize("case", COMMANDS, ids="-".join)
+def test_what_is_no_file_is_refused_in_words(case, thing, places, request, call):
+    words = [str({**places, "X": thing}.get(word, word)) for word in COMMANDS[case].split()]
+    done = call(case[0], *words)
+    assert done.code == (4 if case[0] == "doctor" else 2), done
+    kind = request.node.callspec.params["thing"]
+    assert f"it is a {kind}" in done.out + done.err
+    assert re.search(r"thing|/dev/zero", done.out + done.err)
+    assert not places["OUT"].exists()
+
+
+@pytest.mark.parametrize("said", ["check <(cat FENCE)", "check /dev/stdin < FENCE"])
+def test_a_shell_may_pass_on_text(said, fence, call):
+    line = said.replace("FENCE", str(fence))
+    done = subprocess.run(
+        ["bash", "-c", f"{' '.join(command())} {line}"],
+        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[1:] == call("check", fence).out.splitlines()[1:]
+
+
+def test_output_goes_into_any_pipe():
+    code = f"from {write_atomic.__module__} import write_atomic; write_atomic('/dev/stdout', 'x')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert done.stdout == b"x"
