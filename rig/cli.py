@@ -53,7 +53,7 @@ def _run(argv: Sequence[str] | None) -> int:
         finally:
             sys.stdout.flush()  # of --help, here, where a closed pipe is understood
         if "module" not in arguments:
-            parser.print_help(sys.stderr)
+            say(parser.format_help(), end="")
             return BAD_INPUT
         command = import_module(f"rig.commands.{arguments.module}")
         with _put_in_order():

@@ -6,6 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from rig.streams import say
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -103,8 +105,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and end."""
-        usage = self.format_usage()
-        self.exit(2, f"{self.prog}: {message}\n{usage}  hint: {self.prog} --help\n")
+        say(f"{self.prog}: {message}\n{self.format_usage()}  hint: {self.prog} --help")
+        self.exit(2)
 
 
 def overview(texts: dict[str, str]) -> str:

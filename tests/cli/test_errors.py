@@ -322,6 +322,7 @@ def test_streams_may_be_closed(finished, tmp_path, closed):
         (2, ("analyze", "PLACE/none")),
         (2, ("check", "/none")),
         (2, ("no-such-command",)),
+        (2, ()),
         (0, ("check", "FENCE")),
         (0, ("run", "FENCE", "--port", "sim://", "--session", "PLACE/s", "--yes")),
         (0, ("daemon", "--port", "sim://", "--socket", "PLACE/d/s", "--idle-timeout", "0.1")),

@@ -46,7 +46,7 @@ RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
         (["predict", "--figure", "3", "-o", "x.doc"], "x.doc: a figure is written as .svg, .png"),
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
         (["selftest", "--port", "/dev"], "/dev: it is a folder"),
-        (["import", "/dev/zero", "--protocol", "p", "--session", "s"], "/dev/zero is no file"),
+        (["import", "/dev/zero", "--protocol", "p", "--session", "s"], "/dev/zero: it is a device"),
         ([*RUN, "--session", "s", "--port", "sim://?pace=-1"], "'-1' is not a whole number from 0"),
     ],
 )
