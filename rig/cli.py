@@ -153,7 +153,9 @@ def _parser() -> Parser:
 
     run = command("run", "carry out a protocol, or what is left of it")
     _protocol(run)
-    run.add_argument("--port", required=True, help="device path or URL; sim:// needs no hardware")
+    run.add_argument(
+        "--port", type=_port, required=True, help="device path or URL; sim:// needs no hardware"
+    )
     run.add_argument(
         "--session", required=True, metavar="FILE", help="a new file, or one to be continued"
     )
@@ -165,7 +167,7 @@ def _parser() -> Parser:
     run.add_argument("--socket", metavar="PATH", help="of the daemon to ask, if not the usual one")
 
     daemon = command("daemon", "own a port and its session, and serve clients, until stopped")
-    daemon.add_argument("--port", required=True, help="device path or URL")
+    daemon.add_argument("--port", type=_port, required=True, help="device path or URL")
     daemon.add_argument("--socket", metavar="PATH", help="where clients come, if elsewhere")
     daemon.add_argument(
         "--tcp",
@@ -332,7 +334,10 @@ def _parser() -> Parser:
         help="its kind; nano-old: a Nano whose boot loader listens at 57,600 baud only",
     )
     flash.add_argument(
-        "--port", metavar="PATH", help="its device, such as /dev/ttyACM0; not wanted of a Pico"
+        "--port",
+        type=_port,
+        metavar="PATH",
+        help="its device, such as /dev/ttyACM0; not wanted of a Pico",
     )
     flash.add_argument(
         "--drive",
@@ -356,11 +361,11 @@ def _parser() -> Parser:
     _json(ports)
 
     doctor = command("doctor", "look for what is wrong with this computer, a board or a session")
-    doctor.add_argument("--port", help="also this board: device path or URL")
+    doctor.add_argument("--port", type=_port, help="also this board: device path or URL")
     doctor.add_argument("--session", metavar="FILE", help="also this session, and its disk")
 
     selftest = command("selftest", "have a board prove that it does what it must")
-    selftest.add_argument("--port", required=True, help="device path or URL")
+    selftest.add_argument("--port", type=_port, required=True, help="device path or URL")
     selftest.add_argument(
         "--loopback",
         type=int,
@@ -542,6 +547,7 @@ def _tui(tui: argparse.ArgumentParser) -> None:
     tui.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="else to be picked there")
     tui.add_argument(
         "--port",
+        type=_port,
         help="device path or URL, such as sim://?pace=1; its daemon is started if none runs. "
         "Without it, the daemon that runs is watched",
     )
@@ -614,6 +620,12 @@ def _seed(text: str) -> int:
     if not text.isdecimal() or int(text) >= 2**63:
         raise argparse.ArgumentTypeError(f"found '{text}', not a whole number from 0 to 2^63")
     return int(text)
+
+
+def _port(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("no port is named: a device path, or a URL such as sim://")
+    return text
 
 
 def _seconds(text: str) -> float:

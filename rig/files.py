@@ -138,6 +138,15 @@ def state_folder() -> Path:
     return Path(base) / "chainrig"
 
 
+def identity_of(path: Path) -> tuple[int, int] | None:
+    """Return device and number of what is at a path, which a file that replaces it has not."""
+    try:
+        about = path.stat()
+    except OSError:
+        return None
+    return about.st_dev, about.st_ino
+
+
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder for several files, unless it is there.
 

@@ -232,6 +232,6 @@ def _names(model: DropModel) -> dict[str, slice]:
     for role, record in model.records.items():
         if role == "impact":
             for name in ("contact", "strings"):
-                found[f"{name}, {record.condition}"] = at[name]
+                found[f"{name} at {record.condition}"] = at[name]
         found |= {f"{record.chain.name} {what}": at[f"{role} {what}"] for what in _CHAIN}
     return found

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rig.daemon import rpc
 from rig.daemon.socket_path import prepare_folder, token_file
 from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import identity_of, write_atomic
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,10 +63,22 @@ def listen(path: Path, token: str) -> socket.socket:
     return listener
 
 
-def leave(path: Path, token: str) -> None:
-    """Take away what showed the way."""
-    with suppress(OSError):
-        (token_file(path) if token else path).unlink()
+class Door:
+    """The file by which clients find a daemon: its socket, or what stands for its TCP port."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._ours = identity_of(path)
+
+    def there(self) -> bool:
+        """Whether clients still find this daemon by it."""
+        return identity_of(self.path) == self._ours
+
+    def remove(self) -> None:
+        """Take it away, unless another daemon's is in its place."""
+        with suppress(OSError):
+            if self.there():
+                self.path.unlink()
 
 
 def _answers_at_socket(path: Path) -> bool:

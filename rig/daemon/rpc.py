@@ -172,6 +172,8 @@ def known(error: Exception) -> RigError:
     """Put any failure into words."""
     if isinstance(error, RigError):
         return error
+    if isinstance(error, OSError) and error.filename:  # of a file that a client has named
+        return InputError(f"{error.filename}: {error.strerror}", "name another file")
     log.error("internal error", exc_info=error)
     return RigError("internal error", "this is a bug, please report it with the daemon's log")
 

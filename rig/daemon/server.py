@@ -9,7 +9,7 @@ import resource
 import secrets
 import signal
 import sys
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from rig import __version__
@@ -17,24 +17,26 @@ from rig.daemon import rpc
 from rig.daemon.admission import HELLO_S, Admission
 from rig.daemon.connection import Connection, Turns
 from rig.daemon.lease import LEASE_S, Lease
-from rig.daemon.listener import leave, listen
+from rig.daemon.listener import Door, listen
 from rig.daemon.publisher import Publisher
 from rig.daemon.rpc import error_to_data
 from rig.daemon.service import Service
-from rig.daemon.socket_path import peer_uid
+from rig.daemon.socket_path import peer_uid, token_file
 from rig.daemon.worker import STALL_S, Worker
-from rig.errors import RigError
+from rig.errors import InputError, RigError
+from rig.files import make_folder, state_folder
 from rig.ports import is_simulated
 from rig.recorder.published import PublishedState
 
 if TYPE_CHECKING:
     import socket
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
 log = logging.getLogger(__name__)
 _SWITCH_S = 1e-3
 _AGAIN_S = 0.05
+_DOOR_S = 1.0  # between looks whether clients still find the socket
 _DESCRIPTORS = 1024
 """Files and connections that may be open: all clients, and what port and session need."""
 
@@ -103,6 +105,7 @@ class Server:
             loop.add_signal_handler(number, self.end)
         _allow_descriptors()
         listener = listen(self.path, self._token)
+        door = Door(token_file(self.path) if self._token else self.path)
         self.published.set(
             daemon={"version": __version__, "pid": os.getpid(), "api": rpc.API},
             port={"url": self.url, "simulated": is_simulated(self.url), "path": self.url},
@@ -112,6 +115,7 @@ class Server:
             self.publisher.run(),
             self._watch_lease(),
             self._watch_worker(),
+            self._watch_door(door),
         ]
         if self._idle_s is not None:
             parts.append(self._watch_clients(self._idle_s))
@@ -139,7 +143,7 @@ class Server:
                 connection.close()
             if self._serving:  # they end by themselves; to be cancelled would be told on stderr
                 await asyncio.wait(self._serving, timeout=1.0)
-            leave(self.path, self._token)
+            door.remove()
         if self._failed is not None:
             raise self._failed
 
@@ -224,6 +228,19 @@ class Server:
                     self.published.set(error=None, phase=before if phase == "trouble" else phase)
                 told = None
 
+    async def _watch_door(self, door: Door) -> None:
+        """End when no client is there and none can come; what is said then goes into a log too."""
+        while door.there() or self.publisher.connections:
+            await asyncio.sleep(_DOOR_S)
+        self._failed = InputError(
+            f"{door.path} was deleted, moved or replaced: no client finds this daemon, so it ended",
+            f"its last words are in {state_folder()}; start it again",
+        )
+        with _kept_log():
+            log.error("%s", self._failed)
+            self.end()
+            await asyncio.Event().wait()  # until this is cancelled, when all has ended
+
     async def _watch_clients(self, idle_s: float) -> None:
         """End when no client was there for so long and nothing would be lost."""
         now = asyncio.get_running_loop().time
@@ -241,6 +258,20 @@ class Server:
             elif not self.publisher.connections:
                 log.info("no client for %g s, and nothing armed, falling or unsaved", idle_s)
                 self.end()
+
+
+@contextmanager
+def _kept_log() -> Iterator[None]:
+    """Log into the state folder too: where stderr went may be deleted with the socket."""
+    handler = logging.FileHandler(make_folder(state_folder()) / "daemon.log")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d: %(message)s"))
+    root = logging.getLogger()
+    root.addHandler(handler)
+    try:
+        yield
+    finally:
+        root.removeHandler(handler)
+        handler.close()
 
 
 def _allow_descriptors() -> None:

@@ -366,6 +366,10 @@ class Condition(NamedTuple):
     incline_deg: float
     impact_chain: str | None = None
 
+    def __str__(self) -> str:
+        chain = "" if self.impact_chain is None else f", {self.impact_chain} strikes"
+        return f"{self.incline_deg:.15g} deg{chain}"
+
     def json(self) -> dict[str, float | str]:
         """``incline_deg`` and, if there is one, ``impact_chain``."""
         chain = {} if self.impact_chain is None else {"impact_chain": self.impact_chain}

@@ -299,7 +299,8 @@ class Controller:
             The device or the disk does not answer, so it is not known.
         """
         if self._session is not None:
-            self._session.commit()
+            if not self._session.rescued:
+                self._session.commit()
             latest = {entry.run: entry for entry in self._session.states()}
             if any(
                 entry.state is RunState.FIRED
@@ -307,6 +308,8 @@ class Controller:
                 for entry in latest.values()
             ):
                 return True  # on a board that may be away at the moment
+            if self._session.rescued:
+                return False  # nor can it be asked, since nothing of that could be logged
         if self.recorder is None:
             return False
         if self.recorder.armed is not None:

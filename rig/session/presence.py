@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
+
+from rig.files import identity_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,13 +25,24 @@ class Presence:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._files = {one: _known(one) for one in (path, path.with_name(path.name + "-wal"))}
+        self._files = {one: identity_of(one) for one in (path, path.with_name(path.name + "-wal"))}
         self._size = path.stat().st_size
+
+    def remove_log(self) -> None:
+        """Take away the log of a file that is elsewhere, once it is empty.
+
+        SQLite leaves it, and would apply it to any other file that comes to this place.
+        """
+        log = self._path.with_name(self._path.name + "-wal")
+        with suppress(OSError):
+            if identity_of(log) == self._files[log] and log.stat().st_size == 0:
+                log.unlink()
+                self._path.with_name(self._path.name + "-shm").unlink()
 
     def trouble(self) -> str:
         """Say in words what has become of it; empty while it is there."""
         for path, before in self._files.items():
-            now = _known(path)
+            now = identity_of(path)
             if before is None:
                 self._files[path] = now
             elif now is None:
@@ -43,12 +57,3 @@ class Presence:
             return f"{self._path} was cut from {self._size} to {size} bytes"
         self._size = size
         return ""
-
-
-def _known(path: Path) -> tuple[int, int] | None:
-    """Device and number of a file; `None` without one."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino

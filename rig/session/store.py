@@ -16,7 +16,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from rig import __version__
-from rig.errors import SessionError
+from rig.errors import InputError, SessionError
+from rig.files import make_folder, state_folder
 from rig.printable import encodable
 from rig.session.database import build, check_free, check_place, connect
 from rig.session.faults import translated
@@ -49,6 +50,7 @@ class Session(Reader):
         self._journal = Journal(connection, path)
         self._presence = Presence(path)
         self._gone: SessionError | None = None
+        self.rescued = False  # saved elsewhere, whole, since the file is not at its place any more
         # Counted here, not by SQLite, so that a commit tried again writes the same rows.
         self._last_drop = int(self._one('SELECT coalesce(max(id), 0) FROM "drop"', "i"))
 
@@ -188,20 +190,27 @@ class Session(Reader):
         self.require_presence()
 
     def _rescued(self, trouble: str) -> SessionError:
-        """Save what the open file and this memory have; give the error that says where."""
-        place = next(
-            one
-            for number in count(1)
-            if not (one := self.path.with_name(f"{self.path.name}.saved-{number}")).exists()
-        )
+        """Save what the open file and this memory have; give the error that says where.
+
+        All goes into the open file too: it is whole then, wherever it was moved.
+        """
+        with suppress(SessionError):
+            self._journal.commit()
+        self._fold_in()
         try:
-            lost = self._journal.save(place)
-        except (sqlite3.Error, OSError) as error:
+            try:
+                place = _unused(self.path)
+                lost = self._journal.save(place)
+            except (sqlite3.Error, OSError):  # its folder is gone too
+                place = _unused(make_folder(state_folder()) / self.path.name)
+                lost = self._journal.save(place)
+        except (sqlite3.Error, OSError, InputError) as error:
             return SessionError(
-                f"{trouble} while it was in use, and could not be saved as {place}: {error}",
+                f"{trouble} while it was in use, and could not be saved anywhere: {error}",
                 "what was not committed is lost; a drop that fell is still on the board: make "
                 "room, and give the same command with a new session file",
             )
+        self.rescued = True
         log.error("%s while it was in use; everything is saved as %s", trouble, place)
         return SessionError(
             f"{trouble} while it was in use; everything that was recorded is saved as {place}"
@@ -224,14 +233,19 @@ class Session(Reader):
         try:
             if not self.readonly and self._gone is None:
                 self.commit()
-                # Leaves one file to copy even while a reader keeps the log from being removed.
-                with suppress(sqlite3.Error):
-                    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+                self._fold_in()
         finally:
             self._connection = None
             connection.close()
+            if self.rescued:
+                self._presence.remove_log()
             if self._lock is not None:
                 self._lock.release()
+
+    def _fold_in(self) -> None:
+        """Leave one file to copy, even while a reader keeps the log from being removed."""
+        with suppress(sqlite3.Error):
+            self._opened().execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def __enter__(self) -> Self:
         return self
@@ -393,3 +407,9 @@ class Session(Reader):
 
     def _add(self, sql: str, *rows: Sequence[object]) -> None:
         self._writable().add(Statement(sql, rows))
+
+
+def _unused(path: Path) -> Path:
+    """Name a file beside a session that is not there yet."""
+    names = (path.with_name(f"{path.name}.saved-{number}") for number in count(1))
+    return next(name for name in names if not name.exists())

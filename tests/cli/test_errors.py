@@ -106,7 +106,7 @@ def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port
 
 
 @pytest.mark.parametrize(
-    "port", ["", "nonsense", "/dev/null", "/etc/passwd", "no://such", "hwgrep://nobody", "loop://"]
+    "port", ["nonsense", "/dev/null", "/etc/passwd", "no://such", "hwgrep://nobody", "loop://"]
 )
 def test_a_port_that_cannot_be_opened_is_device_trouble(
     call, protocol, tmp_path, port, monkeypatch
@@ -151,6 +151,24 @@ def test_bad_arguments_are_refused(call, arguments):
     assert done.code == 2
     assert done.out == ""
     assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("daemon",),
+        ("doctor",),
+        ("flash", "--board", "mega"),
+        ("run", "p.yaml", "--session", "s"),
+        ("selftest",),
+        ("tui",),
+    ],
+)
+def test_an_empty_port_is_refused(call, words):
+    """As a variable of a shell is that nobody has set."""
+    done = call(*words, "--port", "")
+    assert done.code == 2
+    assert "no port is named" in done.err
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("--version",)])

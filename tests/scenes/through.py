@@ -29,6 +29,10 @@ DONE, BAD_INPUT, VOID = 0, 2, 3
 QUANTITIES = ("separation_m", "separation_raw_m", "separation_strike_m", "speed_m_s",
               "release_skew_s", "gravity_m_s2", "acceleration_m_s2")  # fmt: skip
 _NO_NUMBER = re.compile(r"(?<![\w.])[-−+]?(?:nan|NaN|inf|Infinity|None)(?!\w)")
+_PYTHON = re.compile(
+    r"\b[A-Z]\w*\(\w+=|<rig|\bobject at 0x|\b(?:namedtuple|Quantity|array)\(|\bNone\b"
+)
+"""How Python writes what is no text, in a key or a value."""
 _EXPONENT = re.compile(r"±\s*[\d.]+e[+-]?\d+")
 _PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous")
 _IMPACT = ("inclin", "impact", "strike", "restitution", "friction", "α", "surface", " V ")
@@ -159,9 +163,10 @@ class _Journey:
             self.fault(name, "a traceback")
         if "could not be made" in done.err:
             self.fault(name, done.err.strip())
-        for pattern in (_NO_NUMBER, _EXPONENT):
+        plain = () if "--json" in words else (_NO_NUMBER, _EXPONENT)
+        for pattern in (_PYTHON, *plain):
             for text in (done.out, done.err):
-                if "--json" not in words and (met := pattern.search(text)):
+                if met := pattern.search(text):
                     self.fault(name, f"says {_around(text, met)}")
         return done
 
@@ -270,6 +275,10 @@ class _Journey:
     def exported(self, found: Any) -> None:
         place = self.folder / "csv"
         self.call("export", self.session, "--csv", place)
+        for file in place.iterdir():
+            text = file.read_text("utf-8")
+            if met := _PYTHON.search(text):
+                self.fault("export", f"{file.name} says {_around(text, met)}")
         latest = {"runs.csv": found["runs"], "summary.csv": found["summary"]}
         for name, records in latest.items():
             with (place / name).open(encoding="utf-8", newline="") as file:

@@ -75,6 +75,15 @@ def test_nothing_is_armed_and_all_is_saved_beside_it(rig, lose):
         found.check()
         assert found.drop(1, 1) is not None
         assert found.states() == before
+    with contextlib.suppress(SessionError):
+        made.close()
+    if lose in {moved, without_log}:  # the file goes on elsewhere, or at its place, whole
+        alone = protocol.with_name("alone")
+        shutil.copy(session if session.exists() else session.with_name("elsewhere"), alone)
+        with Session.open(alone, readonly=True) as found:
+            assert found.states() == before
+    left = {path.name for path in session.parent.iterdir()}
+    assert not left & {"session-wal", "session-shm", "session.lock"}
     again = Controller("sim://")
     again.open_session(str(protocol), str(saved))
     again.fire(again.arm(2, 1))
@@ -101,6 +110,24 @@ def test_what_is_not_committed_yet_is_saved_too_and_once(rig):
         made.session.require_presence()
     assert "but for" not in caught.value.message
     with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
+        assert [chunk.data for chunk in found.byte_log()].count(b"once") == 1
+
+
+def test_where_its_folder_is_gone_too_all_is_saved_in_the_state_folder(rig, tmp_path, monkeypatch):
+    made, _, session = rig
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    lost = tmp_path / "lost"
+    made.close()
+    lost.mkdir()
+    shutil.move(session, lost)
+    with Session.open(lost / "session") as opened:
+        opened.log_bytes("rx", 7, b"once")
+        shutil.rmtree(lost)
+        with pytest.raises(SessionError, match=r"state/chainrig/session\.saved-1"):
+            opened.commit()
+        assert opened.rescued
+    with Session.open(tmp_path / "state/chainrig/session.saved-1", readonly=True) as found:
+        assert found.drop(1, 1) is not None
         assert [chunk.data for chunk in found.byte_log()].count(b"once") == 1
 
 

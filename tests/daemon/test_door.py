@@ -1,0 +1,127 @@
+"""A daemon that no client finds any more, or whose session is gone, ends and loses nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+
+import pytest
+
+from bench.process_fixture import ProcessFixture
+from rig.errors import RigError
+from rig.session.store import Session
+from tests.daemon.at_work import working
+from tests.waiting import PATIENCE_S
+
+
+@pytest.fixture
+def state(tmp_path, monkeypatch):
+    """Name the folder for logs and for sessions without a place."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    return tmp_path / "chainrig"
+
+
+@pytest.fixture
+def processes(state):
+    with ProcessFixture(runs=1, seed=3) as made:
+        yield made
+
+
+def drop_once(processes):
+    """Have a drop recorded by a client that goes."""
+    client = processes.client()
+    client.take_control()
+    client.open_session(str(processes.protocol), str(processes.session))
+    for attempt in range(1, 100):
+        try:
+            client.fire(client.arm(1, attempt))
+        except Exception:  # a starved board has disarmed itself
+            client.stop("again")
+        else:
+            break
+    client.collect(1, attempt)
+    client.close()
+    return attempt
+
+
+def ended(processes, code):
+    _, told = processes.daemon.communicate(timeout=PATIENCE_S)
+    assert processes.daemon.returncode == code, told
+    assert "Traceback" not in told
+    return told
+
+
+def delete(place):
+    shutil.rmtree(place.parent)
+
+
+def move(place):
+    place.parent.rename(place.parent.with_name("elsewhere"))
+
+
+def replace(place):
+    place.unlink()
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(place))
+
+
+@pytest.mark.parametrize("lose", [delete, move, replace])
+@pytest.mark.parametrize("option", [(), ("--idle-timeout", "300"), ("--tcp",)], ids=" ".join)
+def test_without_its_socket_it_ends(processes, state, lose, option):
+    processes.start_daemon(*option)
+    place = processes.socket.with_suffix(".tcp" if option == ("--tcp",) else ".sock")
+    lose(place)
+    assert "was deleted, moved or replaced" in ended(processes, 2)
+    assert "was deleted, moved or replaced" in (state / "daemon.log").read_text("utf-8")
+    assert place.exists() == (lose is replace), "another daemon's is not taken away"
+
+
+def test_it_stays_for_the_clients_that_it_has(processes):
+    processes.start_daemon()
+    client = processes.client()
+    delete(processes.socket)
+    lease = client.call("subscribe")["state"]["daemon"]
+    assert client.call("renew") == {"disk_s": 0.0}
+    assert lease["pid"] == processes.daemon.pid
+    client.close()
+    ended(processes, 2)
+
+
+def test_where_all_was_deleted_under_it_it_saves_what_it_has_and_ends(processes, state):
+    processes.start_daemon("--idle-timeout", "300")
+    attempt = drop_once(processes)
+    for path in processes.folder.glob("session*"):
+        path.unlink()
+    elsewhere = processes.folder.rename(processes.folder.with_name(f"gone-{os.getpid()}"))
+    try:
+        told = ended(processes, 2)
+    finally:
+        elsewhere.rename(processes.folder)
+    saved = state / "session.saved-1"
+    assert f"everything is saved as {saved}" in told
+    assert f"everything is saved as {saved}" in (state / "daemon.log").read_text("utf-8")
+    with Session.open(saved, readonly=True) as session:
+        assert session.drop(1, attempt) is not None
+
+
+def test_a_session_that_is_gone_and_saved_keeps_no_daemon(processes):
+    processes.start_daemon("--idle-timeout", "0.4")
+    drop_once(processes)
+    processes.session.unlink()
+    assert "no client for 0.4 s" in ended(processes, 0)
+    with Session.open(processes.folder / "session.saved-1", readonly=True) as session:
+        assert len(list(session.drops())) == 1
+
+
+@pytest.mark.parametrize("length", [250, 300])
+@pytest.mark.parametrize("which", ["session", "protocol"])
+def test_a_name_that_no_disk_takes_is_refused_with_its_place(processes, caplog, length, which):
+    with working(processes) as (_, ask):
+        names = {"protocol": str(processes.protocol), "session": str(processes.session)}
+        names[which] = str(processes.folder / (length * "x"))
+        with pytest.raises(RigError) as caught:
+            ask(lambda controller: controller.open_session(**names))
+    assert caught.value.exit_code == 2
+    assert names[which][:50] in str(caught.value)
+    assert not [record for record in caplog.records if record.exc_info]
