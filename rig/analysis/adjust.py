@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.equations import (
-    NormalEquations,
-    normal_equations,
-    scaled,
-    with_kept_slopes,
-)
+from rig.analysis.equations import Linearization, linearize, scaled, with_kept_slopes
+from rig.analysis.square_root import Root, Rows, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -34,11 +30,20 @@ DONE = 1e-3
 PATIENT = 6
 """Steps after which one back is no part of finding the way: an edge at the very moment of an impact
 has a slope on either side, and steps go to and fro over the best place, which lies between them."""
-_AGAIN = 0.5  # of the last step, taken back by the next one
 _KEPT = 0.1  # of the step before, beyond which a step with its slopes is none
+_DAMPED = 1e-3  # λ of Levenberg and Marquardt with which shorter steps begin
+_FAINT = 1e-12  # λ that does nothing in a double's digits
+_FASTER = 10.0  # by which λ grows with each step taken back
+_SLOWER = 3.0  # and shrinks with each other one
+_FORGOTTEN = 0.5  # of a column's length, with each step: by these lengths steps are measured
+_GAIN = 0.25  # of what the slopes promise, which a step has to bring
+_TRIED = 0.01  # of a step, after which its bend is looked at
+_BENT = 0.75  # of a step's length: what bends more is shortened
+_UNSEEN = 1.0  # standard uncertainties: where a longer step leads is looked at
 _NEAR_BY = 10.0  # standard uncertainties: so long a step slopes of an adjustment before allow
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 _MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
+_NO_ROOT = Root(np.zeros((0, 0)), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -49,18 +54,16 @@ class Estimate:
     ----------
     x, sd
         Best estimates (deviations from nominal) and prior uncertainties, shape ``(unknowns,)``.
-    information
-        Normal matrix in units of the prior uncertainties, prior included.
-    data
-        The part of it that comes from edges.
+    root
+        R of the information RᵀR in units of the prior uncertainties, prior included.
     chi2, edges
         Weighted sum of squares of the edges, and their number.
     scatter
         How much more the edges scatter than assumed; at least 1, and already allowed for.
     settled
         Whether the steps came to an end.
-    plain
-        JᵀWJ and JᵀWr in the unknowns' own units; nothing where no edges were adjusted.
+    rows
+        What the edges leave over, and its slopes, of each side.
     near
         With the slopes of all edges: what an adjustment of the same edges that begins here may
         begin with. Nothing where they scatter more than assumed.
@@ -68,28 +71,37 @@ class Estimate:
 
     x: Array
     sd: Array
-    information: Array
-    data: Array
+    root: Array
     chi2: float
     edges: int
     scatter: float
     settled: bool = True
-    plain: tuple[Array, Array] | None = None
-    near: NormalEquations | None = field(default=None, repr=False)
+    rows: Mapping[str, Rows] = field(default_factory=dict, repr=False)
+    near: Linearization | None = field(default=None, repr=False)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """R⁻¹."""
+        return np.linalg.inv(self.root).astype(float, copy=False)
 
     @cached_property
     def covariance(self) -> Array:
-        """Inverse of the normal matrix."""
-        return np.linalg.inv(self.information).astype(float, copy=False)
+        """R⁻¹R⁻ᵀ, in units of the prior uncertainties."""
+        return self.inverse @ self.inverse.T
 
     def beyond(self, x: Array) -> float:
         """How far this is from other unknowns, see `length`."""
-        return length(scaled(self.x - x, self.sd), self.information)
+        return length(scaled(self.x - x, self.sd), self.root)
 
     @cached_property
     def degrees(self) -> float:
         """Degrees of freedom: edges less the unknowns that they determine."""
-        return self.edges - self.x.size + float(np.trace(self.covariance))
+        return self.edges - self.x.size + float(np.sum(self.inverse**2))
+
+    def kept(self) -> Estimate:
+        """Return the same in little memory."""
+        rows = {role: one.triangle() for role, one in self.rows.items()}
+        return replace(self, rows=rows, near=None)
 
 
 def adjust(
@@ -99,7 +111,7 @@ def adjust(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
-    near: NormalEquations | None = None,
+    near: Linearization | None = None,
     *,
     rough: bool = False,
 ) -> Estimate:
@@ -120,39 +132,43 @@ def adjust(
     steps
         How many there are at most.
     near
-        Equations of the same edges about a point near by, see `Estimate`.
+        Of the same edges about a point near by, see `Estimate`.
     rough
         Whether only the way matters, and edges are weighed as they were.
     """
+
+    def about(at: Array, inflation: float) -> Linearization:
+        return linearize(model, matches, at, inflation)
+
+    def again(at: Array, inflation: float, near: Linearization) -> Linearization:
+        return with_kept_slopes(model, matches, at, inflation, near, rough=rough)
+
     sd = model.unknowns.sd
-
-    def equations(at: Array, inflation: float) -> NormalEquations:
-        return normal_equations(model, matches, at, sd, inflation)
-
-    def again(at: Array, inflation: float, near: NormalEquations) -> NormalEquations:
-        return with_kept_slopes(model, matches, at, sd, inflation, near, rough=rough)
-
-    return least_squares(equations, sd, x, centre, done, steps, again, near, rough=rough)
+    return least_squares(about, sd, x, centre, done, steps, again, near, rough=rough)
 
 
+@np.errstate(all="ignore")  # a step may lead to where there is no number, and is taken back
 def least_squares(
-    equations: Callable[[Array, float], NormalEquations],
+    linearize: Callable[[Array, float], Linearization],
     sd: Array,
     x: Array,
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
-    again: Callable[[Array, float, NormalEquations], NormalEquations] | None = None,
-    near: NormalEquations | None = None,
+    again: Callable[[Array, float, Linearization], Linearization] | None = None,
+    near: Linearization | None = None,
     *,
     rough: bool = False,
 ) -> Estimate:
     """Find the unknowns that fit any observations best, given what is known of them beforehand.
 
+    Steps of Gauss and Newton. One that leads where the observations fit worse, or to no number, is
+    taken back, and shorter ones are tried (Levenberg and Marquardt).
+
     Parameters
     ----------
-    equations
-        Normal equations about a point, if the observations scatter so many times as assumed.
+    linearize
+        Observations about a point, if they scatter so many times as assumed.
     sd
         Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
     x, centre, done, steps, near, rough
@@ -160,95 +176,239 @@ def least_squares(
     again
         The same about a point near by, with the slopes that they had before: much quicker, and as
         good while steps get shorter and shorter.
+
+    Returns
+    -------
+    Estimate
+        Always of finite numbers; where no further step could be taken it is not settled.
     """
     y = scaled(x, sd)
     prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
-    information = identity = np.eye(x.size)
-    found: NormalEquations | None = None
-    chi2, moved, most = 0.0, 0.0, 0.0
-    inflation = damping = 1.0
-    settled, kept, ahead = False, False, np.zeros_like(y)
-    if near is not None:
-        found, kept, most = near.in_units(sd), True, _NEAR_BY
-        information = found.matrix + identity
+    search = _Search(linearize, again, sd, prior)
+    here: _Point | None = None
+    kept, most, limit = near, _NEAR_BY, math.inf
+    share, damping, moved = 1.0, 0.0, 0.0
+    settled, ahead = False, np.zeros_like(y)
     for step in range(steps):
-        if kept and again is not None and found is not None:
-            found = again(y * sd, inflation, found)
-        else:
-            kept, found = False, equations(y * sd, inflation)
-        information = found.matrix + identity
-        turned = ahead
-        ahead = np.linalg.solve(information, prior - y - found.vector).astype(np.float64)
-        size = length(ahead, information)
-        if kept and size > most:
-            kept, ahead = False, turned  # slopes are others here: once more with these
+        point = search.rooted(search.look(y, kept), here, limit)
+        if kept is not None and not point.size <= most:
+            kept = None  # slopes are others here: once more with these
             continue
+        if not math.isfinite(point.size):
+            if here is None:
+                break
+            kept, share = None, 1.0
+            if here.kept:  # slopes of another point led here
+                y, limit = here.y, math.inf
+            else:
+                damping = damping * _FASTER or _DAMPED
+                y, limit = search.onward(here, damping)
+            continue
+        before, here = here, point
+        turned, damping = ahead, damping / _SLOWER if damping > _FAINT else 0.0
+        y, _ = search.onward(here, damping)
+        ahead = y - here.y
         # Steps to and fro that get shorter end by themselves, and sooner.
-        if step > PATIENT:
-            taken_back = -(ahead @ information @ turned)
-            if taken_back > _AGAIN * length(turned, information) ** 2:
-                damping *= 0.5
-        y = y + damping * ahead
-        last, moved = moved, damping * size
+        if step > PATIENT and not damping and here.root.turns_back(ahead, turned):
+            share *= 0.5
+        y = here.y + share * ahead
+        limit = search.limit(here, share * ahead)
+        last, moved = moved, share * here.size
         most = _KEPT * moved
-        previous, chi2 = chi2, found.chi2
-        short = moved < done or (damping == 1.0 and moved**2 < done * last)
+        whole = share == 1.0 and not damping
+        short = moved < done or (whole and moved**2 < done * last)
         # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
         # Unknowns take away less than their number: a chi2 so small needs no closer look.
-        calm = chi2 <= found.size - x.size
-        steady = step and abs(chi2 - previous) <= _STEADY * max(chi2, 1.0)
-        kept = damping == 1.0 and (rough or calm or bool(steady))
-        if not (short if rough else calm or steady):
+        seen = here.seen
+        previous = 0.0 if before is None else before.seen.chi2
+        calm = seen.chi2 <= seen.size - x.size or (
+            bool(step) and abs(seen.chi2 - previous) <= _STEADY * max(seen.chi2, 1.0)
+        )
+        kept = seen if whole and again is not None and (rough or calm) else None
+        if not (short if rough else calm):
             continue
-        factor = _scatter(found, information)
-        if factor >= _MORE:
-            inflation *= factor  # the edges scatter more than assumed: weigh them so
-            kept = False
-        if short and (rough or factor < _MORE):
+        factor = search.scatter(here)
+        if short and (rough or factor == 1.0):
             settled = True
+            search.inflation *= factor
             break
-    if found is None:
-        return Estimate(y * sd, sd, information, identity, chi2, 0, inflation, settled)
-    plain = found.plain
-    if plain is not None:
-        # As it is after the last step.
-        plain = plain[0], plain[1] + plain[0] @ (damping * ahead * sd)
-    return Estimate(
-        y * sd,
-        sd,
-        information,
-        found.matrix,
-        chi2,
-        found.size,
-        inflation,
-        settled,
-        plain,
-        found if inflation == 1.0 else None,
+        if factor != 1.0 and here.size <= factor:
+            # They scatter more or less than assumed: weigh them so, once more from here.
+            search.weigh(factor)
+            y, kept, limit, ahead, moved = here.y, None, math.inf, turned, 0.0
+    return (
+        search.estimate(here, y, limit, settled=settled)
+        if here
+        else Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
     )
 
 
-def _scatter(found: NormalEquations, information: Array) -> float:
-    """How many times as much as assumed observations scatter; 1 where that is near enough."""
-    free = found.size - len(information)
-    # No unknown is left open by less than if all others were known.
-    least = free + float(np.sum(1.0 / np.diag(information)))
-    if found.chi2 < _MORE**2 * max(least, 1.0):
-        return 1.0
-    degrees = found.size - float(np.trace(np.linalg.solve(information, found.matrix)))
-    return math.sqrt(max(1.0, found.chi2 / max(degrees, 1.0)))
+class _Point(NamedTuple):
+    """Where a search is.
+
+    Attributes
+    ----------
+    y, seen
+        Unknowns in units of their prior uncertainties, and what was linearized there.
+    loss
+        What a step has to make less, priors included.
+    kept
+        Whether the slopes are those of a point before.
+    root, size
+        Of the information, and how long the step of Gauss and Newton is; no number where there is
+        no such step.
+    """
+
+    y: Array
+    seen: Linearization
+    loss: float
+    kept: bool
+    root: Root
+    size: float = math.nan
 
 
-def length(step: Array, information: Array) -> float:
-    """√(dᵀAd): no function of the unknowns moves by more of its own standard uncertainties.
+class _Search:
+    """Observations and priors, and how to go on from a point.
+
+    Parameters
+    ----------
+    linearize, again, sd
+        As in `least_squares`.
+    prior
+        Prior means of the unknowns, in units of `sd`.
+    """
+
+    def __init__(
+        self,
+        linearize: Callable[[Array, float], Linearization],
+        again: Callable[[Array, float, Linearization], Linearization] | None,
+        sd: Array,
+        prior: Array,
+    ) -> None:
+        self._linearize, self._again, self._sd, self._prior = linearize, again, sd, prior
+        self.inflation = 1.0
+        self._steepest = np.zeros_like(sd)  # lengths of the root's columns, the largest lately
+
+    def look(self, y: Array, kept: Linearization | None = None) -> _Point:
+        """Look what observations say about a point, with the slopes of another one if kept."""
+        if kept is None or self._again is None:
+            seen = self._linearize(y * self._sd, self.inflation)
+        else:
+            seen = self._again(y * self._sd, self.inflation, kept)
+        off = y - self._prior
+        return _Point(y, seen, seen.loss + float(off @ off), kept is not None, _NO_ROOT)
+
+    def rooted(self, point: _Point, before: _Point | None, limit: float) -> _Point:
+        """Reduce observations and priors where the loss is within a limit.
+
+        With the same slopes as before the same root does.
+        """
+        if not point.loss <= limit:
+            return point
+        rows, pull = point.seen.rows, point.y - self._prior
+        if before is not None and all(
+            one.slopes is before.seen.rows[role].slopes for role, one in rows.items()
+        ):
+            gradient = pull.copy()
+            for one in rows.values():
+                gradient[one.columns] += self._sd[one.columns] * (one.left @ one.slopes)
+            root = before.root.with_gradient(gradient)
+        else:
+            root = square_root([*rows.values()], self._sd, pull)
+        return point._replace(root=root, size=float(np.linalg.norm(root.left)))
+
+    def onward(self, here: _Point, damping: float) -> tuple[Array, float]:
+        """Return where a step leads, and what the loss may be there."""
+        lengths = np.linalg.norm(here.root.matrix, axis=0)
+        self._steepest = np.maximum(_FORGOTTEN * self._steepest, lengths)
+        step = self._bent(here, damping) if damping else here.root.step()
+        return here.y + step, self.limit(here, step)
+
+    def _bent(self, here: _Point, damping: float) -> Array:
+        """Step along a curve, by the second derivative along it (Transtrum and Sethna 2012)."""
+        root = here.root.damped(damping, self._steepest)
+        straight = root.step()
+        there, gradient = self.look(here.y + _TRIED * straight).seen, np.zeros_like(here.y)
+        for role, rows in here.seen.rows.items():
+            turn = there.rows[role].slopes - rows.slopes
+            turned = turn @ (straight * self._sd)[rows.columns]
+            gradient[rows.columns] += self._sd[rows.columns] * (turned @ rows.slopes)
+        bend = root.pulled(0.5 / _TRIED * gradient)
+        long = np.linalg.norm(self._steepest * straight)
+        short = 2.0 * np.linalg.norm(self._steepest * bend) <= _BENT * long
+        return straight + bend if short else straight * math.nan
+
+    def limit(self, here: _Point, step: Array) -> float:
+        """What the loss may be after a step: mostly it has to become less, see `_GAIN`.
+
+        A step to and fro about the best place may make it a little more, for slopes are not quite
+        its.
+        """
+        left, usual = here.root.left + here.root.matrix @ step, _usual(here.seen)
+        if here.size**2 < usual:
+            return here.loss + usual
+        return here.loss - _GAIN * (here.size**2 - float(left @ left))
+
+    def scatter(self, here: _Point) -> float:
+        """How many times as much as thought observations scatter; 1 where that is near enough.
+
+        They never scatter less than stated.
+        """
+        seen, root = here.seen, here.root.matrix
+        free = seen.size - len(root)
+        # No unknown is left open by less than if all others were known.
+        least = free + float(np.sum(1.0 / np.sum(root**2, axis=0)))
+        if self.inflation == 1.0 and seen.chi2 < _MORE**2 * max(least, 1.0):
+            return 1.0
+        degrees = free + float(np.sum(np.linalg.inv(root) ** 2))
+        factor = max(math.sqrt(seen.chi2 / max(degrees, 1.0)), 1.0 / self.inflation)
+        return 1.0 if 1.0 / _MORE < factor < _MORE else factor
+
+    def weigh(self, factor: float) -> None:
+        """Weigh observations as if they scattered so many times as before."""
+        self.inflation *= factor
+        self._steepest = self._steepest / factor
+
+    def estimate(self, here: _Point, y: Array, limit: float, *, settled: bool) -> Estimate:
+        """Sum up a search that was last at a point, and has another one in mind.
+
+        That one is looked at where it is far, or was not reached from a better one.
+        """
+        far = length(y - here.y, here.root.matrix)
+        if not far <= _UNSEEN:
+            kept = here.seen if self._again is not None and here.seen.weights else None
+            if not self.look(y, kept).loss <= limit:
+                y, settled = here.y, False
+        moved = (y - here.y) * self._sd
+        return Estimate(
+            y * self._sd,
+            self._sd,
+            here.root.matrix,
+            here.seen.chi2,
+            here.seen.size,
+            self.inflation,
+            settled,
+            {role: rows.after(moved) for role, rows in here.seen.rows.items()},
+            here.seen if self.inflation == 1.0 else None,
+        )
+
+
+def _usual(seen: Linearization) -> float:
+    """What an observation adds to χ²: 1, or more where they scatter more than assumed."""
+    return max(1.0, seen.chi2 / max(1, seen.size))
+
+
+def length(step: Array, root: Array) -> float:
+    """|R·d|: no function of the unknowns moves by more of its own standard uncertainties.
 
     Parameters
     ----------
     step
         Of the unknowns, in units of their prior uncertainties.
-    information
+    root
         As in `Estimate`.
     """
-    return math.sqrt(max(0.0, float(step @ information @ step)))
+    return float(np.linalg.norm(root @ step))
 
 
 def uncertainty(
@@ -256,8 +416,8 @@ def uncertainty(
 ) -> tuple[float, dict[str, float]]:
     """Standard uncertainty of a function of the unknowns, and what each source adds to it.
 
-    With A = JᵀJ + 1 in prior units, A⁻¹ = A⁻¹JᵀJA⁻¹ + Σ A⁻¹PA⁻¹, P picking one group: the squares
-    of the parts add up to the square of the whole.
+    With A = JᵀJ + 1 = RᵀR in prior units, A⁻¹ = A⁻¹JᵀJA⁻¹ + Σ A⁻¹PA⁻¹, P picking one group: the
+    squares of the parts add up to the square of the whole.
 
     Parameters
     ----------
@@ -266,13 +426,15 @@ def uncertainty(
     groups
         Lines of the budget.
     """
-    inverse = estimate.covariance @ (gradient * estimate.sd)
-    whole = math.sqrt(max(0.0, float(gradient * estimate.sd @ inverse)))
+    by_root = (gradient * estimate.sd) @ estimate.inverse
+    whole = math.sqrt(float(by_root @ by_root))
+    inverse = estimate.inverse @ by_root
     squares = (inverse * inverse).tolist()  # of blocks so short, Python's own sums are quicker
     parts = {
         name: math.sqrt(sum(sum(squares[block]) for block in blocks))
         for name, blocks in groups.items()
     }
-    edges = math.sqrt(max(0.0, float(inverse @ estimate.data @ inverse)))
+    # What no prior explains comes from the edges; rounding may leave less than nothing.
+    edges = math.sqrt(max(0.0, float(by_root @ by_root) - sum(squares)))
     parts["edges"] = math.hypot(edges, parts.get("edges", 0.0))
     return whole, {name: part for name, part in parts.items() if part > 0.0}

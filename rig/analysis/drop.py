@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
+
+_NO_FIT = "the fit did not converge: no fall in this scene fits these edges"
 
 
 def analyze_drop(
@@ -135,6 +138,8 @@ def _fitted(
     unmatched = unmatched_edges(fit)
     audit = blank.count(fit.matched, count_unexplained(unmatched))
     found = quantities(fit.model, fit.estimate)
+    if not all(math.isfinite(one.value) and math.isfinite(one.u) for one in found.values()):
+        return DropResult(run, drop.attempt, "void", (_NO_FIT,), blank), None
     alone = last_passages(fit)
     end = judge(protocol, run, drop, (), audit, found, fit, alone, unmatched)
     verdict, reasons = end.verdict, end.reasons

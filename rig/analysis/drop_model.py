@@ -268,6 +268,8 @@ class DropModel:
             start += float(x[at["side"]][0])
         gravity = self.protocol.gravity.value + float(x[at["gravity"]][0])
         kappa, record = self.kappa(x), self.records[role]
+        if not gravity > 0.0:
+            gravity = math.nan  # nothing falls: no number, so that no fit ends there
         if role == "free":
             return free_trajectory(release, start, gravity, kappa, record.air)
         assert record.ratios is not None

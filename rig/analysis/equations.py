@@ -1,4 +1,4 @@
-"""One chain's observation equations, the edges they are made of, and a drop's normal equations."""
+"""One chain's observation equations, the edges they are made of, and a drop's linearization."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.square_root import Rows
 from rig.analysis.swing import drawn, lever
 
 if TYPE_CHECKING:
@@ -241,187 +242,135 @@ def scaled(x: Array, sd: Array) -> Array:
     return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
 
 
-class KeptSlopes(NamedTuple):
-    """The slopes that normal equations were made of.
+class Weights(NamedTuple):
+    """How much each edge of a side counts, shape ``(edges,)`` each.
 
     Attributes
     ----------
-    slopes
-        √W J/σ of one side, shape ``(edges, columns)``.
-    columns
-        Which unknowns its columns are.
-    weights, scale
-        √W and √W/σ of each edge.
+    root
+        √W.
+    scale
+        √W/σ.
     """
 
-    slopes: Array
-    columns: Index
-    weights: Array
+    root: Array
     scale: Array
-
-    def weighing(self, edges: Index, weights: Array, scale: Array) -> KeptSlopes:
-        """Return the same with other weights of some edges."""
-        new = KeptSlopes(self.slopes.copy(), self.columns, self.weights.copy(), self.scale.copy())
-        new.slopes[edges] *= (scale[edges] / self.scale[edges])[:, None]
-        new.weights[edges], new.scale[edges] = weights[edges], scale[edges]
-        return new
-
-    def placed(self, rows: Sequence[int], places: Sequence[int]) -> KeptSlopes:
-        """Return the same of a vector that has each of the unknowns `rows` at `places`."""
-        position = np.full(max(rows) + 1, -1)
-        position[self.columns] = np.arange(self.columns.size)
-        mine = position[np.array(rows)]
-        found = mine >= 0
-        columns = np.array(places)[found]
-        return self._replace(slopes=self.slopes[:, mine[found]], columns=columns)
 
 
 @dataclass(frozen=True, slots=True)
-class NormalEquations:
-    """½‖r/σ‖² about a point, to second order.
+class Linearization:
+    """Observations about a point, to first order, in standard deviations.
 
     Attributes
     ----------
-    matrix
-        JᵀWJ in units of the prior uncertainties, shape ``(unknowns, unknowns)``.
-    vector
-        JᵀWr likewise, shape ``(unknowns,)``.
+    rows
+        What they leave over and their slopes, in the unknowns' own units; one block a side.
     chi2, size
-        Weighted sum of squares, and number of edges.
-    plain
-        Matrix and vector in the unknowns' own units, where they were set up from edges.
-    slopes
-        Then also those of each side.
+        Weighted sum of squares, and number of observations.
+    loss
+        Sum of Huber's losses, twice: what a step has to make less.
+    weights
+        Of each side, where they were set up from edges.
     """
 
-    matrix: Array
-    vector: Array
+    rows: Mapping[str, Rows]
     chi2: float
     size: int
-    plain: tuple[Array, Array] | None = None
-    slopes: Mapping[str, KeptSlopes] = field(default_factory=dict)
-
-    def in_units(self, sd: Array) -> NormalEquations:
-        """Return the same where other priors are the units."""
-        assert self.plain is not None
-        matrix, vector = self.plain
-        return replace(self, matrix=matrix * np.outer(sd, sd), vector=vector * sd)
+    loss: float
+    weights: Mapping[str, Weights] = field(default_factory=dict)
 
 
-def plain_equations(residuals: Array, slopes: Array, sd: Array) -> NormalEquations:
-    """Set up the normal equations of observations that are all good.
+def plain_equations(residuals: Array, slopes: Array) -> Linearization:
+    """Set up observations that are all good.
 
     Parameters
     ----------
     residuals, slopes
         In standard deviations of each, shapes ``(observations,)`` and ``(observations, unknowns)``.
-    sd
-        As in `normal_equations`.
     """
-    scaled_slopes = slopes * sd
-    return NormalEquations(
-        scaled_slopes.T @ scaled_slopes,
-        scaled_slopes.T @ residuals,
-        float(residuals @ residuals),
-        residuals.size,
-    )
+    chi2 = float(residuals @ residuals)
+    rows = Rows(slopes, residuals, np.arange(slopes.shape[1]))
+    return Linearization({"": rows}, chi2, residuals.size, chi2)
 
 
-def normal_equations(
-    model: DropModel,
-    matches: Matches,
-    x: Array,
-    sd: Array,
-    inflation: float = 1.0,
-    cut: float = math.inf,
-) -> NormalEquations:
-    """Set up the normal equations; residuals beyond 4 σ weigh less (Huber).
+def linearize(
+    model: DropModel, matches: Matches, x: Array, inflation: float = 1.0, cut: float = math.inf
+) -> Linearization:
+    """Linearize the matched edges about a point; residuals beyond 4 σ weigh less (Huber).
 
-    A side knows nothing of the other's unknowns: only its own are multiplied.
+    A side knows nothing of the other's unknowns.
 
     Parameters
     ----------
-    sd
-        Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
     inflation
         How much more the edges scatter than the model assumes.
     cut
         Standard deviations beyond which an edge does not count.
     """
-    matrix, vector = np.zeros((x.size, x.size)), np.zeros(x.size)
-    chi2, size = 0.0, 0
-    kept: dict[str, KeptSlopes] = {}
+    rows: dict[str, Rows] = {}
+    weights: dict[str, Weights] = {}
+    chi2, loss, size = 0.0, 0.0, 0
     for role, match in matches.items():
         left, _, slopes, columns, _ = model.equations(role, x, match)
-        residuals, weights, scale = _weighed(left, inflation, cut)
-        slopes *= scale[:, None]  # in place: nobody else has them
-        kept[role] = KeptSlopes(slopes, columns, weights, scale)
-        matrix[np.ix_(columns, columns)] += slopes.T @ slopes
-        vector[columns] += slopes.T @ residuals
-        chi2 += float(residuals @ residuals)
+        residuals, weight = _weighed(left, inflation, cut)
+        slopes *= weight.scale[:, None]  # in place: nobody else has them
+        rows[role], weights[role] = Rows(slopes, residuals, columns), weight
+        chi2, loss = _added(chi2, loss, residuals, weight)
         size += residuals.size
-    # A column's unit is applied to few numbers instead of to each edge.
-    return NormalEquations(
-        matrix * np.outer(sd, sd), vector * sd, chi2, size, (matrix, vector), kept
-    )
+    return Linearization(rows, chi2, size, loss, weights)
 
 
 def with_kept_slopes(
     model: DropModel,
     matches: Matches,
     x: Array,
-    sd: Array,
     inflation: float,
-    near: NormalEquations,
+    near: Linearization,
     *,
     rough: bool = False,
-) -> NormalEquations:
-    """Set up the normal equations about a point that is near another one, with its slopes.
+) -> Linearization:
+    """Linearize about a point that is near another one, with its slopes.
 
     That takes a quarter of the time: what is left over of each edge is new, where it leads is not.
 
     Parameters
     ----------
     near
-        Those about the other point; the rest as in `normal_equations`.
+        About the other point; the rest as in `linearize`.
     rough
         Whether edges may count as they did there.
     """
-    assert near.plain is not None
-    matrix, vector, chi2 = near.plain[0], np.zeros(x.size), 0.0
-    kept = dict(near.slopes)
+    rows, weights = dict(near.rows), dict(near.weights)
+    chi2, loss = 0.0, 0.0
     for role, match in matches.items():
-        left, old = model.left_over(role, x, match), near.slopes[role]
-        residuals, weights, scale = _weighed(left, inflation)
-        other = np.flatnonzero(np.abs(weights - old.weights) > _ALIKE)
+        left, old, before = model.left_over(role, x, match), near.rows[role], near.weights[role]
+        residuals, weight = _weighed(left, inflation)
+        scale = before.scale
+        other = np.flatnonzero(np.abs(weight.root - before.root) > _ALIKE)
         if other.size and not rough:
             # Few edges count otherwise than there.
-            kept[role] = new = old.weighing(other, weights, scale)
-            place = np.ix_(old.columns, old.columns)
-            more, less = new.slopes[other], old.slopes[other]
-            matrix = matrix.copy()
-            matrix[place] += more.T @ more - less.T @ less
-            old = new
-        scale = old.scale if rough else scale**2 / old.scale
-        vector[old.columns] += (left.values * scale) @ old.slopes
-        chi2 += float(residuals @ residuals)
-    same = matrix is near.plain[0]
-    return replace(
-        near,
-        matrix=near.matrix if same else matrix * np.outer(sd, sd),
-        vector=vector * sd,
-        chi2=chi2,
-        plain=(matrix, vector),
-        slopes=kept,
-    )
+            slopes, scale, root = old.slopes.copy(), scale.copy(), before.root.copy()
+            slopes[other] *= (weight.scale[other] / scale[other])[:, None]
+            scale[other], root[other] = weight.scale[other], weight.root[other]
+            old, weights[role] = old._replace(slopes=slopes), Weights(root, scale)
+        # So that slopes times these are the gradient.
+        pull = left.values * (scale if rough else weight.scale**2 / scale)
+        rows[role] = old._replace(left=pull)
+        chi2, loss = _added(chi2, loss, residuals, weight)
+    return replace(near, rows=rows, weights=weights, chi2=chi2, loss=loss)
 
 
-def _weighed(
-    left: Residuals, inflation: float, cut: float = math.inf
-) -> tuple[Array, Array, Array]:
-    """Weigh residuals in standard deviations; then see `KeptSlopes`."""
+def _added(chi2: float, loss: float, residuals: Array, weight: Weights) -> tuple[float, float]:
+    """Add a side to the sum of squares and to that of losses, 2·4|r| − 4² beyond 4 σ."""
+    squares = residuals * residuals
+    own = float(squares.sum())
+    return chi2 + own, loss + own + float((squares - HUBER**2)[weight.root < 1.0].sum())
+
+
+def _weighed(left: Residuals, inflation: float, cut: float = math.inf) -> tuple[Array, Weights]:
+    """Weigh residuals in standard deviations."""
     sigma = left.sigma * inflation
     residuals = left.values / sigma
-    weights = np.sqrt(robust_weights(residuals, cut))
-    residuals *= weights
-    return residuals, weights, weights / sigma
+    root = np.sqrt(robust_weights(residuals, cut))
+    residuals *= root
+    return residuals, Weights(root, root / sigma)

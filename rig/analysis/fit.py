@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import NormalEquations
+    from rig.analysis.equations import Linearization
     from rig.analysis.pattern import Guess
 
     Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def settle(
     steps: int = STEPS,
     x: Array | None = None,
     done: float = CLOSE,
-    near: NormalEquations | None = None,
+    near: Linearization | None = None,
 ) -> Fit:
     """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
 
@@ -166,7 +166,7 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
     x, clock = begun.x.copy(), model.unknowns["clock"]
     x[clock] = (1.0 + x[clock]) * rate - 1.0
     estimate = adjust(model, begun.matches, x)
-    return Fit(model, begun.matches, replace(estimate, near=None))  # larger than all the rest
+    return Fit(model, begun.matches, estimate.kept())
 
 
 def first_match(model: DropModel) -> Matches:

@@ -39,7 +39,7 @@ def _largest(kappa: float | Array) -> float:
 def _rate(kappa: float | Array, gravity: float) -> float | Array:
     """√(|κ|g); of one κ a plain number, with which arrays are multiplied quicker."""
     if isinstance(kappa, float):
-        return math.sqrt(abs(kappa) * gravity)
+        return math.sqrt(abs(kappa) * gravity) if gravity > 0.0 else math.nan
     found: Array = np.sqrt(np.abs(kappa) * gravity)
     return found
 

@@ -18,7 +18,7 @@ import numpy as np
 from rig.analysis.adjust import least_squares
 from rig.analysis.components import stated
 from rig.analysis.drop_model import prior_air
-from rig.analysis.equations import NormalEquations, plain_equations
+from rig.analysis.equations import Linearization, plain_equations
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.free_flight import leg_slopes
 from rig.analysis.result import GOOD, Measured, normalized_error
@@ -166,22 +166,20 @@ def free_gravity(
     # Height, release and gravity are told by the edges alone.
     sd = np.concatenate([[ANYTHING, ANYTHING, ANY_GRAVITY, air_u], np.ones(common.shape[1])])
 
-    def equations(x: Array, inflation: float) -> NormalEquations:
+    def equations(x: Array, inflation: float) -> Linearization:
         at, release, g, kappa = point + x[:4]
         since = np.maximum(time - release, 0.0)
         fallen, end, _, by_gravity, by_kappa = leg_slopes(since, np.zeros_like(since), g, kappa)
         slopes = np.stack([-np.ones_like(time), -end, by_gravity, by_kappa], axis=1)
         off = height - at + fallen - common @ x[4:]
         weight = 1.0 / (sigma * inflation)
-        return plain_equations(
-            off * weight, np.column_stack([slopes, -common]) * weight[:, None], sd
-        )
+        return plain_equations(off * weight, np.column_stack([slopes, -common]) * weight[:, None])
 
     found = least_squares(equations, sd, np.zeros(sd.size))
     # How much edges scatter is seen where they are many; what is stated of it counts as one more.
     if found.scatter == 1.0:
-        degrees = found.edges - float(np.trace(found.covariance @ found.data))
-        sigma = sigma * math.sqrt((STATED_WEIGHT + found.chi2) / (STATED_WEIGHT + degrees))
+        scatter = (STATED_WEIGHT + found.chi2) / (STATED_WEIGHT + found.degrees)
+        sigma = sigma * math.sqrt(scatter)
         found = least_squares(equations, sd, found.x)
     value = float(point[2] + found.x[2])
     fitted = math.sqrt(found.covariance[2, 2]) * sd[2]

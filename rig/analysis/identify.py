@@ -17,7 +17,7 @@ import numpy as np
 
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel, prior_air
-from rig.analysis.equations import HUBER, KeptSlopes, NormalEquations, scaled
+from rig.analysis.equations import HUBER, Linearization, Weights, scaled
 from rig.analysis.fit import ROUGHLY, Fit, count_matched, first_match, settle
 from rig.analysis.pattern import (
     AIRS,
@@ -31,6 +31,7 @@ from rig.analysis.pattern import (
     slack_of,
 )
 from rig.analysis.pattern import guesses as votes
+from rig.analysis.square_root import Rows, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -391,7 +392,7 @@ def log_evidence(fit: Fit) -> float:
 
     A matched edge has the density of its time about the motion; a missed and an extra one what is
     known of such beforehand. The unknowns are integrated out by Laplace's method: −½‖y‖² −
-    ½ ln det A at the best estimate, with y and A in units of the prior uncertainties.
+    ln |det R| at the best estimate, with y and RᵀR in units of the prior uncertainties.
     """
     estimate, model = fit.estimate, fit.model
     total = 0.0
@@ -405,8 +406,8 @@ def log_evidence(fit: Fit) -> float:
         # Relative to a reading in which all edges are strays and every rod was missed.
         total += far.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS))
     y = scaled(estimate.x, estimate.sd)
-    _, volume = np.linalg.slogdet(estimate.information)
-    return total - 0.5 * float(y @ y) - 0.5 * float(volume) + held_back(fit)
+    _, volume = np.linalg.slogdet(estimate.root)
+    return total - 0.5 * float(y @ y) - float(volume) + held_back(fit)
 
 
 def held_back(fit: Fit) -> float:
@@ -416,7 +417,7 @@ def held_back(fit: Fit) -> float:
     if not estimate.sd[at]:
         return 0.0
     unit = np.eye(estimate.x.size)[at]
-    u = math.sqrt(float(np.linalg.solve(estimate.information, unit)[at])) * float(estimate.sd[at])
+    u = float(np.linalg.norm(np.linalg.solve(estimate.root.T, unit)) * estimate.sd[at])
     below = -model.kappa(estimate.x) / u
     if below < _TAIL:
         return math.log(math.erfc(below / math.sqrt(2.0)))
@@ -502,45 +503,45 @@ def _together(
     return Identification(fit, _shares(fit), odds, best.evidence, other)
 
 
-def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, NormalEquations | None]:
+def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, Linearization | None]:
     """Unknowns of both sides together, as far as each side has told them by itself.
 
     Each side's equations at its own estimate, one below the other: were they linear, this would be
     the solution of all. With them goes what an adjustment may begin with.
     """
-    at, size = model.unknowns, len(model.unknowns)
-    matrix, vector = np.zeros((size, size)), np.zeros(size)
-    slopes: dict[str, KeptSlopes] = {}
+    at = model.unknowns
+    rows: dict[str, Rows] = {}
+    weights: dict[str, Weights] = {}
     edges = 0
     for side in sides:
         (role,), own, estimate = side.fit.matches, side.fit.model.unknowns, side.fit.estimate
-        assert estimate.plain is not None
+        if role not in estimate.rows:
+            continue
         x = estimate.x.copy()
         for name in (f"{role} release", "alpha"):  # are counted from what was found
             if name in own:
                 x[own[name]] = 0.0
-        rows = [*range(len(own))]
-        places = [n for name in own.blocks for n in range(at[name].start, at[name].stop)]
+        slopes, left, columns = estimate.rows[role].after(-x)
+        places = np.array([n for name in own.blocks for n in range(at[name].start, at[name].stop)])
         if role == "free" and "side" in at:  # where a side begins is one number by itself
-            rows.append(own["drop"].start)
-            places.append(at["side"].start)
-        seen, left = estimate.plain
-        matrix[np.ix_(places, places)] += seen[np.ix_(rows, rows)]
-        vector[places] += (seen @ x - left)[rows]
+            slopes = np.column_stack([slopes, slopes[:, columns == own["drop"].start]])
+            places = np.append(places[columns], at["side"].start)
+        else:
+            places = places[columns]
+        rows[role] = Rows(slopes, left, places)
         edges += estimate.edges
         if estimate.near is not None:
-            slopes[role] = estimate.near.slopes[role].placed(rows, places)
-    sd = at.sd
-    told = matrix * np.outer(sd, sd) + np.eye(size)
-    x = np.asarray(sd * np.linalg.solve(told, sd * vector), dtype=np.float64)
-    if len(slopes) < len(sides):
+            weights |= estimate.near.weights
+    x = at.sd * square_root([*rows.values()], at.sd, np.zeros(len(at))).step()
+    if len(weights) < len(sides):
         return x, None
-    return x, NormalEquations(told, vector, 0.0, edges, (matrix, vector), slopes)
+    return x, Linearization(rows, 0.0, edges, 0.0, weights)
 
 
 def weighed(fit: Fit) -> Reading:
     """Weigh a fit of all sides."""
-    return Reading(fit, log_evidence(fit) + _simultaneous(fit.model.protocol, _begins(fit)))
+    evidence = log_evidence(fit) + _simultaneous(fit.model.protocol, _begins(fit))
+    return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
 
 
 def _begins(fit: Fit) -> list[Guess]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from rig.analysis.components import stated
 from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
-from rig.analysis.joint_step import DropState, joint_step
+from rig.analysis.joint_step import DropState, joint_step, take
 from rig.analysis.unknowns import SharedUnknowns
 from rig.threads import one_thread
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.components import Components
+    from rig.analysis.equations import Residuals
     from rig.analysis.fit import Fit
 
     Array = NDArray[np.float64]
@@ -42,6 +44,7 @@ IDENTIFIED = 0.5
 _ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
 _DONE = 0.02  # of a standard uncertainty
+_SHORTEST = 1e-6  # share of a step, less of which is none
 _STEADY = 0.02  # relative change of the components
 _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
 """Where others of their kind count for more."""
@@ -58,7 +61,7 @@ class JointDrop(Matched):
     own, common, here
         Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
     inverse, gain
-        As in `rig.analysis.joint_step.Reduced`.
+        As in `rig.analysis.square_root.Eliminated`.
     """
 
     x: Array
@@ -69,7 +72,7 @@ class JointDrop(Matched):
     gain: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class JointFit:
     """What the drops of a session say together.
 
@@ -77,25 +80,30 @@ class JointFit:
     ----------
     shared
         Names of the common unknowns.
-    x, sd, covariance
-        Estimates (deviations from the protocol), prior standard uncertainties, and covariance in
-        units of these.
+    x, sd, inverse
+        Estimates (deviations from the protocol), prior standard uncertainties, and R⁻¹ of the
+        information RᵀR in units of these.
     components, degrees
         How much everything scatters, and how many degrees of freedom each of these numbers has.
     drops
         In the order given.
     settled
-        Whether the steps came to an end.
+        Whether the steps came to an end; if not, there may be no drops.
     """
 
     shared: SharedUnknowns
     x: Array
     sd: Array
-    covariance: Array
+    inverse: Array
     components: Components
     degrees: Mapping[str, float]
     drops: tuple[JointDrop, ...]
     settled: bool
+
+    @cached_property
+    def covariance(self) -> Array:
+        """R⁻¹R⁻ᵀ: covariance of the common unknowns in units of `sd`."""
+        return self.inverse @ self.inverse.T
 
     def json(self) -> dict[str, Any]:
         """``learned`` of `rig analyze --json`.
@@ -153,6 +161,7 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
     beforehand = stated(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, damping, previous = False, 0.0, 1.0, np.zeros(len(shared))
+    inverse, before = np.eye(len(shared)), evidence.components
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
         for drop in drops:
@@ -163,16 +172,21 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
                 drop.matches = match(drop.model, drop.x)
             sd[drop.here] = drop.model.unknowns.sd[drop.common]
         # At first the common unknowns are not yet what a drop's own go with: all may be far off.
-        cut = STRAY if round_ else math.inf
-        covariance, step = joint_step(drops, x, sd, cut=cut, damping=damping)
-        x = x + damping * step * sd
-        ahead = step / np.sqrt(np.diag(covariance))
+        root = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
+        step = root.step()
+        moves = _move(drops, x, sd, step, damping) if np.isfinite(step).all() else None
+        if moves is None:
+            return JointFit(shared, x, sd, inverse, before, evidence.degrees, (), settled=False)
+        x, left, damping = moves
+        inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
+        variance = np.sum(inverse**2, axis=1)
+        ahead = step / np.sqrt(variance)
         last, moved = moved, damping * float(np.abs(ahead).max())
         if round_ > PATIENT and ahead @ previous < 0.0:
             damping *= 0.5
         previous = ahead
         before = evidence.components
-        evidence = _weigh(evidence, shared, x, sd, covariance, drops)
+        evidence = _weigh(evidence, shared, x, sd, inverse, drops, left)
         # As long as steps get shorter alike, the next one is that of the last times their ratio.
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
@@ -181,12 +195,39 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
         shared,
         x,
         sd,
-        covariance,
+        inverse,
         before,  # those that the solution was made with
         evidence.degrees,
         tuple(_jointly_fitted(drop) for drop in drops),
         settled,
     )
+
+
+def _move(
+    drops: Sequence[DropState], x: Array, sd: Array, step: Array, share: float
+) -> tuple[Array, list[Residuals], float] | None:
+    """Take a step, or as much of it as leads to where chains fall.
+
+    Returns
+    -------
+    x, left, share
+        The common unknowns, what all edges leave over, and how much of the step was taken; nothing
+        where no part of it will do.
+    """
+    begin = [drop.x.copy() for drop in drops]
+    while share > _SHORTEST:
+        there = take(drops, x, sd, step, share)
+        left = [
+            drop.model.residuals(role, drop.x, match)
+            for drop in drops
+            for role, match in drop.matches.items()
+        ]
+        if all(np.isfinite(one.values).all() for one in left):
+            return there, left, share
+        for drop, at in zip(drops, begin, strict=True):
+            drop.x[:] = at
+        share *= 0.5
+    return None
 
 
 def _begin(fit: Fit | JointDrop, shared: SharedUnknowns) -> DropState:
@@ -209,12 +250,13 @@ def _weigh(
     shared: SharedUnknowns,
     x: Array,
     sd: Array,
-    covariance: Array,
+    inverse: Array,
     drops: Sequence[DropState],
+    left: Sequence[Residuals],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
     new = Evidence(evidence.components, evidence.stated)
-    remaining = np.diag(covariance)
+    remaining = np.sum(inverse**2, axis=1)
     for name, block in shared.blocks.items():
         new.common(name, scaled(x, sd)[block], remaining[block], sd[block])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
@@ -222,17 +264,17 @@ def _weigh(
     for drop in drops:
         assert drop.reduced is not None
         reduced, model = drop.reduced, drop.model
-        common = covariance[np.ix_(drop.here, drop.here)]
         # The variance of an own unknown: with the common ones known, and what these leave open.
-        left = np.diag(reduced.inverse) + np.sum((reduced.gain @ common) * reduced.gain, axis=1)
+        by_common = reduced.gain @ inverse[drop.here]
+        variances = np.sum(reduced.inverse**2, axis=1) + np.sum(by_common**2, axis=1)
         own_sd = model.unknowns.sd[drop.own]
         variance = np.zeros(drop.x.size)
-        variance[drop.own] = left
-        parameters += float(np.sum((1.0 - left)[own_sd > 0.0]))
+        variance[drop.own] = variances
+        parameters += float(np.sum((1.0 - variances)[own_sd > 0.0]))
         if "impulses" in model.unknowns:
             struck += float(np.sum(1.0 - variance[model.unknowns["impulses"]]))
         new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
-        new.edges(model.residuals(role, drop.x, match) for role, match in drop.matches.items())
+    new.edges(left)
     return new.settled(parameters, struck)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import STRAY, NormalEquations, normal_equations, scaled
+from rig.analysis.equations import STRAY, linearize, scaled
+from rig.analysis.square_root import Root, eliminate, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
+    from rig.analysis.square_root import Eliminated
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -44,29 +46,7 @@ class DropState:
     common: Index
     here: Index
     centre: Array | None = None
-    reduced: Reduced | None = None
-
-
-class Reduced(NamedTuple):
-    """A drop's equations with its own unknowns o eliminated, all in units of prior uncertainties.
-
-    Attributes
-    ----------
-    inverse
-        A⁻¹ of the drop's own unknowns, prior included.
-    gain
-        G = A⁻¹B: o = o₀ − G c.
-    matrix, vector
-        What the drop says of c: N_cc − BᵀG, and the right-hand side.
-    own
-        o₀.
-    """
-
-    inverse: Array
-    gain: Array
-    matrix: Array
-    vector: Array
-    own: Array
+    reduced: Eliminated | None = None
 
 
 def joint_step(
@@ -75,9 +55,8 @@ def joint_step(
     sd: Array,
     centre: Array | None = None,
     cut: float = STRAY,
-    damping: float = 1.0,
-) -> tuple[Array, Array]:
-    """Take one Gauss–Newton step of all drops together; moves their own unknowns in place.
+) -> Root:
+    """Reduce all drops to what they say together of what they have in common.
 
     Parameters
     ----------
@@ -86,50 +65,44 @@ def joint_step(
     centre
         Prior means of the common unknowns, zero if not given.
     cut
-        As for `rig.analysis.equations.normal_equations`.
-    damping
-        Which share of the step is taken.
+        As for `rig.analysis.equations.linearize`.
 
     Returns
     -------
-    covariance, step
-        Of the common unknowns, in units of `sd`; the whole step.
+    Root
+        In units of `sd`.
     """
-    total = np.eye(x.size)
-    vector = scaled(-x if centre is None else centre - x, sd)
+    rows = []
     for drop in drops:
-        found = normal_equations(drop.model, drop.matches, drop.x, drop.model.unknowns.sd, cut=cut)
-        drop.reduced = reduced = _eliminate(drop, found)
-        total[np.ix_(drop.here, drop.here)] += reduced.matrix
-        vector[drop.here] += reduced.vector
-    # The inverse itself is wanted: variances of all common unknowns, of every drop, from each step.
-    covariance = np.linalg.inv(total).astype(np.float64, copy=False)
-    step = covariance @ vector
+        own_sd = drop.model.unknowns.sd
+        seen = linearize(drop.model, drop.matches, drop.x, cut=cut)
+        pull = np.zeros(drop.x.size)
+        off = drop.x[drop.own] if drop.centre is None else drop.x[drop.own] - drop.centre
+        pull[drop.own] = scaled(off, own_sd[drop.own])
+        drop.reduced = eliminate([*seen.rows.values()], own_sd, pull, drop.own, drop.common)
+        rest = drop.reduced.rest
+        rows.append(rest._replace(columns=drop.here))
+    return square_root(rows, np.ones(x.size), scaled(x if centre is None else x - centre, sd))
+
+
+def take(drops: Sequence[DropState], x: Array, sd: Array, step: Array, share: float = 1.0) -> Array:
+    """Take a share of a step of the common unknowns, and of what each drop's own do then.
+
+    Parameters
+    ----------
+    step
+        In units of `sd`.
+
+    Returns
+    -------
+    ndarray
+        The common unknowns; the drops' own are moved in place.
+    """
+    x = x + share * step * sd
     for drop in drops:
         assert drop.reduced is not None
-        scale = drop.model.unknowns.sd[drop.own]
         own = drop.reduced.own - drop.reduced.gain @ step[drop.here]
-        drop.x[drop.own] += damping * scale * own
+        drop.x[drop.own] += share * drop.model.unknowns.sd[drop.own] * own
         # Its copy of the common unknowns follows, so that the next equations are made there.
-        drop.x[drop.common] = (x + damping * step * sd)[drop.here]
-    return covariance, step
-
-
-def _eliminate(drop: DropState, found: NormalEquations) -> Reduced:
-    """Solve for the drop's own unknowns, given the common ones."""
-    own, common = drop.own, drop.common
-    sd = drop.model.unknowns.sd
-    inverse = np.linalg.inv(found.matrix[np.ix_(own, own)] + np.eye(own.size)).astype(
-        np.float64, copy=False
-    )
-    cross = found.matrix[np.ix_(own, common)]
-    gain = inverse @ cross
-    off = drop.x[own] if drop.centre is None else drop.x[own] - drop.centre
-    pull = -found.vector[own] - scaled(off, sd[own])
-    return Reduced(
-        inverse,
-        gain,
-        found.matrix[np.ix_(common, common)] - cross.T @ gain,
-        -found.vector[common] - gain.T @ pull,
-        inverse @ pull,
-    )
+        drop.x[drop.common] = x[drop.here]
+    return x

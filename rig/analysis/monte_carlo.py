@@ -12,7 +12,7 @@ import numpy as np
 from rig.analysis.adjust import adjust
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.equations import robust_weights, scaled
-from rig.analysis.joint_step import DropState, joint_step
+from rig.analysis.joint_step import DropState, joint_step, take
 from rig.analysis.quantities import measurands
 from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
@@ -190,8 +190,8 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
             places = drop.own, drop.common, drop.here
             states.append(DropState(model, drop.matches, drop.x.copy(), *places, own))
         for _step in range(_SESSION_STEPS):
-            _, step = joint_step(states, x, joint.sd, centre)
-            x = x + step * joint.sd
+            step = joint_step(states, x, joint.sd, centre).step()
+            x = take(states, x, joint.sd, step)
         for one, values in zip(states, found, strict=True):
             for name, (value, _gradient) in measurands(one.model, one.x).items():
                 values.setdefault(name, []).append(value)

@@ -53,9 +53,6 @@ class Budgets:
     def __init__(self, joint: JointFit) -> None:
         self.joint = joint
         size = len(joint.shared)
-        # h·C·h is |h·L|²: with the vector h·L kept of every measurand, covariances between drops
-        # are plain products, and signs that cancel when chains change places are not lost.
-        self._root = np.linalg.cholesky(joint.covariance)
         self._others: dict[str, Array] = {}
         for drop in joint.drops:
             place = np.ix_(drop.here, drop.here)
@@ -82,13 +79,15 @@ class Budgets:
         self, drop: JointDrop, places: tuple[Places, Places], value: float, gradient: Array
     ) -> Measured:
         """Put value and uncertainty together; `gradient` is in units of the prior uncertainties."""
-        alone = drop.inverse @ gradient[drop.own]
+        by_root = gradient[drop.own] @ drop.inverse
         h = np.zeros(len(self.joint.shared))
         h[drop.here] = gradient[drop.common] - drop.gain.T @ gradient[drop.own]
-        common = self.joint.covariance @ h
-        own = alone - drop.gain @ common[drop.here]
-        shared = h @ self._root
-        variance = float(gradient[drop.own] @ alone) + float(shared @ shared)
+        # h·C·h is |h·R⁻¹|²: with that vector kept of every measurand, covariances between drops
+        # are plain products, and signs that cancel when chains change places are not lost.
+        shared = h @ self.joint.inverse
+        common = self.joint.inverse @ shared
+        own = drop.inverse @ by_root - drop.gain @ common[drop.here]
+        variance = float(by_root @ by_root) + float(shared @ shared)
         lines: dict[str, float] = {}
         for name, rows in places[0].items():
             # The sum over all drops was made once; this drop's share is replaced by its own rows.

@@ -46,7 +46,8 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     rows = []
     for name, scaled in _priors(protocol):
         wider, narrower = (_again(scaled(by), analysis) for by in (FACTOR, 1.0 / FACTOR))
-        for line, wide, narrow in zip(here, wider, narrower, strict=True):
+        # Without one of these a prior's line is left out: its joint fit did not converge.
+        for line, wide, narrow in zip(here or (), wider or (), narrower or (), strict=False):
             for quantity, mean in line.means.items():
                 row: dict[str, Any] = {"prior": name, **line.condition.json(), "quantity": quantity}
                 for word, other in (("wider", wide.means), ("narrower", narrow.means)):
@@ -56,8 +57,8 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     return rows
 
 
-def _again(protocol: Protocol, analysis: Analysis) -> list[Incline]:
-    """Means as they are with the priors of another protocol."""
+def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
+    """Means as they are with the priors of another protocol, if the joint fit converges."""
     drops = {
         key: replace(drop, model=drop.model.under(protocol))
         for key, drop in analysis.adjusted.items()
@@ -69,6 +70,8 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline]:
         }
     else:
         joint = joint_fit(list(drops.values()))
+        if not joint.settled:
+            return None
         budgets = Budgets(joint)
         found = {key: budgets.measured(drop) for key, drop in zip(drops, joint.drops, strict=True)}
     return summarize(

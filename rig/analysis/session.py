@@ -57,6 +57,8 @@ class Analysis:
         attempt.
     effects
         Of chains and sides, by incline; none where the plan has no blocks of A, B, B, A.
+    unsettled
+        Whether there are enough good drops, and their joint fit did not converge.
     with_rejected
         The summary as it would be with the runs that were rejected and are good by their limits;
         none where there are no such runs.
@@ -69,6 +71,7 @@ class Analysis:
     adjusted: Mapping[tuple[int, int], Fit | JointDrop] = field(default_factory=dict)
     effects: tuple[Effects, ...] = ()
     with_rejected: tuple[Incline, ...] = ()
+    unsettled: bool = False
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
@@ -80,6 +83,8 @@ class Analysis:
             found["superseded"] = [run.json() for run in self.superseded]
         if self.with_rejected:
             found["summary_with_rejected"] = [line.json() for line in self.with_rejected]
+        if self.unsettled:
+            found["joint_fit_converged"] = False
         if self.effects:
             found["effects"] = [one.json() for one in self.effects]
         if self.joint is not None:
@@ -170,7 +175,8 @@ def gather(
     results, fits
         Of each drop, as `rig.analysis.drop.fit_drop` gives them.
     """
-    return sum_up(protocol, *_fit_jointly(results, fits))
+    found, joint, adjusted, unsettled = _fit_jointly(results, fits)
+    return replace(sum_up(protocol, found, joint, adjusted), unsettled=unsettled)
 
 
 def sum_up(
@@ -203,7 +209,7 @@ def sum_up(
 
 def _fit_jointly(
     results: Sequence[DropResult], fits: Sequence[Fit | None]
-) -> tuple[list[DropResult], JointFit | None, dict[tuple[int, int], Fit | JointDrop]]:
+) -> tuple[list[DropResult], JointFit | None, dict[tuple[int, int], Fit | JointDrop], bool]:
     """Give good drops the numbers that they have in the light of all of them.
 
     A verdict is on a drop by itself, by limits fixed beforehand: what others say of the rig
@@ -216,16 +222,22 @@ def _fit_jointly(
         if fit is not None and result.verdict in GOOD and fit.estimate.settled
     }
     found = list(results)
-    joint = None
+    joint, unsettled = None, False
     while joint is None and len(good) >= FEWEST:
         joint = joint_fit(list(good.values()))
+        if not joint.settled:
+            joint, unsettled = None, True
+            break
         fewer = {
             n: f"only {drop.matched} of its {fit.matched} edges go with the other runs: {_MOVED}"
             for (n, fit), drop in zip(good.items(), joint.drops, strict=True)
             if drop.matched < _KEPT * fit.matched
         }
-        if not joint.settled or 2 * len(fewer) > len(good):
-            joint = None  # it is the adjustment that fails, and no drop is to blame for that
+        if 2 * len(fewer) > len(good):
+            joint, unsettled = (
+                None,
+                True,
+            )  # it is the adjustment that fails, and no drop is to blame for that
             break
         for n, why in fewer.items():
             found[n] = replace(found[n], reasons=(*found[n].reasons, why))
@@ -233,7 +245,7 @@ def _fit_jointly(
             joint = None
     keys = [(results[n].run.number, results[n].attempt) for n in good]
     if joint is None:
-        return found, None, dict(zip(keys, good.values(), strict=True))
+        return found, None, dict(zip(keys, good.values(), strict=True)), unsettled
     budgets = Budgets(joint)
     for n, drop in zip(good, joint.drops, strict=True):
         unmatched = unmatched_edges(drop)
@@ -246,4 +258,4 @@ def _fit_jointly(
             learned=True,
             unmatched=unmatched,
         )
-    return found, joint, dict(zip(keys, joint.drops, strict=True))
+    return found, joint, dict(zip(keys, joint.drops, strict=True)), False

@@ -182,14 +182,13 @@ def _with_band(
     slopes[:, sd >= 1.0] *= 1e3 * sd[sd >= 1.0]
     if isinstance(drop, Fit) or joint is None:
         assert isinstance(drop, Fit)
-        variance = np.einsum("ij,jk,ik->i", slopes, drop.estimate.covariance, slopes, optimize=True)
+        variance = np.sum((slopes @ drop.estimate.inverse) ** 2, axis=1)
     else:
         own, common = slopes[:, drop.own], slopes[:, drop.common]
         left = common - own @ drop.gain
-        shared = joint.covariance[np.ix_(drop.here, drop.here)]
-        variance = np.einsum("ij,jk,ik->i", own, drop.inverse, own, optimize=True)
-        variance += np.einsum("ij,jk,ik->i", left, shared, left, optimize=True)
-    band = coverage_factor(np.inf) * np.sqrt(np.maximum(variance, 0.0))
+        variance = np.sum((own @ drop.inverse) ** 2, axis=1)
+        variance += np.sum((left @ joint.inverse[drop.here]) ** 2, axis=1)
+    band = coverage_factor(np.inf) * np.sqrt(variance)
     return curve(x), band
 
 

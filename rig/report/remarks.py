@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
 
 _CLOCK_COVERAGE = 2.0  # about 95 %
+_ALONE = "the joint fit of all good runs did not converge: each run is shown by itself"
 _FOUND = 4.0  # standard uncertainties beyond which κ is worth a remark
 
 
@@ -30,6 +31,7 @@ def remarks(found: SessionResults) -> list[str]:
     if joint is not None and joint.drops[0].model.protocol.drag is not None:
         joint = None  # predictions are made in this air
     return [
+        *([_ALONE] if found.analysis.unsettled else []),
         *model_lines(fitted),
         *common_lines(found.analysis.summary),
         *clock_lines(found.calibration),

@@ -38,7 +38,7 @@ def test_impedance():
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))
     sd = 1e4 * np.sqrt(np.diag(covariance))
     found = least_squares(
-        lambda x, _: plain_equations(whiten @ (x - means), whiten, sd), sd, np.zeros(3)
+        lambda x, _: plain_equations(whiten @ (x - means), whiten), sd, np.zeros(3)
     )
     v, i, phi = found.x
     z = v / i
@@ -68,7 +68,7 @@ def test_thermometer():
     sd, scatter = np.array([10.0, 10.0]), 0.0035
     for _ in range(2):  # the scatter is that of the residuals themselves
         found = least_squares(
-            lambda y, _, s=scatter: plain_equations((slopes @ y - b) / s, slopes / s, sd),
+            lambda y, _, s=scatter: plain_equations((slopes @ y - b) / s, slopes / s),
             sd,
             np.zeros(2),
         )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.components import LEAST_SHARE, above
-from rig.analysis.equations import STRAY, normal_equations
+from rig.analysis.equations import STRAY, linearize
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.quantities import measurands
@@ -48,9 +48,10 @@ class Whole:
         self.group = np.empty(size, dtype=object)
         for drop, place in zip(joint.drops, self.columns, strict=True):
             sd = drop.model.unknowns.sd
-            found = normal_equations(drop.model, drop.matches, drop.x, sd, cut=STRAY)
-            self.data[np.ix_(place, place)] += found.matrix
-            self.vector[place] += found.vector
+            for rows in linearize(drop.model, drop.matches, drop.x, cut=STRAY).rows.values():
+                slopes, there = rows.slopes * sd[rows.columns], place[rows.columns]
+                self.data[np.ix_(there, there)] += slopes.T @ slopes
+                self.vector[there] += slopes.T @ rows.left
             self.x[place] = np.divide(drop.x, sd, out=np.zeros_like(sd), where=sd > 0)
             for name, blocks in drop.model.unknowns.groups.items():
                 for block in blocks:

@@ -1,0 +1,206 @@
+"""Linear least squares on square roots: QR keeps the digits of which a normal matrix loses half."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
+
+
+class Rows(NamedTuple):
+    """Observations in standard deviations: for a step d they leave ``left + slopes @ d[columns]``.
+
+    Attributes
+    ----------
+    slopes
+        Shape ``(rows, columns)``.
+    left
+        Shape ``(rows,)``.
+    columns
+        Which unknowns they depend on; shape ``(columns,)``.
+    """
+
+    slopes: Array
+    left: Array
+    columns: Index
+
+    def triangle(self) -> Rows:
+        """Return the same sum of squares of any step, in no more rows than columns and one."""
+        whole = _triangle(np.column_stack([self.slopes, self.left]))
+        return self._replace(slopes=whole[:, :-1], left=whole[:, -1])
+
+    def after(self, step: Array) -> Rows:
+        """Return the same about the point that a step leads to."""
+        return self._replace(left=self.left + self.slopes @ step[self.columns])
+
+
+class Root(NamedTuple):
+    """A square root R of an information matrix RᵀR, and what R·d leaves: ``left + matrix @ d``.
+
+    Attributes
+    ----------
+    matrix
+        Shape ``(unknowns, unknowns)``; a triangle but for the order of its columns.
+    left
+        Shape ``(unknowns,)``.
+    """
+
+    matrix: Array
+    left: Array
+
+    def step(self) -> Array:
+        """Return the step to the least sum of squares."""
+        return np.asarray(np.linalg.solve(self.matrix, -self.left), dtype=np.float64)
+
+    def with_gradient(self, gradient: Array) -> Root:
+        """Return the root of the same matrix about a point of another gradient."""
+        left = np.linalg.solve(self.matrix.T, gradient)
+        return Root(self.matrix, np.asarray(left, dtype=np.float64))
+
+    def turns_back(self, step: Array, last: Array) -> bool:
+        """Whether a step takes back more than half of the last one."""
+        before = self.matrix @ last
+        return -float(self.matrix @ step @ before) > 0.5 * float(before @ before)
+
+    def pulled(self, gradient: Array) -> Array:
+        """Return the step that balances a further gradient."""
+        found = np.linalg.solve(self.matrix, np.linalg.solve(self.matrix.T, -gradient))
+        return np.asarray(found, dtype=np.float64)
+
+    def damped(self, damping: float, lengths: Array) -> Root:
+        """Return the root with λ times the squares of its columns' lengths (Marquardt 1963)."""
+        size = self.left.size
+        whole = np.zeros((2 * size, size + 1))
+        whole[:size, :size], whole[:size, size] = self.matrix, self.left
+        whole[size + np.arange(size), np.arange(size)] = np.sqrt(damping) * lengths
+        whole = _triangle(whole)
+        return Root(whole[:size, :size], whole[:size, size])
+
+
+class Eliminated(NamedTuple):
+    """Some unknowns o eliminated from observations of these and others c: o = own − gain·c.
+
+    Attributes
+    ----------
+    inverse
+        R⁻¹ of the eliminated ones, of which the covariance given the others is R⁻¹R⁻ᵀ.
+    gain, own
+        As above.
+    rest
+        What is left to say of the others.
+    """
+
+    inverse: Array
+    gain: Array
+    own: Array
+    rest: Rows
+
+
+def square_root(blocks: Sequence[Rows], sd: Array, pull: Array) -> Root:
+    """Reduce observations and priors to a square root.
+
+    Parameters
+    ----------
+    blocks
+        In the unknowns' own units. What only one of them knows of is eliminated from it first.
+    sd
+        Prior standard uncertainties: the root's units; where 0 an unknown stays as it is.
+    pull
+        How far the unknowns are above their prior means, in these units.
+    """
+    whole, top, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
+    columns = np.setdiff1d(np.arange(sd.size), top, assume_unique=True)
+    whole[top.size :, np.append(columns, sd.size)] = _stacked(rest, columns, pull[columns])
+    return Root(whole[:, :-1], whole[:, -1])
+
+
+def eliminate(
+    blocks: Sequence[Rows], sd: Array, pull: Array, own: Index, others: Index
+) -> Eliminated:
+    """Eliminate some unknowns, priors of these included.
+
+    Parameters
+    ----------
+    blocks, sd, pull
+        As for `square_root`.
+    own, others
+        Those that are eliminated, and all others.
+    """
+    whole, top, rest = _eliminate_private(blocks, sd, pull, own)
+    more = np.setdiff1d(own, top, assume_unique=True)
+    columns = np.concatenate([more, others, [sd.size]])
+    last = _stacked(rest, columns[:-1], pull[more])
+    whole[top.size : own.size, columns] = last[: more.size]
+    inverse = np.linalg.inv(whole[: own.size, own]).astype(np.float64, copy=False)
+    right = inverse @ whole[: own.size, columns[more.size :]]
+    last = last[more.size :, more.size :]
+    return Eliminated(
+        inverse, right[:, :-1], -right[:, -1], Rows(last[:, :-1], last[:, -1], others)
+    )
+
+
+def _eliminate_private(
+    blocks: Sequence[Rows], sd: Array, pull: Array, among: Index
+) -> tuple[Array, Index, list[Rows]]:
+    """Eliminate from each block those of some unknowns that no other block knows of.
+
+    Returns
+    -------
+    whole, top, rest
+        Triangles of these, one below the other and the left sides behind, shape ``(unknowns,
+        unknowns + 1)``; their columns; and what each block says of other unknowns.
+    """
+    size = sd.size
+    known = np.zeros(size, dtype=np.intp)
+    for block in blocks:
+        known[block.columns] += 1
+    private = np.zeros(size, dtype=np.bool_)
+    private[among] = known[among] == 1
+    whole, begin = np.zeros((size, size + 1)), 0
+    top, rest = [], []
+    for block in blocks:
+        alone = private[block.columns]
+        order = np.concatenate([np.flatnonzero(alone), np.flatnonzero(~alone)])
+        columns, count, rows = block.columns[order], int(alone.sum()), block.left.size
+        stack = np.zeros((rows + count, order.size + 1))
+        np.multiply(block.slopes[:, order], sd[columns], out=stack[:rows, :-1])
+        stack[:rows, -1] = block.left
+        stack[rows + np.arange(count), np.arange(count)] = 1.0
+        stack[rows:, -1] = pull[columns[:count]]
+        stack = _triangle(stack)
+        whole[begin : begin + count, np.append(columns, size)] = stack[:count]
+        begin += count
+        top.append(columns[:count])
+        rest.append(Rows(stack[count:, count:-1], stack[count:, -1], columns[count:]))
+    return whole, np.concatenate([np.zeros(0, dtype=np.intp), *top]), rest
+
+
+def _stacked(blocks: Sequence[Rows], columns: Index, pull: Array) -> Array:
+    """Stack blocks and the priors of the first columns to a triangle, the left side behind."""
+    place = np.full(int(columns.max(initial=-1)) + 1, -1)
+    place[columns] = np.arange(columns.size)
+    stack = np.zeros((sum(block.left.size for block in blocks) + pull.size, columns.size + 1))
+    end = 0
+    for block in blocks:
+        begin, end = end, end + block.left.size
+        stack[begin:end, place[block.columns]] = block.slopes
+        stack[begin:end, -1] = block.left
+    stack[end + np.arange(pull.size), np.arange(pull.size)] = 1.0
+    stack[end:, -1] = pull
+    whole = _triangle(stack)
+    if whole.shape[0] < columns.size:  # fewer rows than unknowns: the others are said nothing of
+        whole = np.vstack([whole, np.zeros((columns.size - whole.shape[0], whole.shape[1]))])
+    return whole[: columns.size]
+
+
+def _triangle(rows: Array) -> Array:
+    found: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+    return found
