@@ -279,9 +279,9 @@ def _parser() -> Parser:
     analyze.add_argument(
         "--trials",
         type=_trials,
-        default=200,
         metavar="M",
-        help="Monte Carlo trials beside it, or adaptive: as many as u to one digit needs",
+        help="Monte Carlo trials beside it (default: until they tell whether both agree, at most "
+        "1600), or adaptive: as many as u to one digit needs",
     )
     analyze.add_argument(
         "--session-trials", type=_count, metavar="M", help="Monte Carlo of the session's joint fit"
@@ -558,9 +558,9 @@ def _count(text: str) -> int:
     return number
 
 
-def _trials(text: str) -> int | None:
+def _trials(text: str) -> int | str:
     if text == "adaptive":
-        return None
+        return text
     if not text.lstrip("+-").isdecimal():
         raise argparse.ArgumentTypeError(f"found '{text}', neither a whole number nor adaptive")
     return _count(text)

@@ -24,12 +24,15 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.analysis.result import Measured
 
     Array = NDArray[np.float64]
 
 PROBABILITY = 0.95
 BLOCK = 10_000
 """Trials of a block of the adaptive procedure, for up to 99 % (JCGM 101, 7.9.4)."""
+FIRST, MOST = 200, 1600
+"""Trials after which one looks whether they can tell, and after which one looks no more."""
 _SESSION_STEPS = 3  # from the solution itself: a trial moves it by about one σ
 _END = 2.7
 """Standard error of the end of a 95 % interval from M trials, in units of u/√M: the quantile of a
@@ -91,6 +94,35 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
         Of the generator; the same seed gives the same trials.
     """
     return Propagated.all(_drawn(fit, seed), trials)
+
+
+@one_thread
+def until_decided(
+    fit: Fit, measured: Mapping[str, Measured], seed: int, first: int = FIRST, most: int = MOST
+) -> tuple[dict[str, Propagated], int]:
+    """Like `monte_carlo`, with twice as many trials until all results agree, or do not.
+
+    Parameters
+    ----------
+    measured
+        What the drop says by itself, see `agreement`.
+    first, most
+        With how many trials to begin and to end, whether they can tell then or not.
+
+    Returns
+    -------
+    found, trials
+    """
+    drawn = _drawn(fit, seed)
+    every: list[Mapping[str, float]] = []
+    while True:
+        every += islice(drawn, min(max(first, len(every)), most - len(every)))
+        found = Propagated.all(iter(every), len(every))
+        if len(every) >= most or all(
+            agreement(measured[name].value, measured[name].u, one, len(every)).decided
+            for name, one in found.items()
+        ):
+            return found, len(every)
 
 
 @one_thread

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
-from rig.analysis.monte_carlo import adaptive, agreement, monte_carlo, session_monte_carlo
+from rig.analysis.monte_carlo import (
+    adaptive,
+    agreement,
+    monte_carlo,
+    session_monte_carlo,
+    until_decided,
+)
 from rig.analysis.result import Measured
 from rig.commands.output import print_json
 from rig.errors import InputError
@@ -49,7 +55,7 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def budget(session: Reader, number: int, trials: int | None, seed: int) -> dict[str, Any]:
+def budget(session: Reader, number: int, trials: int | str | None, seed: int) -> dict[str, Any]:
     """Account for the uncertainty of a run's results.
 
     Parameters
@@ -57,7 +63,8 @@ def budget(session: Reader, number: int, trials: int | None, seed: int) -> dict[
     number
         Of the run.
     trials, seed
-        Of the Monte Carlo propagation, JCGM 101; as many as u to one digit needs if not given.
+        Of the Monte Carlo propagation, JCGM 101: so many; ``adaptive``, as many as u to one digit
+        needs; or, if not given, as many as tell whether it agrees, within bounds.
 
     Raises
     ------
@@ -78,21 +85,23 @@ def budget(session: Reader, number: int, trials: int | None, seed: int) -> dict[
     records = kept(session) or results(session).records()
     record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
     if trials is None:
-        trial, trials = adaptive(fit, seed)
+        trial, drawn = until_decided(fit, alone.quantities, seed)
+    elif isinstance(trials, str):
+        trial, drawn = adaptive(fit, seed)
     else:
-        trial = monte_carlo(fit, trials, seed)
+        trial, drawn = monte_carlo(fit, trials, seed), trials
     return {
         "run": number,
         "learned": record["learned"],
         "budget": {name: _lines(_measured(record, name)) for name in record["degrees"]},
         "by_itself": {name: _lines(measured) for name, measured in alone.quantities.items()},
         "monte_carlo": {
-            "trials": trials,
+            "trials": drawn,
             "seed": seed,
             "quantities": {
                 name: one.json()
                 | agreement(
-                    alone.quantities[name].value, alone.quantities[name].u, one, trials
+                    alone.quantities[name].value, alone.quantities[name].u, one, drawn
                 ).json()
                 for name, one in trial.items()
             },
@@ -144,11 +153,16 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         lines += [
             f"  by itself u = {_written(row, alone['u'])} {row.fine}; by {drawn['trials']} "
             f"trials (seed {drawn['seed']}) {_written(row, trial['u'])} {row.fine}",
-            f"  95 % of trials in {low} … {high} {row.unit}: "
-            + ("both agree" if trial["agrees"] else "they do not agree")
-            + ("" if trial["decided"] else " (too few to tell)"),
+            f"  95 % of trials in {low} … {high} {row.unit}" + _judgement(trial),
         ]
     return lines
+
+
+def _judgement(trial: Mapping[str, Any]) -> str:
+    """Say whether both ways agree, where the trials are enough to tell."""
+    if not trial["decided"]:
+        return ""
+    return ": both agree" if trial["agrees"] else ": they do not agree"
 
 
 def _written(row: Measurand, u: float) -> str:
