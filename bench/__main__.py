@@ -35,6 +35,21 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="./run bench", description="Benchmarks of the software.")
     benches = parser.add_subparsers(required=True, metavar="BENCH", dest="bench")
 
+    agreement = benches.add_parser("agreement", help="how rarely a true model is refuted")
+    agreement.add_argument("--sessions", type=_count, default=100, metavar="N", help="to simulate")
+    agreement.add_argument(
+        "--drops",
+        type=_count,
+        nargs="+",
+        default=[1, 2, 4, 12],
+        metavar="N",
+        help="at each incline",
+    )
+    agreement.add_argument(
+        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
+    )
+    agreement.add_argument("-o", "--output", metavar="DIR", help="folder for a page of the same")
+
     clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
     clock.add_argument(
         "--protocol", default="protocols/picket-fence.yaml", metavar="FILE", help="any scene"
@@ -96,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
         "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
     )
     tui.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
-    for one in (clock, faults, hostile, link, mutation, soak, states, stop, tui):
+    for one in (agreement, clock, faults, hostile, link, mutation, soak, states, stop, tui):
         one.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser
 

@@ -6,7 +6,6 @@ Mechanics that a scene does not have are not loaded.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
@@ -157,15 +156,15 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     }
 
 
-def predicted_parts(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]:
-    """By how much each prediction moves with each thing stated that measuring needs, too.
+def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]:
+    """Return by how much each prediction moves with each coefficient, by its standard uncertainty.
 
-    By one standard uncertainty, that is; none of what is exact.
+    What else a prediction is made from, measuring needs too: the drop's own equations know that.
     """
     if run.impact is None:
-        return {}
+        return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
     found: dict[str, dict[str, float]] = {}
-    for name, low, high, share in _moved(protocol):
+    for name, low, high, share in _moved(protocol, run, run.impact):
         below, above = predicted_run(low, run), predicted_run(high, run)
         for measurand in below.keys() & above.keys():
             moved = above[measurand].value - below[measurand].value
@@ -173,30 +172,35 @@ def predicted_parts(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]
     return found
 
 
-def _moved(protocol: Protocol) -> Iterator[tuple[str, Protocol, Protocol, float]]:
-    """Each stated thing, made less and more, and its uncertainty over the distance between them."""
+def _moved(
+    protocol: Protocol, run: Run, struck: str
+) -> Iterator[tuple[str, Protocol, Protocol, float]]:
+    """Each coefficient, made less and more, and its uncertainty over the distance between them."""
+    surface, rods = protocol.surface, protocol.chains[struck]
+    assert surface is not None
+
+    def on(**changed: Any) -> Protocol:
+        return replace(protocol, surface=replace(surface, **changed))
+
+    def giving(alpha: Quantity) -> Protocol:
+        chain = replace(rods, chain=replace(rods.chain, alpha=alpha))
+        return replace(protocol, chains={**protocol.chains, struck: chain})
+
     stated: list[tuple[str, Quantity, Callable[[Quantity], Protocol]]] = [
-        ("drop", protocol.drop, lambda to: replace(protocol, drop=to)),
-        ("gravity", protocol.gravity, lambda to: replace(protocol, gravity=to)),
+        ("restitution", surface.restitution, lambda to: on(restitution=to)),
+        ("friction", surface.friction, lambda to: on(friction=to)),
     ]
-    drag, sign = protocol.drag, 1.0
-    if drag is not None and drag.terminal_speed is not None:
-        sign = -1.0  # the faster, the less air
-        slower = partial(replace, drag)
-        stated.append(
-            ("drag", drag.terminal_speed,
-             lambda to: replace(protocol, drag=slower(terminal_speed=to)))
-        )  # fmt: skip
-    elif drag is not None and drag.coefficient is not None:
-        thicker = partial(replace, drag)
-        stated.append(
-            ("drag", drag.coefficient, lambda to: replace(protocol, drag=thicker(coefficient=to)))
-        )
-    for name, one, moved in stated:
-        if one.u:
-            step = min(one.u, 0.5 * one.value)  # all of these are above zero
-            low, high = (moved(Quantity(one.value + way * step)) for way in (-1.0, 1.0))
-            yield name, low, high, (sign if name == "drag" else 1.0) * one.u / (2.0 * step)
+    pile, alpha = surface.pile, rods.chain.alpha
+    if pile is not None:
+        stated.append(("pile", pile.restitution, lambda to: on(pile=replace(pile, restitution=to))))
+    if alpha is not None:
+        stated.append((f"alpha {protocol.condition(run).impact_chain}", alpha, giving))
+    for name, value, moved in stated:
+        if value.u:
+            least = max(0.0, value.value - value.u) if name == "friction" else value.value - value.u
+            most = value.value + value.u
+            low, high = (moved(Quantity(end)) for end in (least, most))
+            yield name, low, high, value.u / (most - least)
 
 
 def notes(protocol: Protocol) -> list[str]:

@@ -36,6 +36,8 @@ class Dials:
     drop_error
         How far the drop is off its stated value, in its own standard uncertainties; one draw a
         session, this is its standard deviation.
+    impact_error
+        How far restitution and friction, or a stated α, are off their stated values, likewise.
     rod_sd
         Rods off their nominal places on the string, m; the same in every run of that chain.
     width_sd
@@ -90,6 +92,7 @@ class Dials:
     hang_sd: float = 0.1e-3
     side_sd: float = 0.0
     drop_error: float = 0.5
+    impact_error: float = 0.0
     rod_sd: float = 0.3e-3
     width_sd: float = 0.1e-3
     gate_sd: float = 0.2e-3
@@ -124,7 +127,7 @@ class Dials:
     @classmethod
     def stated(cls) -> Dials:
         """A rig that is off by as much as its protocol says, wherever it says it."""
-        return cls(**dict.fromkeys(_STATED, math.nan), drop_error=1.0)
+        return cls(**dict.fromkeys(_STATED, math.nan), drop_error=1.0, impact_error=1.0)
 
     def on(self, protocol: Protocol, share: Callable[[str], float] = lambda _: 1.0) -> Dials:
         """Take what is not-a-number from a protocol, but for what differs from chain to chain.

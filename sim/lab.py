@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -15,10 +15,12 @@ from rig.model.chain import Chain
 from rig.model.drag import drag_hits
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
+from rig.model.surface import Surface
 from rig.protocol.contact import contact_level, higher_contacts
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import GUESSED
+from rig.units import Quantity
 from sim.air import air
 from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
 from sim.camera import camera_reading
@@ -109,6 +111,7 @@ class ChainLab:
         self.gates = protocol.gates.gates if protocol.gates else ()
         rig = self._rng("rig")
         self.hang_height = protocol.drop.value + protocol.drop.u * dials.drop_error * rig.normal()
+        self.surface = self._surface()
         self.side = dials.side_sd * float(self._rng("side").normal())
         self.air = air(protocol, dials.drag)
         self.bodies = {name: self._body(spec) for name, spec in protocol.chains.items()}
@@ -122,6 +125,27 @@ class ChainLab:
             gate.channel: dials.beam_sd * self._rng("beam", gate.channel).normal()
             for gate in self.gates
         }
+
+    def _surface(self) -> Surface | None:
+        """Draw the surface as it really is; what a dial says of it is exact."""
+        stated, dials = self.protocol.surface, self.dials
+        if stated is None:
+            return None
+
+        def draw(what: str, of: Quantity, dial: float) -> Quantity:
+            off = dials.impact_error * of.u * float(self._rng(what).normal())
+            return Quantity(known(dial, of.value + off))
+
+        pile = stated.pile
+        if pile is not None:
+            softness = draw("pile", pile.restitution, dials.restitution)
+            pile = replace(pile, restitution=softness)
+        friction = draw("friction", stated.friction, dials.friction)
+        return Surface(
+            draw("restitution", stated.restitution, dials.restitution),
+            Quantity(max(0.0, friction.value)),
+            pile,
+        )
 
     def _level(self, run: Run) -> float:
         """How far above the zero of all heights the chain strikes, m."""
@@ -222,17 +246,13 @@ class ChainLab:
         self, body: Body, run: Run, release: float, start: float, rng: np.random.Generator
     ) -> Path:
         """Compute the fall of the impact chain by the model, with its own rods and impulses."""
-        surface = self.protocol.surface
-        assert surface is not None
+        assert self.surface is not None
         dials, chain, incline = self.dials, body.spec.chain, run.incline_deg
-        impact = impact_on(
-            surface,
-            chain,
-            incline,
-            restitution=None if math.isnan(dials.restitution) else dials.restitution,
-            friction=None if math.isnan(dials.friction) else dials.friction,
-        )
-        alphas = impact.alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
+        impact = impact_on(self.surface, chain, incline)
+        alpha = impact.alpha
+        if chain.alpha is not None:
+            alpha += dials.impact_error * chain.alpha.u * self._rng("alpha").normal()
+        alphas = alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
         # What touches the board higher hangs as much lower, as far as its strike goes.
         strikes = body.offsets - np.array(higher_contacts(self.protocol, incline, body.spec))
         strikes[:-1] -= self._contact(run)  # the last one is judged at the level

@@ -114,10 +114,10 @@ class ResolvedLab(ChainLab):
         self.world = world
         for spec in protocol.chains.values():
             _check(spec)
-        if protocol.surface is not None:
-            _bounce(protocol.surface, dials, world)
+        if self.surface is not None:
+            _bounce(self.surface, world)
         self._key = fall_cache.key(
-            protocol.chains, protocol.surface, protocol.drop, protocol.gravity, self.gates,
+            protocol.chains, self.surface, protocol.drop, protocol.gravity, self.gates,
             protocol.plan, protocol.contact, protocol.drag, asdict(dials), world, seed,
         )  # fmt: skip
         self._ahead = Ahead(self._make)
@@ -267,10 +267,10 @@ class ResolvedLab(ChainLab):
         spin: float = 0.0,
         incline_deg: float | None = None,
     ) -> Chain:
-        world, dials, surface = self.world, self.dials, self.protocol.surface
+        world, dials, surface = self.world, self.dials, self.surface
         board = touching = None
         if incline_deg is not None and surface is not None:
-            board = Board(math.radians(incline_deg), _bounce(surface, dials, world))
+            board = Board(math.radians(incline_deg), _bounce(surface, world))
             if world.rods_touch > 0.0:
                 touching = Bounce(world.rod_restitution, world.rod_time, world.rod_friction)
         thin = np.array([1.0 / d for d in spec.diameters])
@@ -380,22 +380,21 @@ def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
     return float(t0 + (t1 - t0) * z0 / (z0 - z1)), float((z0 - z1) / (t1 - t0))
 
 
-def _bounce(surface: Surface, dials: Dials, world: ResolvedDials) -> Bounce:
-    """How the board throws rods back: as the protocol says, or the dials.
+def _bounce(surface: Surface, world: ResolvedDials) -> Bounce:
+    """How the board throws rods back.
 
     Raises
     ------
     InputError
         A restitution that no contact here has.
     """
-    beta = surface.restitution.value if math.isnan(dials.restitution) else dials.restitution
-    mu = surface.friction.value if math.isnan(dials.friction) else dials.friction
+    beta = surface.restitution.value
     if not DEADEST <= beta <= 1.0:
         raise InputError(
             f"dynamics=resolved: the board's restitution {beta:g} is not between {DEADEST} and 1",
             "a pile needs none of its own here: rods land on rods",
         )
-    return Bounce(beta, world.board_time, mu)
+    return Bounce(beta, world.board_time, surface.friction.value)
 
 
 def _check(spec: RodChain) -> None:

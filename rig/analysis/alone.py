@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.edge_classes import UnmatchedEdge
 from rig.analysis.gate_passages import GatePassage
-from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.result import Audit, Deviation, DropResult, Measured
 from rig.protocol.protocol import Run
 
 if TYPE_CHECKING:
@@ -80,9 +80,14 @@ def _each(measured: Mapping[str, Measured]) -> dict[str, Any]:
 
 
 def _by_name(said: Mapping[str, Any]) -> dict[str, Measured]:
-    return {name: Measured(**one) for name, one in said.items()}
+    return {name: _measured(one) for name, one in said.items()}
+
+
+def _measured(said: Mapping[str, Any]) -> Measured:
+    deviation = said["deviation"]
+    return Measured(**{**said, "deviation": deviation and Deviation(*deviation)})
 
 
 def _passage(speed: Any, interval: Any, **said: Any) -> GatePassage:
-    since = None if interval is None else Measured(**interval)
-    return GatePassage(speed=Measured(**speed), interval=since, **said)
+    since = None if interval is None else _measured(interval)
+    return GatePassage(speed=_measured(speed), interval=since, **said)

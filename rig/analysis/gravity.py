@@ -21,7 +21,7 @@ from rig.analysis.drop_model import prior_air
 from rig.analysis.equations import Linearization, plain_equations
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.free_flight import leg_slopes
-from rig.analysis.result import GOOD, Measured, normalized_error
+from rig.analysis.result import GOOD, Measured
 from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING
 from rig.predictions import air_shares
 from rig.threads import one_thread
@@ -63,7 +63,8 @@ class GravityCheck:
     @property
     def normalized_error(self) -> float:
         """Of what is measured against what is stated."""
-        return normalized_error(self.measured, self.stated) or 0.0
+        stated = Measured(self.stated.value, self.stated.u)
+        return self.measured.less(stated).normalized_error or 0.0
 
     @property
     def agrees(self) -> bool:
@@ -143,12 +144,12 @@ def free_gravity(
     height = beam - np.array(chain.chain.heights)[rods] + side * np.array(chain.widths)[rods]
     design = np.stack([np.ones_like(time), time, -0.5 * time**2], axis=1)
     top, speed, fall = np.linalg.lstsq(design, height, rcond=None)[0]
-    scatter = stated(protocol)
-    sigma = np.hypot(scatter.floor, (speed - fall * time) * scatter.jitter)
+    sizes = stated(protocol)
+    sigma = np.hypot(sizes.floor, (speed - fall * time) * sizes.jitter)
     # The parabola's vertex is the release: where and when the speed was zero.
     point = np.array([top + speed**2 / (2.0 * fall), speed / fall, fall, 0.0])  # h, t, g and κ
     turn = np.where(rods % 2, -1.0, 1.0)  # neighbours are tilted the other way
-    ripple = scatter.beam * math.tan(math.radians(chain.tilt_deg))
+    ripple = sizes.beam * math.tan(math.radians(chain.tilt_deg))
     # What edges have in common, one column each, in units of its standard uncertainty: with the
     # fit's own unknowns beside it, least squares need no covariance of all edges with all.
     beams = (channel[:, None] == np.array([*gates])).astype(float)

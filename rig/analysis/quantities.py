@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import uncertainty
+from rig.analysis.deviation import deviation_alone
 from rig.analysis.result import Measured
 from rig.analysis.swing import lever
 from rig.protocol.protocol import GUESSED
@@ -40,6 +41,22 @@ SCALES = frozenset(
 )
 """Lines of the budget whose size nobody has measured, unless a joint fit finds it."""
 
+COMMON = frozenset(
+    {
+        "clock",
+        "gravity",
+        "air",
+        "drop height",
+        "beam heights",
+        "datum",
+        "side",
+        "beam offsets",
+        "rod places",
+        "rod width",
+    }
+)
+"""Budget lines that are the same in every run, so that averaging does not reduce them."""
+
 
 def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
     """Return everything the scene lets one measure, by its JSON name."""
@@ -60,18 +77,10 @@ def measured(model: DropModel, estimate: Estimate, value: float, gradient: Array
     """Put a value and its uncertainty together, from its derivatives by all unknowns."""
     u, budget = uncertainty(estimate, gradient, model.unknowns.groups)
     degrees = effective_degrees(u, budget, {"edges": estimate.degrees})
-    moved = estimate.covariance @ (gradient * estimate.sd)
-    stated = {name: float(moved[place]) for name, place in stated_places(model).items()}
-    return Measured(value, u, degrees, budget, stated=stated)
-
-
-def stated_places(model: DropModel) -> dict[str, int]:
-    """Unknowns that the protocol states a value of which predictions are made from, too."""
-    if "impact" not in model.records:
-        return {}  # gravity is what is measured
-    at = model.unknowns
-    names = ["drop", "gravity", *(["drag"] if model.protocol.drag is not None else [])]
-    return {name: at[name].start for name in names if name in at}
+    groups = model.unknowns.groups
+    common = [block for name in COMMON & groups.keys() for block in groups[name]]
+    deviation = deviation_alone(model, estimate, gradient * estimate.sd, common, degrees)
+    return Measured(value, u, degrees, budget, deviation=deviation)
 
 
 def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str, float]) -> float:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.deviation import deviation_among
 from rig.analysis.gate_passages import gate_passages
-from rig.analysis.quantities import effective_degrees, measurands, stated_places
+from rig.analysis.quantities import effective_degrees, measurands
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
@@ -102,12 +103,9 @@ class Budgets:
         u = math.sqrt(variance)
         found = self.joint.degrees
         known = {line: found[kind] for line, kind in _DEGREES.items() if kind in found}
-        place = np.full(gradient.size, -1)
-        place[drop.common] = drop.here
-        stated = {
-            name: float(common[place[one]]) for name, one in stated_places(drop.model).items()
-        }
-        return Measured(value, u, effective_degrees(u, budget, known), budget, shared, stated)
+        degrees = effective_degrees(u, budget, known)
+        deviation = deviation_among(self.joint, drop, gradient, degrees)
+        return Measured(value, u, degrees, budget, shared, deviation)
 
 
 def _common(drop: JointDrop) -> Places:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -17,12 +17,33 @@ if TYPE_CHECKING:
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.gate_passages import GatePassage
     from rig.protocol.protocol import Run
-    from rig.units import Quantity
 
-_ROUNDING = 1e-12
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
 """Verdicts that take part in a summary."""
+
+
+class Deviation(NamedTuple):
+    """Variance of a drop's result less its prediction if the model holds, coefficients aside.
+
+    A fall's own impulses, this rig's own rods and the errors of measuring are in it; what measuring
+    leaves to be as stated is in neither. Covariances of two drops of a session are products,
+    `plus`·`plus` − `minus`·`minus`.
+
+    Attributes
+    ----------
+    own
+        Variance that is this drop's own.
+    degrees
+        Degrees of freedom of `own`.
+    plus, minus
+        What it has in common with other drops.
+    """
+
+    own: float
+    degrees: float
+    plus: Sequence[float] | NDArray[np.float64]
+    minus: Sequence[float] | NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +61,8 @@ class Measured:
     shared
         What of `u` is common to all drops of a session, as a vector: those of two drops multiplied
         are their covariance. `None` for a drop by itself.
-    stated
-        By how much the value moves, with its sign, if what a protocol states of the drop, gravity
-        or the air moves by its standard uncertainty: a prediction moves with the same.
+    deviation
+        How far from the model's prediction it may be while the model holds.
     """
 
     value: float
@@ -50,7 +70,18 @@ class Measured:
     degrees: float = math.inf
     budget: Mapping[str, float] = field(default_factory=dict)
     shared: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
-    stated: Mapping[str, float] = field(default_factory=dict)
+    deviation: Deviation | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def normalized_error(self) -> float | None:
+        """E_n of a difference: within ±1 both agree (ISO 13528); `None` without uncertainty."""
+        return self.value / self.expanded if self.u > 0.0 else None
+
+    def less(self, other: Measured) -> Measured:
+        """Return the difference from something measured or stated independently."""
+        u = math.hypot(self.u, other.u)
+        shares = self.u**4 / self.degrees + other.u**4 / other.degrees
+        return Measured(self.value - other.value, u, u**4 / shares if shares else math.inf)
 
     @property
     def expanded(self) -> float:
@@ -61,32 +92,6 @@ class Measured:
     def json(self) -> dict[str, float]:
         """``{"value", "u", "U95"}``."""
         return {"value": self.value, "u": self.u, "U95": self.expanded}
-
-
-def normalized_error(
-    measured: Measured, expected: Quantity, parts: Mapping[str, float] | None = None
-) -> float | None:
-    """E_n = (x − m)/√(U² + U_m² − 2 k k_m cov(x, m)); within ±1 they agree (ISO 13528).
-
-    Parameters
-    ----------
-    measured, expected
-        x with its coverage factor k, and m, whose uncertainty is taken as known exactly.
-    parts
-        By how much m moves with what the protocol states, as `Measured.stated` has it of x.
-
-    Returns
-    -------
-    float or None
-        `None` where neither has an uncertainty, or they share all of it.
-    """
-    k, k_model = coverage_factor(max(1.0, measured.degrees)), coverage_factor(math.inf)
-    both = sum(part * measured.stated.get(name, 0.0) for name, part in (parts or {}).items())
-    whole = measured.expanded**2 + (k_model * expected.u) ** 2
-    square = whole - 2.0 * k * k_model * both
-    if square <= _ROUNDING * whole:
-        return None
-    return (measured.value - expected.value) / math.sqrt(square)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,36 +9,23 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rig.analysis.result import GOOD, Measured, normalized_error
+from rig.analysis.comparison import compare
+from rig.analysis.quantities import COMMON
+from rig.analysis.result import GOOD, Measured
 from rig.measurands import MEASURANDS, averaged
-from rig.predictions import predicted_parts, predicted_run
+from rig.predictions import predicted_run
 from rig.protocol.protocol import Condition
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from rig.analysis.comparison import Comparison, Difference
     from rig.analysis.gate_passages import GatePassage
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol, Run
     from rig.units import Quantity
 
 T = TypeVar("T")
-
-COMMON = frozenset(
-    {
-        "clock",
-        "gravity",
-        "air",
-        "drop height",
-        "beam heights",
-        "datum",
-        "side",
-        "beam offsets",
-        "rod places",
-        "rod width",
-    }
-)
-"""Budget lines that are the same in every run, so that averaging does not reduce them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +66,8 @@ class Incline:
         The model's value of each measurand; missing outside its domain.
     impact_chain
         Which chain struck, where chains are unlike.
-    parts
-        What of each prediction moves with what the measured value moves with.
+    differences
+        Each mean less the model's value.
     causes
         What of each mean's uncertainty all runs share, by line of the budget.
     gates
@@ -93,7 +80,7 @@ class Incline:
     deviations: dict[str, float]
     predicted: dict[str, Quantity]
     impact_chain: str | None = None
-    parts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    differences: Mapping[str, Difference] = field(default_factory=dict)
     causes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gates: tuple[GateMeans, ...] = ()
 
@@ -103,10 +90,8 @@ class Incline:
         return Condition(self.incline_deg, self.impact_chain)
 
     def normalized_error(self, name: str) -> float | None:
-        """Of a measurand, see `rig.analysis.result.normalized_error`."""
-        if name not in self.means or name not in self.predicted:
-            return None
-        return normalized_error(self.means[name], self.predicted[name], self.parts.get(name))
+        """Of a measurand, see `Difference`; `None` where nothing can be compared."""
+        return self.differences[name].normalized_error if name in self.differences else None
 
     def json(self) -> dict[str, Any]:
         """One member of ``summary``."""
@@ -144,12 +129,21 @@ def summarize(
     rejected
         Whether runs that are good by their limits count though the operator rejected them.
     """
+    cases = good_cases(protocol, results, rejected=rejected)
+    compared = compare(protocol, cases)
+    return [_incline(protocol, runs, compared) for runs in cases]
+
+
+def good_cases(
+    protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
+) -> list[list[DropResult]]:
+    """Sort good runs by condition; `rejected` as in `summarize`."""
     good = [
         result
         for result in results
         if result.verdict in GOOD or (rejected and result.limits in GOOD)
     ]
-    return [_incline(protocol, runs) for runs in by_case(protocol, good, lambda one: one.run)]
+    return by_case(protocol, good, lambda one: one.run)
 
 
 def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
@@ -160,8 +154,11 @@ def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]
     return [group for _, group in sorted(found.items())]
 
 
-def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
+def _incline(
+    protocol: Protocol, results: Sequence[DropResult], compared: Iterable[Comparison]
+) -> Incline:
     run = results[0].run
+    condition = protocol.condition(run)
     names = [row.name for row in averaged() if row.name in results[0].quantities]
     values = {name: [result.quantities[name] for result in results] for name in names}
     return Incline(
@@ -174,8 +171,13 @@ def _incline(protocol: Protocol, results: Sequence[DropResult]) -> Incline:
             if len(found) > 1
         },
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
-        protocol.condition(run).impact_chain,
-        predicted_parts(protocol, run),
+        condition.impact_chain,
+        {
+            one.quantity: line
+            for one in compared
+            for line in one.differences
+            if line.condition == condition
+        },
         {name: _causes(found) for name, found in values.items()},
         tuple(_gate_means(results)),
     )
@@ -216,7 +218,7 @@ def mean(runs: Sequence[Measured]) -> Measured:
         (run,) = runs
         common = _common(runs)[0]
         alone = math.sqrt(max(0.0, run.u**2 - common**2))
-        return replace(run, budget={"runs": alone, "common": common}, shared=None)
+        return replace(run, budget={"runs": alone, "common": common}, shared=None, deviation=None)
     n = len(runs)
     common, each = _common(runs)
     # Of a run's u² what all share is taken out: averaging does not reduce it, and it is added last.
@@ -234,7 +236,6 @@ def mean(runs: Sequence[Measured]) -> Measured:
         u,
         u**4 / share if share > 0.0 else math.inf,
         {"runs": single, "common": common},
-        stated={name: fmean(run.stated.get(name, 0.0) for run in runs) for name in runs[0].stated},
     )
 
 

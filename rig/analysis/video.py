@@ -39,8 +39,7 @@ class VideoFall:
 
     def beside(self, gates: Measured) -> float:
         """E_n of the video's acceleration less that of the gates; within ±1 they agree."""
-        width = np.hypot(self.acceleration.expanded, gates.expanded)
-        return float((self.acceleration.value - gates.value) / width)
+        return self.acceleration.less(gates).normalized_error or 0.0
 
     def json(self, gates: Measured | None) -> dict[str, Any]:
         """As ``video`` in the results."""

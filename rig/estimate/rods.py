@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.result import Measured, normalized_error
+from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
 from rig.estimate.hypothesis_fit import fit
 from rig.estimate.likelihood_ratio import LikelihoodRatio
-from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +55,7 @@ class Gain:
     @property
     def normalized_error(self) -> float | None:
         """Of what was measured against Eq. 9."""
-        return normalized_error(self.measured, Quantity(self.eq9_m_s))
+        return self.measured.less(Measured(self.eq9_m_s, 0.0)).normalized_error
 
     def json(self) -> dict[str, Any]:
         """One of ``groups``."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.comparison import compare
 from rig.analysis.result import GOOD, Measured
+from rig.analysis.summary import good_cases
 from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.estimate import coefficients as of
-from rig.estimate.agreement import agreement
 from rig.estimate.alphas import single_alphas
 from rig.estimate.curves import drop_curves
 from rig.estimate.end_correction import end_correction
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rig.analysis.comparison import Comparison
     from rig.analysis.session import Analysis
-    from rig.estimate.agreement import Comparison
     from rig.estimate.alphas import SingleAlphas
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.curves import DropCurves
@@ -248,7 +249,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     with sections.alone("The speed gained from each rod"):
         said.impulses = impulses(protocol, like)
     with sections.alone("The comparison with the model"):
-        said.comparison = agreement(protocol, analysis.runs)
+        said.comparison = compare(protocol, good_cases(protocol, analysis.runs))
     with sections.alone("The curves"):
         first: Mapping[Condition, tuple[int, int]] = {
             protocol.condition(good[key]): key for key in reversed(drops)

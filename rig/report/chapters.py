@@ -113,7 +113,7 @@ def _summary(analysis: Analysis) -> str:
     if any(line.normalized_error(name) is not None for line in lines for name in line.means):
         note += (
             " Eₙ is the difference from the prediction over the expanded uncertainty of that "
-            "difference: within ±1 they agree."
+            "difference, the scatter of single falls included: within ±1 they agree."
         )
     return html + paragraphs([note])
 

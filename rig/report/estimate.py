@@ -14,7 +14,7 @@ from rig.report.parts import Part
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from rig.estimate.agreement import Comparison, Difference
+    from rig.analysis.comparison import Comparison, Difference
     from rig.estimate.alphas import ConditionAlpha
     from rig.estimate.likelihood_ratio import LikelihoodRatio
     from rig.estimate.rods import Gain, Impulses

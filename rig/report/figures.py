@@ -6,7 +6,7 @@ from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.result import GOOD, Measured
+from rig.analysis.result import GOOD
 from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
 from rig.report.bars import LABELS, bar
 from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, RULE, SECOND, canvas
@@ -85,32 +85,24 @@ def incline_figure(
             elif row == SPEED:
                 _free_fall_line(axes, value_of(curves.get("free_fall_speed_m_s")))
             if row in strips:
-                _residual_strip(next(panels), analysis.summary, row, bars)
+                _residual_strip(next(panels), analysis.summary, row)
         legend_above(drawing.axes[0])
         _incline_axis(drawing.axes[-1])
     return drawing.svg
 
 
 def _compared(summary: Sequence[Incline], row: Measurand) -> list[Incline]:
-    return [line for line in summary if row.name in line.means and row.name in line.predicted]
+    return [line for line in summary if row.name in line.differences]
 
 
-def _residual_strip(axes: Axes, summary: Sequence[Incline], row: Measurand, bars: Bars) -> None:
-    """Draw what is measured less what is predicted, each with its own bar."""
+def _residual_strip(axes: Axes, summary: Sequence[Incline], row: Measurand) -> None:
+    """Draw what is measured less what is predicted, with U of that difference."""
     lines = _compared(summary, row)
-    inclines = [line.incline_deg for line in lines]
-    scale = row.fine_scale
-    models = [scale * Measured(0.0, line.predicted[row.name].u).expanded for line in lines]
+    differences = [line.differences[row.name] for line in lines]
+    left = [row.fine_scale * one.value for one in differences]
+    widths = [row.fine_scale * one.expanded for one in differences]
     axes.axhline(0, color=MODEL, linewidth=0.9)
-    axes.errorbar(inclines, [0.0] * len(lines), models, fmt="none", ecolor=MODEL_BAND,
-                  elinewidth=7.0, capsize=0, zorder=1)  # fmt: skip
-    left = [scale * (line.means[row.name].value - line.predicted[row.name].value) for line in lines]
-    widths = [scale * (bar(line, row.name, bars) or 0.0) for line in lines]
-    axes.errorbar(inclines, left, widths, **_MEAN)
-    # The scale is the measurement's: a model that knows little would make its bars invisible.
-    most = 2.0 * max(abs(value) + width for value, width in zip(left, widths, strict=True))
-    if 0.0 < most < max(models):
-        axes.set_ylim(-most, most)
+    axes.errorbar([line.incline_deg for line in lines], left, widths, **_MEAN)
     axes.set_ylabel(f"{row.symbol} − model\n({row.fine})")
 
 

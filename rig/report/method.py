@@ -57,8 +57,9 @@ def method_words(analysis: Analysis) -> tuple[str, str]:
         "than allowed for with a scale that says so; U = k·u is for 95 % with effective degrees of "
         "freedom (GUM). A mean has the scatter of its runs over √n and, in full, what all runs "
         "share. Predictions carry the uncertainty of the protocol's own numbers. Eₙ is the "
-        "difference of both over the expanded uncertainty of that difference; within ±1 they "
-        "agree (ISO 13528)."
+        "difference of both over the expanded uncertainty of that difference, which contains the "
+        "scatter of the falls themselves: 1/√n of it for a mean of n drops. Within ±1 both agree "
+        "(ISO 13528)."
     )
     return first, second
 

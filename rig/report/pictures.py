@@ -75,9 +75,8 @@ def pictures(
                     f"{both} against inclination",
                     f"{apart} of the {chain}'s end just before it reaches the surface, against "
                     "inclination; lines are the model, their band its U (95 %). Below each, "
-                    f"measured less predicted: bars are {LABELS[bars]} of the mean, and the wide "
-                    "ones about zero U of the prediction, cut off where they are far longer."
-                    + (_GAP if unanswered(curves or {}) else ""),
+                    "measured less predicted, with U (95 %) of that difference. Bars on means are "
+                    f"{LABELS[bars]}." + (_GAP if unanswered(curves or {}) else ""),
                 ),
             )
         )

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.result import Measured, normalized_error
-from rig.measurands import SEPARATION, SPEED, averaged
-from rig.predictions import predict_incline, predicted_parts, predicted_run
+from rig.analysis.comparison import compare
+from rig.analysis.result import Measured
+from rig.measurands import MEASURANDS, SEPARATION, SPEED, averaged
+from rig.predictions import predict_incline, predicted_run
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.motion import model_fall
 from rig.tui.plotting import Picture, Series
@@ -42,7 +43,7 @@ def stated(model: Quantity) -> Measured | float:
 def why_words(view: SessionView, job: Job) -> str:
     """Say what a drop means beside the model and free fall; empty where nothing was measured."""
     run, found = view.plan[job.run], view.results[job].quantities
-    expected, parts = predicted_run(view.protocol, run), predicted_parts(view.protocol, run)
+    expected = predicted_run(view.protocol, run)
     lines = []
     speed = found.get(SPEED.name)
     if speed is not None and run.impact is not None:
@@ -60,11 +61,10 @@ def why_words(view: SessionView, job: Job) -> str:
             f"it arrives {apart.value * SEPARATION.scale:.1f} {SEPARATION.unit} ahead: "
             f"free fall needs {late * 1e3:.0f} ms more for that"
         )
-    for row in averaged():
-        if row.name in found and row.name in expected:
-            error = normalized_error(found[row.name], expected[row.name], parts.get(row.name))
-            if error is not None:
-                lines.append(f"{row.symbol} {_agreement(error)}")
+    for one in compare(view.protocol, [[view.results[job]]]):
+        error = one.differences[0].normalized_error
+        if error is not None:
+            lines.append(f"{MEASURANDS[one.quantity].symbol} {_agreement(error)}")
     return "\n".join(lines)
 
 

@@ -11,14 +11,12 @@ from hypothesis import strategies as st
 
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.quantities import effective_degrees
-from rig.analysis.result import Audit, DropResult, Measured, normalized_error
-from rig.analysis.summary import Incline, mean, summarize
+from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.summary import mean, summarize
 from rig.model.chain import Chain
-from rig.predictions import predicted_parts, predicted_run
 from rig.protocol.plan import runs
 from rig.units import Quantity
-from sim.dials import Dials
-from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
+from tests.analysis.drops import FENCE, SINGLE, UNIFORM
 
 AUDIT = Audit(660, 660, 0, 0, 0)
 REFERENCE = {
@@ -108,21 +106,6 @@ def test_a_mean_in_other_units_is_the_same(drawn, factor):
     assert one.degrees >= (len(drawn) - 1) * (1 - 1e-9)
 
 
-def test_normalized_error_by_hand():
-    mean_ = Measured(0.120, 0.003, math.inf)
-    line = Incline(40.0, 3, {"separation_m": mean_}, {}, {"separation_m": Quantity(0.110, 0.004)})
-    z = 1.959963984540054
-    assert line.normalized_error("separation_m") == pytest.approx(0.010 / (z * 0.005), rel=2e-6)
-    few = replace(line, means={"separation_m": Measured(0.120, 0.003, 2.0)})
-    wide = math.hypot(4.302652729911275 * 0.003, z * 0.004)
-    assert few.normalized_error("separation_m") == pytest.approx(0.010 / wide, rel=2e-6)
-    assert line.normalized_error("speed_m_s") is None
-    exact = replace(
-        line, means={"separation_m": Measured(0.1, 0.0)}, predicted={"separation_m": Quantity(0.1)}
-    )
-    assert exact.normalized_error("separation_m") is None
-
-
 def results(protocol, values: dict[float, list[float]], verdict="accepted") -> list[DropResult]:
     """Made-up drops: Δz is the value, V fifty times it."""
     found = []
@@ -208,40 +191,6 @@ def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
     assert line.predicted == {"gravity_m_s2": FENCE.gravity}
     t = 1.964719837  # of 500 degrees of freedom
     assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (t * 0.01), rel=1e-6)
-
-
-def test_what_measured_and_predicted_share_is_no_reason_to_agree():
-    """Both move by +3 with the drop: what is left of 5 and 5 is 4 and 4."""
-    one = Measured(10.0, 5.0, math.inf, stated={"drop": 3.0})
-    z = 1.959963984540054
-    apart = math.hypot(4.0, 4.0)
-    assert normalized_error(one, Quantity(0.0, 5.0), {"drop": 3.0}) == pytest.approx(
-        10.0 / (z * apart), rel=2e-6
-    )
-    opposite = math.sqrt(25.0 + 25.0 + 18.0)
-    assert normalized_error(one, Quantity(0.0, 5.0), {"drop": -3.0}) == pytest.approx(
-        10.0 / (z * opposite), rel=2e-6
-    )
-    same = Measured(10.0, 3.0, math.inf, stated={"drop": 3.0})
-    assert normalized_error(same, Quantity(0.0, 3.0), {"drop": 3.0}) is None
-
-
-@pytest.mark.parametrize("name", ["drop", "gravity"])
-def test_what_is_stated_moves_measured_and_predicted_as_is_said(name):
-    """Another stated value, and everything again: the change is what `stated` and parts say."""
-    loose = replace(UNIFORM, gravity=Quantity(9.81, 0.02), drop=Quantity(0.18, 0.001))
-    stated = getattr(loose, name)
-    more = replace(loose, **{name: Quantity(stated.value + stated.u, stated.u)})
-    one = case(loose, Dials.quiet(), incline=40.0)
-    here, there = (replace(one, protocol=p).analyze().quantities for p in (loose, more))
-    for measurand, measured_ in here.items():
-        moved = there[measurand].value - measured_.value
-        assert measured_.stated[name] == pytest.approx(moved, rel=0.05, abs=0.01 * measured_.u)
-    parts = predicted_parts(loose, one.run)
-    run = one.run
-    for measurand, model in predicted_run(loose, run).items():
-        moved = predicted_run(more, run)[measurand].value - model.value
-        assert parts[measurand][name] == pytest.approx(moved, rel=0.02, abs=1e-12)
 
 
 def test_guessed_scales_are_known_to_a_quarter_of_themselves():

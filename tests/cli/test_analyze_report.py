@@ -59,12 +59,16 @@ def test_a_write_protected_session_is_analysed(finished, analysis, tmp_path):
     assert json.loads(done.stdout) == analysis
 
 
-def test_normalized_errors_are_what_they_say(analysis):
-    for line in analysis["summary"]:
-        difference = line["separation_m"]["value"] - line["predicted"]["separation_m"]
-        width = (line["separation_m"]["U95"] ** 2
-                 + (1.96 * line["predicted_u"]["separation_m"]) ** 2) ** 0.5  # fmt: skip
-        assert line["normalized_error"] == pytest.approx(difference / width, rel=1e-3)
+def test_normalized_errors_are_those_of_the_comparison(finished, analysis):
+    """One covariance serves them all: Eₙ of the summary and that beside χ² are one number."""
+    done = rig("estimate", finished.session, "--json")
+    compared = {one["quantity"]: one for one in json.loads(done.stdout)["comparison"]}
+    for line, summary in zip(
+        compared["separation_m"]["inclines"], analysis["summary"], strict=True
+    ):
+        assert line["normalized_error"] == summary["normalized_error"]
+        expected = line["difference"] / (1.959963984540054 * line["u"])
+        assert line["normalized_error"] == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_mean_is_the_mean_of_its_runs(analysis):

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
-from rig.analysis.result import GOOD
 from rig.analysis.trajectory import DRAG, free_trajectory, struck_trajectory
-from rig.estimate.agreement import agreement
 from rig.estimate.rods import _groups
 from rig.model.chain import Chain
 from rig.model.drag import drag_hits, fallen
 from tests.analysis.drops import UNIFORM, impact_ratios
-from tests.estimate.sessions import analysis
 
 
 def test_a_little_air_by_the_exact_fall_of_a_free_chain():
@@ -50,27 +44,3 @@ def test_rods_that_are_not_resolved_are_taken_with_their_neighbours():
     # What is left over at the end joins the last group; if nothing is known, all are one.
     assert _groups(np.diag([sure, sure, sure, sure, unsure]), sizes)[-1] == (3, 4)
     assert _groups(unsure * np.eye(5), sizes) == [(0, 4)]
-
-
-def test_agreement_with_the_model_counts_what_is_common_once():
-    """Against a model that is wrong by its own β, many inclines are no more than one."""
-    found = analysis((30.0, 50.0, 70.0))
-    good = [one for one in found.runs if one.verdict in GOOD]
-    whole = {one.quantity: one for one in agreement(UNIFORM, good)}
-    assert set(whole) == {"separation_m", "speed_m_s"}
-    for one in whole.values():
-        assert one.degrees == 3
-        independent = sum(line.chi2 for line in one.differences)
-        assert one.chi2 != pytest.approx(independent, rel=0.01)
-        half = one.chi2 / 2.0
-        tail = math.erfc(math.sqrt(half)) + 2.0 * math.sqrt(half / math.pi) * math.exp(-half)
-        assert one.p == pytest.approx(tail, rel=1e-9)  # of χ² with three degrees of freedom
-    single = [one for one in good if one.run.incline_deg == 50.0]
-    alone = agreement(UNIFORM, single)[0]
-    (line,) = alone.differences
-    assert alone.chi2 == pytest.approx((line.value / line.u) ** 2)
-    by_summary = next(one for one in found.summary if one.incline_deg == 50.0)
-    mine = by_summary.normalized_error("separation_m")
-    assert mine is not None
-    assert math.copysign(1.0, mine) == math.copysign(1.0, line.normalized_error)
-    assert line.normalized_error == pytest.approx(mine, rel=0.05)

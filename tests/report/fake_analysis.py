@@ -5,6 +5,7 @@ import random
 from dataclasses import replace
 from typing import Any
 
+from rig.analysis.comparison import Difference
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.analysis.summary import Incline
@@ -64,15 +65,17 @@ def two_chains(seed: int = 1, repeats: int = 12) -> Analysis:
         mean = sum(values) / len(values)
         sd = math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))
         summary.append(
-            Incline(
-                incline,
-                len(values),
-                {
-                    "separation_m": Measured(mean, sd / math.sqrt(len(values))),
-                    "speed_m_s": Measured(speed + rng.gauss(0, 0.03), 0.03),
-                },
-                {"separation_m": sd},
-                {"separation_m": Quantity(separation), "speed_m_s": Quantity(speed)},
+            compared(
+                Incline(
+                    incline,
+                    len(values),
+                    {
+                        "separation_m": Measured(mean, sd / math.sqrt(len(values))),
+                        "speed_m_s": Measured(speed + rng.gauss(0, 0.03), 0.03),
+                    },
+                    {"separation_m": sd},
+                    {"separation_m": Quantity(separation), "speed_m_s": Quantity(speed)},
+                )
             )
         )
     summary.sort(key=lambda line: line.incline_deg)
@@ -83,6 +86,22 @@ def two_chains(seed: int = 1, repeats: int = 12) -> Analysis:
     for name, budget in budgets.items():
         runs[5] = measured(runs[5], **{name: replace(runs[5].quantities[name], budget=budget)})
     return analysis(runs, summary)
+
+
+def compared(line: Incline) -> Incline:
+    """Set means beside predictions that have nothing in common with them."""
+    both = line.means.keys() & line.predicted.keys()
+    off = {
+        name: line.means[name].less(Measured(model.value, model.u))
+        for name, model in line.predicted.items()
+        if name in both
+    }
+    return replace(
+        line,
+        differences={
+            name: Difference(line.condition, line.n, one.value, one.u) for name, one in off.items()
+        },
+    )
 
 
 def measured(one: DropResult, **quantities: Measured) -> DropResult:
@@ -99,7 +118,7 @@ def without(found: Analysis, *names: str) -> Analysis:
     return analysis(
         [replace(one, quantities=rest(one.quantities)) for one in found.runs],
         [
-            replace(line, means=rest(line.means), predicted=rest(line.predicted))
+            compared(replace(line, means=rest(line.means), predicted=rest(line.predicted)))
             for line in found.summary
         ],
     )
@@ -151,4 +170,4 @@ def gravity(seed: int = 3) -> Analysis:
     ]
     mean, model = Measured(9.8188, 0.0014), Quantity(9.8201)
     line = Incline(0.0, 10, {"gravity_m_s2": mean}, {}, {"gravity_m_s2": model})
-    return analysis(runs, [line])
+    return analysis(runs, [compared(line)])

@@ -16,7 +16,6 @@ from rig.report.figures import gravity_figure, incline_figure, runs_figure
 from rig.report.film import film_figure
 from rig.report.pictures import pictures
 from rig.sections import Sections
-from rig.units import Quantity
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
@@ -82,19 +81,18 @@ def test_every_colour_has_its_counterpart_on_a_dark_page() -> None:
         assert f"fill: {PAPER}" in svg  # a ground of its own
 
 
-def test_bars_of_residuals_are_seen_beside_a_model_that_knows_little() -> None:
-    vague = [
-        replace(line, predicted={"separation_m": Quantity(line.means["separation_m"].value, 0.05)})
-        for line in TWO.summary
-    ]
+def test_bars_of_residuals_are_u_of_the_difference() -> None:
+    """One uncertainty, which holds the model's and the falls' scatter: no second bar beside it."""
     drawn = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Canvas, "svg", property(lambda self: drawn.append(self) or ""))
-        incline_figure(replace(TWO, summary=tuple(vague)), CURVES)
-    low, high = drawn[0].axes[1].get_ylim()
-    longest = max(line.means["separation_m"].expanded for line in vague) * 1e3
-    assert -low == high
-    assert longest < high < 4 * longest
+        incline_figure(TWO, CURVES)
+    bars = [one for one in drawn[0].axes[1].containers if one.has_yerr]
+    (segments,) = [bar.get_segments() for bar in bars[0].lines[2]]
+    lengths = [(end[1] - begin[1]) / 2.0 for begin, end in segments]
+    differences = [line.differences["separation_m"] for line in TWO.summary]
+    assert len(bars) == 1
+    assert lengths == pytest.approx([1e3 * one.expanded for one in differences])
 
 
 def test_where_the_model_has_no_answer_is_hatched() -> None:

@@ -38,14 +38,16 @@ def test_what_disagrees_is_named_with_its_size():
     two = fake_analysis.two_chains()
     vague = {"separation_m": 0.05, "speed_m_s": 1.0}
     lines = [
-        replace(line, predicted={n: Quantity(line.means[n].value, u) for n, u in vague.items()})
+        fake_analysis.compared(
+            replace(line, predicted={n: Quantity(line.means[n].value, u) for n, u in vague.items()})
+        )
         for line in two.summary
     ]
     assert finding(replace(two, summary=tuple(lines))).endswith(
         "With the model Δz and V agree within U."
     )
     wrong = {**lines[0].predicted, "speed_m_s": Quantity(99.0)}
-    lines[0] = replace(lines[0], predicted=wrong)
+    lines[0] = fake_analysis.compared(replace(lines[0], predicted=wrong))
     told = finding(replace(two, summary=tuple(lines)))
     error = f"{lines[0].normalized_error('speed_m_s'):.2f}".replace("-", "−")
     assert told.endswith(f"Δz agrees, V disagrees at 1 of 7 (0°: Eₙ {error}) within U.")

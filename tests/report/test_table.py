@@ -36,7 +36,7 @@ def test_gravity_summary() -> None:
 def test_a_prediction_is_held_against_its_own_uncertainty(value, u, said) -> None:
     mean = {"speed_m_s": Measured(5.26136, 0.0004)}
     line = Incline(80.0, 12, mean, {}, {"speed_m_s": Quantity(value, u)})
-    told = summary_table([line]).splitlines()[-1]
+    told = summary_table([fake_analysis.compared(line)]).splitlines()[-1]
     assert told.endswith(said)
     assert ("5.2580 ± 0.0078" in told) == bool(u)
 

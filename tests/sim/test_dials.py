@@ -23,8 +23,8 @@ LENGTHS = (
 )  # fmt: skip
 SHARES = ("missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled")
 FACTORS = (
-    "drop_error", "impulse_sd", "friction", "restitution", "clock", "drift", "wander", "reference",
-    "drag",
+    "drop_error", "impact_error", "impulse_sd", "friction", "restitution", "clock", "drift",
+    "wander", "reference", "drag",
 )  # fmt: skip
 UNSET = {"restitution", "friction", "reference"}  # not-a-number, which equals nothing
 SIGNED = {"restitution", "clock", "drift", "reference"}

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from textual.containers import Horizontal
 from textual.content import Content
 
-from rig.analysis.result import normalized_error
+from rig.analysis.comparison import compare
 from rig.measurands import RELEASE_SKEW, listed
-from rig.predictions import predicted_parts, predicted_run
+from rig.predictions import predicted_run
 from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import drop_pictures
 from rig.tui.screens.page import Page
@@ -78,7 +78,9 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     """Write the numbers with U95; where there is room, the model's and the normalized error too."""
     result = view.results[job]
     run = view.plan[job.run]
-    expected, parts = predicted_run(view.protocol, run), predicted_parts(view.protocol, run)
+    expected = predicted_run(view.protocol, run)
+    compared = compare(view.protocol, [[result]]) if wide else ()
+    errors = {one.quantity: one.differences[0].normalized_error for one in compared}
     head = f"{'':15}{'measured ± U95':>20}"
     lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
     for row in listed():
@@ -91,8 +93,7 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
             pass
         elif model is not None:
             line += f"{plus_minus(stated(model), row.scale):>16}"
-            error = normalized_error(measured, model, parts.get(row.name))
-            line += f"   {fixed(error, 2):>5}"
+            line += f"   {fixed(errors.get(row.name), 2):>5}"
         elif row == RELEASE_SKEW:
             limit = view.protocol.accept.release_skew * row.scale
             line += f"{f'limit ±{limit:g}':>16}"

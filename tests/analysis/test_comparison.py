@@ -1,0 +1,115 @@
+"""What is measured less what is predicted: one difference, with one covariance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from bench.agreement import Comparisons, compare_sessions
+from rig.analysis.comparison import compare
+from rig.analysis.distributions import coverage_factor
+from rig.analysis.result import Deviation, Measured
+from rig.analysis.summary import good_cases
+from rig.protocol.plan import runs
+from rig.units import Quantity
+from tests.analysis.drops import FENCE, PROTOCOLS, UNIFORM
+from tests.analysis.test_summary import results
+from tests.estimate.sessions import analysis
+
+Z = 1.959963984540054
+EXACT = replace(
+    UNIFORM,
+    surface=replace(
+        UNIFORM.surface,
+        restitution=Quantity(UNIFORM.surface.restitution.value),
+        friction=Quantity(UNIFORM.surface.friction.value),
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def single_drops() -> Comparisons:
+    """Two dozen rigs that are off by as much as their protocol says, one drop an incline."""
+    return compare_sessions(PROTOCOLS / "inclined-uniform.yaml", 1, range(1, 25))
+
+
+def test_p_of_single_drops_is_uniform(single_drops):
+    """With one drop an incline the falls' own scatter is most of what differs."""
+    for values in single_drops.p.values():
+        assert len(values) == 24
+        assert kstest(values, "uniform").pvalue > 0.01
+
+
+def test_single_drops_disagree_with_a_true_model_as_rarely_as_is_said(single_drops):
+    """Inclines of one rig share its errors: what chance allows is seen from rig to rig."""
+    for sessions in single_drops.errors.values():
+        beyond = [np.mean(np.abs(errors) > 1.0) for errors in sessions]
+        chance = max(np.std(beyond), math.sqrt(0.05 * 0.95)) / math.sqrt(len(beyond))
+        assert 0.0 < np.mean(beyond) < 0.05 + 3.0 * chance
+
+
+def differing(scatter: float, values: list[float]) -> list[Measured]:
+    """Values measured exactly, of falls that are foretold to scatter so much."""
+    return [Measured(x, 0.0, deviation=Deviation(scatter**2, math.inf, (0.0,), (0.0,)))
+            for x in values]  # fmt: skip
+
+
+def compared(values: list[Measured]):
+    drops = results(EXACT, {40.0: [0.0] * len(values)})
+    drops = [replace(drop, quantities={"separation_m": one})
+             for drop, one in zip(drops, values, strict=True)]  # fmt: skip
+    (comparison,) = compare(EXACT, good_cases(EXACT, drops))
+    return comparison.differences[0]
+
+
+def test_one_fall_is_off_by_its_own_scatter_and_n_by_its_share():
+    model = 0.11546810526538031
+    assert compared(differing(0.002, [model + 0.002])).u == pytest.approx(0.002, rel=1e-9)
+    assert compared(differing(0.002, [model])).value == pytest.approx(0.0, abs=1e-12)
+    # Four that scatter as foretold: their standard deviation is 2 mm.
+    step = 0.002 * math.sqrt(3.0) / 2.0
+    four = compared(differing(0.002, [model + way * step for way in (-1, -1, 1, 1)]))
+    # 8 degrees of freedom are foretold and 3 seen: the scale's are 11²/3, see GUM G.4.
+    widened = coverage_factor(11.0**2 / 3.0) / Z
+    assert four.u == pytest.approx(0.001 * widened, rel=2e-6)
+
+
+def test_falls_that_scatter_more_than_foretold_are_believed():
+    model = 0.11546810526538031
+    wild = [model + 0.02 * way for way in (-1, -1, 1, 1)]
+    assert compared(differing(0.002, wild)).u > 4.0 * compared(differing(0.002, wild[:1])).u / 2.0
+
+
+def test_what_the_protocol_states_of_coefficients_counts_once():
+    """Against a model that is wrong by its own β, many inclines are no more than one."""
+    found = analysis((30.0, 50.0, 70.0))
+    whole = {one.quantity: one for one in compare(UNIFORM, good_cases(UNIFORM, found.runs))}
+    assert set(whole) == {"separation_m", "speed_m_s"}
+    for one in whole.values():
+        assert one.degrees == 3
+        assert one.chi2 != pytest.approx(sum(line.chi2 for line in one.differences), rel=0.01)
+        half = one.chi2 / 2.0
+        tail = math.erfc(math.sqrt(half)) + 2.0 * math.sqrt(half / math.pi) * math.exp(-half)
+        assert one.p == pytest.approx(tail, rel=1e-9)  # of χ² with three degrees of freedom
+    # Of the summary's lines each has the same difference, whatever else is compared.
+    for line in found.summary:
+        (other,) = [
+            one for one in whole["speed_m_s"].differences if one.condition == line.condition
+        ]
+        assert line.differences["speed_m_s"] == other
+
+
+def test_gravity_is_compared_with_what_the_protocol_states():
+    run = runs(FENCE)[0]
+    stated = replace(FENCE, gravity=Quantity(9.81, 0.03))
+    drop = replace(
+        results(UNIFORM, {40.0: [0.1]})[0],
+        run=run,
+        quantities={"gravity_m_s2": Measured(9.86, 0.04)},
+    )
+    (comparison,) = compare(stated, [[drop]])
+    assert comparison.differences[0].normalized_error == pytest.approx(0.05 / (Z * 0.05), rel=2e-6)
