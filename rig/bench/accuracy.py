@@ -41,39 +41,31 @@ class Errors:
     errors: list[float] = field(default_factory=list)
     expanded: list[float] = field(default_factory=list)
     rigs: list[int] = field(default_factory=list)
-    bounds: list[float] = field(default_factory=list)
+    stated: list[float] = field(default_factory=list)
 
     def add(
-        self, error: float, expanded: float = math.inf, rig: int = 0, bound: float | None = None
+        self, error: float, expanded: float = math.inf, rig: int = 0, u: float | None = None
     ) -> None:
-        """Count one measurement on a rig.
-
-        Parameters
-        ----------
-        bound
-            Standard uncertainty by the information in the edges and all that is known beforehand,
-            where everything scatters as it was found: no estimate can be nearer than this, by
-            Cramér and Rao (van Trees, with priors).
-        """
+        """Count one measurement on a rig, with its stated expanded and standard uncertainty."""
         self.errors.append(error)
         self.expanded.append(expanded)
         self.rigs.append(rig)
-        if bound is not None:
-            self.bounds.append(bound)
+        if u is not None:
+            self.stated.append(u)
 
     def join(self, other: Errors) -> None:
         """Count the measurements of others as well."""
         self.errors += other.errors
         self.expanded += other.expanded
         self.rigs += other.rigs
-        self.bounds += other.bounds
+        self.stated += other.stated
 
     def json(self) -> dict[str, float | int]:
         """Rms, bias, largest error, mean U95, and the share of intervals that hold the truth.
 
         Drops on one rig share errors: ``bias_se`` and ``coverage_se``, from rig to rig, say how
         well bias and coverage are known. ``bias_over_U`` is the bias in units of the mean U95, and
-        ``times_bound`` the rms in units of that of the bounds.
+        ``times_u`` the rms over that of the stated standard uncertainties.
         """
         n = len(self.errors)
         held = [abs(error) <= u for error, u in zip(self.errors, self.expanded, strict=True)]
@@ -87,8 +79,8 @@ class Errors:
             "bias_over_U": bias / mean_u,
             "coverage": sum(held) / n,
         }
-        if self.bounds:
-            found["times_bound"] = found["rms"] / math.sqrt(fmean(u**2 for u in self.bounds))
+        if self.stated:
+            found["times_u"] = found["rms"] / math.sqrt(fmean(u**2 for u in self.stated))
         if len(set(self.rigs)) > 1:
             found["bias_se"] = self._between(self.errors)
             # Few misses tell little of how they scatter: so many independent errors there are.

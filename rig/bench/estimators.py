@@ -16,7 +16,7 @@ import numpy as np
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import joint_fit
 from rig.analysis.monte_carlo import monte_carlo
-from rig.analysis.quantities import measurands
+from rig.analysis.quantities import COMPUTED, Adjusted, measurands
 from rig.analysis.result import GOOD
 from rig.bench.accuracy import repeated
 from rig.bench.baselines import TimerReading, line_fit, plain_fit, two_gate_timer
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 TRIALS = (10**2, 10**3, 10**4, 10**5, 10**6)
 _NAMES = ("separation_m", "speed_m_s")
 SEED = 1
-BATCH = 10_000
-"""Draws at a time: a few megabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,10 +189,10 @@ def estimators(
     return found, left_out, times
 
 
-def drawn(fit: Fit, draws: int, seed: int) -> TimerReading:
+def mean_of_draws(fit: Fit, draws: int, seed: int, spread: float = 1.0) -> TimerReading:
     """Mean Δz and V over draws of all unknowns from their joint normal distribution.
 
-    Nothing is linearised from the unknowns on: each draw is a fall of its own.
+    Each draw goes through the very functions of the unknowns that give the results.
 
     Parameters
     ----------
@@ -202,38 +200,18 @@ def drawn(fit: Fit, draws: int, seed: int) -> TimerReading:
         A drop of two chains, adjusted by itself.
     draws
         M of JCGM 101.
+    spread
+        Of the draws, in standard uncertainties.
     """
     rng = np.random.default_rng(seed)
     model, estimate = fit.model, fit.estimate
-    at, struck, free = model.unknowns, model.records["impact"], model.records["free"]
-    assert struck.ratios is not None
-    names = ["gravity", "drop", "side", "alpha", "impulses", "impact hang", "impact rods"]
-    names += ["free hang", "free rods"]
-    places = np.concatenate([np.arange(at[name].start, at[name].stop) for name in names])
-    sd = estimate.sd[places]
-    covariance = estimate.covariance[np.ix_(places, places)] * np.outer(sd, sd)
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    begin = np.cumsum([0, *(at[name].stop - at[name].start for name in names)])
-    part = {name: slice(*begin[n : n + 2]) for n, name in enumerate(names)}
-    total, done = np.zeros(2), 0
-    while done < draws:
-        size = min(BATCH, draws - done)
-        x = estimate.x[places][:, None] + root @ rng.standard_normal((places.size, size))
-        gravity = model.protocol.gravity.value + x[part["gravity"]][0]
-        start = model.protocol.drop.value + x[part["drop"]][0]
-        heights = np.array(struck.chain.chain.heights)[:, None] + x[part["impact rods"]]
-        gains = model.guesses["impact"].alpha + x[part["alpha"]] + x[part["impulses"]]
-        level, speed, time, arrival = start + x[part["impact hang"]][0], 0.0, 0.0, 0.0
-        for gain, ratio, height in zip(gains, struck.ratios, heights, strict=True):
-            distance = np.maximum(level + height, 0.0)
-            arrival = np.sqrt(speed**2 + 2.0 * gravity * distance)
-            time = time + 2.0 * distance / (speed + arrival)
-            speed, level = arrival * (1.0 + gain * ratio), -height
-        top = free.chain.chain.length + x[part["free rods"]][-1]
-        above = start + x[part["side"]][0] + x[part["free hang"]][0] + top
-        total += [(above - 0.5 * gravity * time**2).sum(), np.sum(arrival)]
-        done += size
+    values, vectors = np.linalg.eigh(estimate.covariance)
+    root = spread * estimate.sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    total = np.zeros(len(_NAMES))
+    for _ in range(draws):
+        drop = Adjusted(model, estimate.x + root @ rng.standard_normal(estimate.x.size))
+        found = [COMPUTED[name](drop) for name in _NAMES]
+        total += [one[0] for one in found if one is not None]
     return TimerReading(*(total / draws).tolist())
 
 
@@ -260,7 +238,7 @@ def _readjusted(case: _Case, trials: int) -> TimerReading:
 
 
 def _draws(case: _Case, trials: int) -> TimerReading:
-    return drawn(case.fit, trials, SEED)
+    return mean_of_draws(case.fit, trials, SEED)
 
 
 def _raw_point(

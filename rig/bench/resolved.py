@@ -169,7 +169,7 @@ def summary(drops: Sequence[JudgedDrop]) -> dict[str, Any]:
     errors: dict[str, Errors] = {}
     for one in drops:
         for name, (error, expanded, u) in one.errors.items():
-            errors.setdefault(name, Errors()).add(error, expanded, bound=u)
+            errors.setdefault(name, Errors()).add(error, expanded, u=u)
     reasons = Counter(_NUMBER.sub("…", reason) for one in void for reason in one.reasons)
     return {
         "drops": len(drops),

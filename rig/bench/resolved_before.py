@@ -23,7 +23,7 @@ def read_before(path: Path) -> list[JudgedDrop]:
     Parameters
     ----------
     path
-        Of ``resolved.csv``. It says nothing of bounds and of reasons.
+        Of ``resolved.csv``. It says nothing of rms / u and of reasons.
 
     Raises
     ------

@@ -29,8 +29,8 @@ _HEAD = """\
 # Errors in the model's world
 
 `./run bench accuracy`: simulated sessions through board, line and file, compared with the true
-values. *In U95*: how often ± U holds the true value (95 % is intended). *× bound*: error over the
-smallest possible (Cramér and Rao)."""
+values. *In U95*: how often ± U holds the true value (95 % is intended). *rms / u*: rms error over the
+stated standard uncertainty."""
 
 
 def main(arguments: Namespace) -> int:
@@ -85,14 +85,14 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         f"{found['edges_matched']} edges matched, {found['edges_given_to_a_wrong_rod']} to a wrong "
         f"rod, {found['strays_taken_for_a_rod']} strays taken for a rod",
     ]
-    rows = [["error of one run", "rms", "bias", "worst", "mean U95", "bias/U", "in U95", "× bound"]]
+    rows = [["error of one run", "rms", "bias", "worst", "mean U95", "bias/U", "in U95", "rms / u"]]
     for name, errors in found["quantities"].items():
         row = MEASURANDS[name]
         held = f"{errors['coverage']:.1%}"
         if "coverage_se" in errors:
             held += f" ± {errors['coverage_se']:.1%}"
         sizes = _sizes(errors, row, "rms", "bias", "worst", "mean_U95")
-        bias, bound = f"{errors['bias_over_U']:.2f}", f"{errors['times_bound']:.2f}"
+        bias, bound = f"{errors['bias_over_U']:.2f}", f"{errors['times_u']:.2f}"
         rows.append([f"{row.label} ({row.fine})", *sizes, bias, held, bound])
     for baseline, label in (("camera_480_fps", "camera"), ("two_gate_timer", "two-gate timer")):
         for name, errors in found.get(baseline, {}).items():

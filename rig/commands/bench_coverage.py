@@ -28,8 +28,8 @@ _HEAD = """\
 # Does U hold the true value?
 
 `./run bench coverage`: many rigs, each wrong by as much as its protocol states, a few drops on
-each. 95 % of the intervals should hold the true value. ± of a share is from rig to rig. *×
-bound*: error over the smallest possible (Cramér and Rao). Void shares leave out drops beyond the
+each. 95 % of the intervals should hold the true value. ± of a share is from rig to rig. *rms
+/ u*: rms error over the stated standard uncertainty. Void shares leave out drops beyond the
 limit of release skew."""
 _OTHER = {
     "drag_per_m": ("κ", "1/km", 1e3),
@@ -82,7 +82,7 @@ def _lines(found: Mapping[str, Record], wrong: Mapping[str, Record]) -> Iterator
     ]  # fmt: skip
     yield from text_table(rows, left={0}, rule=True)
     for name, one in found.items():
-        rows = [[name, "n", "rms", "bias", "mean U95", "in U95", "", "× bound"]]
+        rows = [[name, "n", "rms", "bias", "mean U95", "in U95", "", "rms / u"]]
         rows += [_row(key, errors) for key, errors in one["quantities"].items() if "°" not in key]
         yield ""
         yield from text_table(rows, left={0, 6}, rule=True)
@@ -109,7 +109,7 @@ def _row(key: str, errors: Record) -> list[str]:
     chance = f"± {errors['coverage_se']:.1%}" if "coverage_se" in errors else ""
     held = f"{errors['coverage']:.1%}"
     label = f"{mean}{symbol} ({unit})" if unit else f"{mean}{symbol}"
-    return [label, str(errors["n"]), *sizes, held, chance, f"{errors['times_bound']:.2f}"]
+    return [label, str(errors["n"]), *sizes, held, chance, f"{errors['times_u']:.2f}"]
 
 
 def _csv(found: Mapping[str, Record]) -> str:

@@ -125,7 +125,7 @@ def _table(records: Sequence[Record]) -> list[str]:
     shown = [row for row in told() if any(row.name in one["quantities"] for one in records)]
     head = ["", "drops", "void", "wrong"]
     for row in shown:
-        head += [f"{row.label} rms ({row.fine})", "bias", "in U95", "× bound"]
+        head += [f"{row.label} rms ({row.fine})", "bias", "in U95", "rms / u"]
     rows = [head]
     for one in records:
         cells = [one["case"], str(one["drops"]), f"{one['void_share']:.0%}", str(one["wrong"])]
@@ -138,7 +138,7 @@ def _table(records: Sequence[Record]) -> list[str]:
                     f"{errors['rms'] * row.fine_scale:.2f}",
                     f"{errors['bias'] * row.fine_scale:+.2f}",
                     f"{errors['coverage']:.0%}",
-                    f"{errors['times_bound']:.1f}",
+                    f"{errors['times_u']:.1f}",
                 ]
             )
         rows.append(cells)

@@ -48,9 +48,9 @@ def test_bias_and_coverage_are_as_sure_as_there_are_rigs():
     errors = Errors()
     for rig, values in enumerate(([0.1, 0.1], [0.3, 0.5], [-0.2, -0.2])):
         for value in values:
-            errors.add(value, 0.25, rig, bound=0.1)
+            errors.add(value, 0.25, rig, u=0.1)
     found = errors.json()
-    assert found["times_bound"] == pytest.approx(10.0 * math.sqrt(0.44 / 6))
+    assert found["times_u"] == pytest.approx(10.0 * math.sqrt(0.44 / 6))
     assert found["bias"] == pytest.approx(0.1)
     assert found["bias_over_U"] == pytest.approx(0.4)
     assert found["coverage"] == pytest.approx(4 / 6)

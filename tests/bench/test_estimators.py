@@ -10,8 +10,8 @@ import pytest
 
 from rig.analysis.drop import fit_drop
 from rig.analysis.quantities import quantities
-from rig.bench.baselines import line_fit
-from rig.bench.estimators import drawn
+from rig.bench.baselines import TimerReading, line_fit
+from rig.bench.estimators import mean_of_draws
 from rig.cli import main
 from rig.protocol.protocol import Priors
 from sim.dials import Dials
@@ -27,6 +27,15 @@ def test_line_fits_are_near_on_a_perfect_rig():
     assert line_fit(UNIFORM, one.with_edges([]).drop, one.scale.hz) is None
 
 
+def test_draws_of_no_spread_are_the_adjustment_itself():
+    """The curve is of the same function as the results beside it, on a rig with everything off."""
+    one = case(UNIFORM, Dials(skew_sd=1e-3), incline=40.0)
+    fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
+    known = quantities(fit.model, fit.estimate)
+    reading = mean_of_draws(fit, 1, 3, spread=0.0)
+    assert reading == TimerReading(known["separation_m"].value, known["speed_m_s"].value)
+
+
 def test_draws_have_the_mean_of_the_adjustment():
     """Within what so many draws allow; what is not linear adds less than that.
 
@@ -37,11 +46,12 @@ def test_draws_have_the_mean_of_the_adjustment():
     one = case(replace(UNIFORM, priors=like), Dials(skew_sd=1e-3), incline=40.0)
     fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
     known = quantities(fit.model, fit.estimate)
-    reading = drawn(fit, 20_000, 3)
+    draws = 1_000
+    reading = mean_of_draws(fit, draws, 3)
     for name in ("separation_m", "speed_m_s"):
         off = getattr(reading, name) - known[name].value
-        assert abs(off) < 5 * known[name].u / np.sqrt(20_000) + 0.01 * known[name].u
-    assert drawn(fit, 20_000, 3) == reading
+        assert 0.0 < abs(off) < 5 * known[name].u / np.sqrt(draws) + 0.01 * known[name].u
+    assert mean_of_draws(fit, draws, 3) == reading
 
 
 def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
