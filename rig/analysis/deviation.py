@@ -101,9 +101,7 @@ def deviation_alone(
     )
 
 
-def deviation_among(
-    joint: JointFit, drop: JointDrop, gradient: Array, degrees: float
-) -> Deviation:
+def deviation_among(joint: JointFit, drop: JointDrop, gradient: Array, degrees: float) -> Deviation:
     """Return the deviation of a drop that was fitted with others.
 
     Parameters

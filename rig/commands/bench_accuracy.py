@@ -29,8 +29,8 @@ _HEAD = """\
 # Errors in the model's world
 
 `./run bench accuracy`: simulated sessions through board, line and file, compared with the true
-values. *In U95*: how often ± U holds the true value (95 % is intended). *rms / u*: rms error over the
-stated standard uncertainty."""
+values. *In U95*: how often ± U holds the true value (95 % is intended). *rms / u*: rms error over
+the stated standard uncertainty."""
 
 
 def main(arguments: Namespace) -> int:
