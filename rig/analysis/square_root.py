@@ -118,7 +118,8 @@ def square_root(blocks: Sequence[Rows], sd: Array, pull: Array) -> Root:
     """
     whole, top, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
     columns = np.setdiff1d(np.arange(sd.size), top, assume_unique=True)
-    whole[top.size :, np.append(columns, sd.size)] = _stacked(rest, columns, pull[columns])
+    last = _stacked(rest, columns, pull[columns])
+    whole[top.size :, np.append(columns, sd.size)] = last[: columns.size]
     return Root(whole[:, :-1], whole[:, -1])
 
 
@@ -195,10 +196,7 @@ def _stacked(blocks: Sequence[Rows], columns: Index, pull: Array) -> Array:
         stack[begin:end, -1] = block.left
     stack[end + np.arange(pull.size), np.arange(pull.size)] = 1.0
     stack[end:, -1] = pull
-    whole = _triangle(stack)
-    if whole.shape[0] < columns.size:  # fewer rows than unknowns: the others are said nothing of
-        whole = np.vstack([whole, np.zeros((columns.size - whole.shape[0], whole.shape[1]))])
-    return whole[: columns.size]
+    return _triangle(stack)
 
 
 def _triangle(rows: Array) -> Array:

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.adjust import least_squares
+from rig.analysis.equations import Linearization
+from rig.analysis.square_root import Rows
 from rig.errors import RigError
 
 if TYPE_CHECKING:
@@ -21,7 +24,6 @@ if TYPE_CHECKING:
 ANYTHING = 1.0
 """How far a parameter may be from where the search begins when nothing is known of it: coefficients
 are of order one, and a fit with a parameter that no edge tells of must still end."""
-_STEPS = 60
 _DONE = 1e-5  # of a standard uncertainty
 
 
@@ -110,39 +112,30 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
     """
     parameters = hypothesis.parameters
     shared = 1 + max((int(form.here.max(initial=-1)) for form in forms), default=-1)
-    values = np.array([one.start for one in parameters])
-    c = np.zeros(shared)
     priors = [one.prior or (one.start, ANYTHING) for one in parameters]
-    centre = np.array([mean for mean, _ in priors])
-    weight = np.array([u**-2 for _, u in priors])
-    known = np.eye(shared)  # what does not depend on the parameters
-    for form in forms:
-        known[np.ix_(form.here, form.here)] += form.matrix[: form.here.size, : form.here.size]
-    for _ in range(_STEPS):
-        total = np.zeros((shared + values.size, shared + values.size))
-        total[:shared, :shared] = known
-        total[shared:, shared:] = np.diag(weight)
-        slope = np.concatenate([c, weight * (values - centre)])
-        chi2 = float(c @ c + weight @ (values - centre) ** 2)
-        for form in forms:
-            target, by_parameters = hypothesis.targets(form, values)
+    begin = np.append(np.zeros(shared), [one.start for one in parameters])
+    centre = np.append(np.zeros(shared), [mean for mean, _ in priors])
+    sd = np.append(np.ones(shared), [u for _, u in priors])
+
+    def linearize(at: Array, _inflation: float) -> Linearization:
+        blocks = {}
+        for number, form in enumerate(forms):
+            target, by_parameters = hypothesis.targets(form, at[shared:])
+            slopes, left, _ = form.rows.after(np.append(at[form.here], target))
             n = form.here.size
-            z = np.concatenate([c[form.here], target])
-            pull = form.matrix @ z
-            chi2 += float(z @ (pull + 2.0 * form.vector)) + form.constant
-            slope[form.here] += pull[:n] + form.vector[:n]
-            slope[shared:] += by_parameters.T @ (pull[n:] + form.vector[n:])
-            total[form.here, shared:] += form.matrix[:n, n:] @ by_parameters
             # The targets are taken as linear: where the fit is good, their curvature counts little.
-            total[shared:, shared:] += by_parameters.T @ form.matrix[n:, n:] @ by_parameters
-        total[shared:, :shared] = total[:shared, shared:].T
-        # A few tens of unknowns: the inverse costs little, and its diagonal says when to stop.
-        covariance = np.linalg.inv(total).astype(np.float64, copy=False)
-        step = -covariance @ slope
-        c, values = c + step[:shared], values + step[shared:]
-        sd = np.sqrt(np.diag(covariance))
-        if float(np.abs(step / sd).max()) < _DONE:
-            names = tuple(one.name for one in parameters)
-            volume = -0.5 * float(np.linalg.slogdet(total)[1])
-            return HypothesisFit(names, values, covariance[shared:, shared:], chi2, volume)
-    raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")
+            slopes = np.column_stack([slopes[:, :n], slopes[:, n:] @ by_parameters])
+            columns = np.append(form.here, np.arange(shared, at.size))
+            blocks[str(number)] = Rows(slopes, left, columns)
+        chi2 = sum(float(rows.left @ rows.left) for rows in blocks.values())
+        return Linearization(blocks, chi2, sum(form.edges for form in forms), chi2)
+
+    found = least_squares(linearize, sd, begin, centre, _DONE, rough=True)
+    if not found.settled:
+        raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")
+    chi2 = sum(float(rows.left @ rows.left) for rows in found.rows.values())
+    chi2 += float(np.sum(((found.x - centre) / sd) ** 2))
+    by_root = found.inverse[shared:] * sd[shared:, None]
+    volume = float(np.sum(np.log(sd)) - np.linalg.slogdet(found.root)[1])
+    names = tuple(one.name for one in parameters)
+    return HypothesisFit(names, found.x[shared:], by_root @ by_root.T, chi2, volume)

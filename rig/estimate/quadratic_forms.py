@@ -2,7 +2,7 @@
 
 About the adjusted unknowns, ‖r/σ‖² of a drop is a quadratic form in all of them. Its release
 times, hanging heights and the scatter of its single impulses belong to this drop alone and are
-eliminated, priors included (a Schur complement); what stays are the unknowns that all drops share,
+eliminated, priors included; what stays are the unknowns that all drops share,
 the α of every rod, the height of the contact point and the air's drag. Every hypothesis about the
 impacts is then a few small matrices away: no edge is looked at again, and none of what the edges
 say is lost.
@@ -17,6 +17,7 @@ import numpy as np
 
 from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
+from rig.analysis.square_root import Rows, eliminate
 from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ EXTRA = ("contact", "drag")
 
 @dataclass(frozen=True, slots=True)
 class QuadraticForm:
-    """zᵀMz + 2 vᵀz + c, z being the shared unknowns of the drop, then its impacts.
+    """|R·z + r|², z being the shared unknowns of the drop, then its impacts.
 
     Attributes
     ----------
@@ -50,8 +51,8 @@ class QuadraticForm:
         What struck, and ΔV/V of each impact for α = 1, shape ``(rods,)``.
     here
         Places of the drop's shared unknowns in the session's vector.
-    matrix, vector, constant
-        M, v and c, n = shared + rods + `EXTRA` of them. Shared unknowns are in units of their prior
+    rows
+        R and r, of n = shared + rods + `EXTRA` columns. Shared unknowns are in units of their prior
         uncertainties, the others in SI.
     alphas
         α of each rod at which the form was made.
@@ -65,9 +66,7 @@ class QuadraticForm:
     chain: Chain
     ratios: Array
     here: Index
-    matrix: Array
-    vector: Array
-    constant: float
+    rows: Rows
     alphas: Array
     arrivals: Array
     edges: int
@@ -91,70 +90,60 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     common, here = shared.places(model)
     alphas = model.guesses["impact"].alpha + x[at["alpha"]] + x[at["impulses"]]
     inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
-    normal, vector, constant, edges = _normal(drop, alphas, inflation)
-    sd = np.concatenate([at.sd, np.ones(len(EXTRA))])
+    blocks, edges = _blocks(drop, alphas, inflation)
+    size, rods = len(at) + len(EXTRA), alphas.size
     impulses = np.arange(at["impulses"].start, at["impulses"].stop)
-    extra = np.arange(len(at), len(at) + len(EXTRA))
-    alone = np.setdiff1d(
-        np.arange(len(at)), np.concatenate([common, impulses, [at["alpha"].start]])
-    )
+    gone = np.concatenate([common, impulses, [at["alpha"].start]])
     # Of one drop alone: its own unknowns, and how far each impulse is off its mean.
-    own = np.concatenate([alone, impulses])
-    kept = np.concatenate([common, impulses, extra])
-    scale = sd.copy()
-    scale[impulses] = 1.0
-    left = normal[np.ix_(own, own)] * np.outer(sd[own], sd[own]) + np.eye(own.size)
-    cross = normal[np.ix_(own, kept)] * np.outer(sd[own], scale[kept])
-    # Matrix and vector in one solution: the same factors serve both.
-    gain = np.linalg.solve(left, np.column_stack([cross, vector[own] * sd[own]]))
+    own = np.append(np.setdiff1d(np.arange(len(at)), gone), impulses)
+    kept = np.concatenate([common, size + np.arange(rods), np.arange(len(at), size)])
+    sd = np.append(at.sd, np.ones(len(EXTRA) + rods))
+    rest = eliminate(blocks, sd, np.zeros(sd.size), own, kept).rest
     path = model.trajectory("impact", x)
     return QuadraticForm(
         run,
         record.chain.chain,
         record.ratios,
         here,
-        normal[np.ix_(kept, kept)] * np.outer(scale[kept], scale[kept]) - cross.T @ gain[:, :-1],
-        vector[kept] * scale[kept] - cross.T @ gain[:, -1],
-        constant - float(vector[own] * sd[own] @ gain[:, -1]),
+        rest._replace(columns=np.arange(kept.size)),
         alphas,
         path.speed[1:] / (1.0 + alphas * record.ratios),
         edges,
     )
 
 
-def _normal(
-    drop: Fit | JointDrop, alphas: Array, inflation: float
-) -> tuple[Array, Array, float, int]:
-    """‖r/σ‖² about a point, as in `QuadraticForm`, in the drop's unknowns and `EXTRA`, all in SI.
+def _blocks(drop: Fit | JointDrop, alphas: Array, inflation: float) -> tuple[list[Rows], int]:
+    """‖r/σ‖² in the drop's unknowns, `EXTRA`, and the mean of each impulse, all in SI.
 
-    The impulses stand for whole α, and the unknown α for nothing.
+    The impulses stand for whole α, and the unknown α for nothing; κ stands behind, free of what is
+    known of it beforehand.
     """
     model, x = drop.model, drop.x
     at = model.unknowns
-    size = len(at) + len(EXTRA)
-    point = np.concatenate([x, np.zeros(len(EXTRA))])
-    point[at["impulses"]], point[at["alpha"]] = alphas, 0.0
-    # κ stands behind the rods here, free of what is known of it beforehand.
-    point[-1], point[at["drag"]] = model.kappa(x), 0.0
-    matrix, vector, constant, edges = np.zeros((size, size)), np.zeros(size), 0.0, 0
+    size, rods = len(at) + len(EXTRA), alphas.size
+    point = np.concatenate([x, np.zeros(len(EXTRA)), alphas])
+    point[at["impulses"]] = 0.0
+    point[size - 1] = model.kappa(x) if "drag" in at else 0.0
+    nothing = [at[name].start for name in ("alpha", "drag") if name in at]
+    blocks, edges = [], 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
         expected = model.expected[role]
         times = expected.times[expected.chosen(matches)[1]] * (1.0 + x[at["clock"]])
         extra = np.column_stack(_extra(model, role, model.trajectory(role, x), times))
         extra[1:] -= rows.told[1:, None] * extra[:-1]
-        place = np.append(rows.columns, np.arange(len(at), size))
-        slopes = np.column_stack([rows.slopes, extra])
-        slopes[:, np.flatnonzero(rows.columns == at["drag"].start)] = 0.0
+        stays = ~np.isin(rows.columns, nothing)
+        struck = rows.columns - at["impulses"].start
+        means = np.flatnonzero((struck >= 0) & (struck < rods))
+        slopes = np.column_stack([rows.slopes[:, stays], extra, rows.slopes[:, means]])
+        place = [rows.columns[stays], np.arange(len(at), size), size + struck[means]]
+        columns = np.concatenate(place)
         sigma = rows.residuals.sigma * inflation
-        weight = robust_weights(rows.residuals.values / sigma, STRAY) / sigma**2
-        weighted = slopes * weight[:, None]
-        left = rows.residuals.values - slopes @ point[place]
-        matrix[np.ix_(place, place)] += slopes.T @ weighted
-        vector[place] += weighted.T @ left
-        constant += float(left @ (weight * left))
+        weight = np.sqrt(robust_weights(rows.residuals.values / sigma, STRAY)) / sigma
+        left = rows.residuals.values - slopes @ point[columns]
+        blocks.append(Rows(slopes * weight[:, None], left * weight, columns))
         edges += int((weight > 0.0).sum())
-    return matrix, vector, constant, edges
+    return blocks, edges
 
 
 def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple[Array, Array]:
@@ -178,9 +167,12 @@ def merged(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
     return [
         replace(
             group[0],
-            matrix=sum((one.matrix for one in group[1:]), group[0].matrix),
-            vector=sum((one.vector for one in group[1:]), group[0].vector),
-            constant=sum(one.constant for one in group),
+            rows=group[0]
+            .rows._replace(
+                slopes=np.concatenate([one.rows.slopes for one in group]),
+                left=np.concatenate([one.rows.left for one in group]),
+            )
+            .triangle(),
             alphas=np.mean([one.alphas for one in group], axis=0),
             arrivals=np.mean([one.arrivals for one in group], axis=0),
             edges=sum(one.edges for one in group),
