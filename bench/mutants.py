@@ -50,7 +50,7 @@ def make_session(folder: Path, runs: int = 1) -> Path:
 
 
 class Mutants:
-    """Mutants of one session.
+    """Mutants of one session, whose `columns` are those of every table.
 
     Parameters
     ----------
@@ -76,6 +76,12 @@ class Mutants:
             connection.execute("DELETE FROM sqlite_master WHERE type = 'trigger'")
             connection.executemany("UPDATE sqlite_master SET sql = ? WHERE name = ?", loose)
         self._tables = [name for kind, name, *_ in self._schema if kind == "table"]
+        with closing(_connected(self._loose)) as connection:
+            self.columns = [
+                (table, row[1])
+                for table in self._tables
+                for row in connection.execute(f'PRAGMA table_info("{table}")')
+            ]
 
     def write(self, seed: int, path: Path) -> str:
         """Write one mutant; say what was done to it."""
@@ -104,22 +110,29 @@ class Mutants:
         return what
 
     def _altered_value(self, rng: random.Random, path: Path) -> str:
+        table, column = rng.choice(self.columns)
+        # In one of five a table has no rows, too.
+        emptied = rng.choice(self._tables) if rng.random() < 0.2 else ""
+        value, row = rng.choice(VALUES), rng.randrange(3)
+        return self.alter(path, table, column, value, row=row, emptied=emptied)
+
+    def alter(
+        self, path: Path, table: str, column: str, value: Any, *, row: int, emptied: str = ""
+    ) -> str:
+        """Write a mutant with another value in a row, and a table emptied; say what was done."""
         shutil.copy(self._loose, path)
+        done = f"{table}.{column} = {value!r:.40} in row {row}"
         with closing(_connected(path)) as connection:
-            table = rng.choice(self._tables)
-            columns = [row[1] for row in connection.execute(f'PRAGMA table_info("{table}")')]
-            column, value = rng.choice(columns), rng.choice(VALUES)
             key = '"drop", idx' if table == "edge" else "rowid"
             how = "CAST(? AS TEXT)" if value == VALUES[-1] else "?"
-            done = f"{table}.{column} = {value!r:.40}"
             try:
                 connection.execute(
                     f'UPDATE "{table}" SET "{column}" = {how} WHERE ({key}) IN '  # noqa: S608
                     f'(SELECT {key} FROM "{table}" ORDER BY {key} LIMIT 1 OFFSET ?)',
-                    (value, rng.randrange(3)),
+                    (value, row),
                 )
-                if rng.random() < 0.2:  # a row less, too
-                    connection.execute(f'DELETE FROM "{rng.choice(self._tables)}"')  # noqa: S608
+                if emptied:
+                    connection.execute(f'DELETE FROM "{emptied}"')  # noqa: S608
             except sqlite3.Error:
                 done += ", which cannot be"
             connection.execute("PRAGMA writable_schema = ON")
@@ -152,9 +165,7 @@ def read_through(path: Path) -> None:
     """Read everything that any command reads of a session."""
     with Session.open(path, readonly=True) as session:
         session.check()
-        session.fired_ns()
         session.latest_state(1)
-        session.latest_drops()
 
 
 def altered_text(text: str, seed: int) -> str:

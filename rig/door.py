@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from rig.analysis.result import GOOD
-from rig.errors import InputError
+from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS, SEPARATION
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
@@ -141,6 +141,8 @@ class RecordedSession:
         ------
         InputError
             If no such drop was recorded.
+        SessionError
+            If its stored record is damaged.
         """
         import numpy as np  # noqa: PLC0415 - a door costs nothing before it is used
 
@@ -150,6 +152,10 @@ class RecordedSession:
             recorded = sorted({drop.run for drop in self._file.drops()})
             raise InputError(f"no recorded drop of run {run}", f"recorded are the runs {recorded}")
         drop = drops[-1]
+        if drop.damage:
+            raise SessionError(
+                f"run {run}, attempt {drop.attempt}: {drop.damage}", "see rig recover SESSION"
+            )
         ticks, channels, blocked = zip(*drop.edges, strict=True) if drop.edges else ((), (), ())
         hz = calibration(self._file).scale(drop).hz
         return Edges(
@@ -349,7 +355,8 @@ class Results:
 
     def __str__(self) -> str:
         stamp = "SIMULATED DATA\n" if self._found.simulated else ""
-        return stamp + summary_table(self._found.analysis.summary)
+        analysis = self._found.analysis
+        return "\n".join([stamp + summary_table(analysis.summary), *analysis.damage])
 
     def __repr__(self) -> str:
         good = sum(run.verdict in GOOD for run in self.runs)

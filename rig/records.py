@@ -121,6 +121,9 @@ class Drop:
         `None` for imported edges.
     faults
         Why the record is not whole (empty when it is): a void run says these as its reasons.
+    damage
+        Why the stored record is not the one that was made; empty where it is. A damaged record
+        has no edges: it tells nothing of the rig.
     """
 
     run: int
@@ -131,3 +134,4 @@ class Drop:
     initial_state: int = 0
     certificate: Certificate | None = None
     faults: tuple[str, ...] = ()
+    damage: str = ""

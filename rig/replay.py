@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rig.link.messages import TEST_RUN
-from rig.link.transcript import Transcript
 from rig.records import ClockSample, Drop, Pulse
 from rig.results import results
+from rig.session.drop_check import ByteReplay, as_old_as
+from rig.session.reading import Reader
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rig.analysis.session import Progress
-    from rig.session.reading import Reader
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,34 @@ class Outcome:
 
     lines: tuple[str, ...]
     differences: tuple[str, ...]
+
+
+class _ByBytes(Reader):
+    """A session in which drops, clock samples and pulses are what the bytes give."""
+
+    def __init__(self, session: Reader) -> None:
+        super().__init__(session.path, session.connection)
+        replay = ByteReplay()
+        replay.feed(session.byte_log())
+        self.chunks = replay.fed
+        self._samples = [one for one in replay.records if isinstance(one, ClockSample)]
+        self._pulses = [one for one in replay.records if isinstance(one, Pulse)]
+        acknowledged = replay.acknowledged()
+        # What was stored and not acknowledged any more still is in the bytes.
+        have = {_key(drop) for drop in acknowledged}
+        stored = {_key(drop): drop for drop in session.drops()}
+        late = [drop for drop in replay.unfinished() if _key(drop) in stored.keys() - have]
+        told = sorted(_once([*acknowledged, *late]), key=_key)
+        self._drops = [as_old_as(stored.get(_key(drop), drop), drop) for drop in told]
+
+    def drops(self, *_: object, **__: object) -> Iterator[Drop]:
+        yield from self._drops
+
+    def pings(self, after: int = 0) -> list[ClockSample]:
+        return self._samples[after:]
+
+    def pulses(self) -> list[Pulse]:
+        return self._pulses
 
 
 def replay(session: Reader, progress: Progress | None = None) -> Outcome:
@@ -37,53 +66,25 @@ def _compared(session: Reader, progress: Progress | None) -> Outcome:
     lines: list[str] = []
     differences: list[str] = []
 
-    def compare(what: str, again: object, stored: object, count: int) -> None:
+    def compare(what: str, again: list[Any], stored: list[Any]) -> None:
         same = again == stored
-        lines.append(f"{what}: {count} {'identical' if same else 'DIFFERENT'}")
+        lines.append(f"{what}: {len(stored)} {'identical' if same else 'DIFFERENT'}")
         if not same:
             differences.append(what)
 
-    chunks, drops, pings, pulses = _from_bytes(session)
-    if chunks:
-        held = sorted(session.drops(), key=_key)
-        compare("drops", sorted(drops, key=_key), held, len(held))
-        compare("clock samples", pings, session.pings(), len(pings))
-        if pulses or session.pulses():
-            compare("reference pulses", pulses, session.pulses(), len(pulses))
-    else:
+    again = _ByBytes(session)
+    if not again.chunks:
         lines.append("no bytes were recorded: the edges come from a file")
-    stored = session.results()
-    again = sorted(results(session, progress).records(), key=_number)
-    if stored:
-        compare("results", again, stored, len(stored))
     else:
-        lines.append("results: none stored yet; rig analyze keeps them")
+        compare("drops", list(again.drops()), sorted(session.drops(), key=_key))
+        compare("clock samples", again.pings(), session.pings())
+        if again.pulses() or session.pulses():
+            compare("reference pulses", again.pulses(), session.pulses())
+    stored = results(session, progress).records()
+    once_more = again if again.chunks else session
+    compare("results", results(once_more, progress).records(), stored)
     lines.append("identical" if not differences else f"DIFFERENT: {', '.join(differences)}")
     return Outcome(tuple(lines), tuple(differences))
-
-
-def _from_bytes(session: Reader) -> tuple[int, list[Drop], list[ClockSample], list[Pulse]]:
-    """Parse the whole byte log."""
-    transcript = Transcript()
-    drops: list[Drop] = []
-    pings: list[ClockSample] = []
-    pulses: list[Pulse] = []
-    chunks = 0
-    for host_ns, direction, data in session.byte_log():
-        chunks += 1
-        for record in transcript.feed(direction, host_ns, data):
-            if isinstance(record, Drop):
-                if record.run != TEST_RUN:  # of the release, and of no plan
-                    drops.append(record)
-            elif isinstance(record, ClockSample):
-                pings.append(record)
-            elif isinstance(record, Pulse):
-                pulses.append(record)
-    # What was stored and not acknowledged any more still is in the bytes.
-    have = {_key(drop) for drop in drops}
-    stored = {_key(drop) for drop in session.drops()}
-    drops += [d for d in transcript.unfinished() if _key(d) in stored - have]
-    return chunks, _once(drops), pings, pulses
 
 
 def _once(drops: list[Drop]) -> list[Drop]:
@@ -102,7 +103,3 @@ def _once(drops: list[Drop]) -> list[Drop]:
 
 def _key(drop: Drop) -> tuple[int, int]:
     return drop.run, drop.attempt
-
-
-def _number(result: dict[str, Any]) -> tuple[int, int]:
-    return result["run"], result["attempt"]

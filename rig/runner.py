@@ -37,7 +37,7 @@ from rig.protocol.plan import runs
 from rig.recorder.interrupts import Interrupts
 from rig.records import Job
 from rig.report.numbers import plus_minus, signed
-from rig.results import keep, results
+from rig.results import results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -130,14 +130,9 @@ def run_protocol(
     finally:
         rig.close()
     # The owner of the port has let go of the file: results are the runner's own business.
-    with Session.open(session_path) as session:
+    with Session.open(session_path, readonly=True) as session:
         operator.say("analysing the session …")
-        known = campaign.live.identified
-        found = results(session, known=known)
-        with interrupts.held():
-            keep(session, found, known)
-            session.commit()
-        return found
+        return results(session, known=campaign.live.identified)
 
 
 class Campaign:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rig.analysis.alone import Alone
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import FEW_GATES, silent
@@ -20,7 +19,7 @@ from rig.analysis.gate_passages import gate_passages
 from rig.analysis.identified import Identified, identified
 from rig.analysis.last_passages import last_passages
 from rig.analysis.quantities import measured, quantities
-from rig.analysis.result import Audit, DropResult
+from rig.analysis.result import NO_EDGES, Audit, DropResult
 from rig.analysis.verdict import judge
 from rig.protocol.contact import at_contact
 from rig.records import Job
@@ -84,11 +83,11 @@ def fit_drop(
         What was found out before about drops of this session, and is found out here. Results are
         the same with it and without.
     """
-    known, job = {} if known is None else known, Job(drop.run, drop.attempt)
-    result, fit = _fitted(protocol, run, drop, scale, components, known, explain=explain)
-    if explain:
-        known[job] = replace(known[job], alone=Alone(scale.hz, result))
-    return result, fit
+    if drop.damage:  # the file's, and no finding about chains or gates
+        why = (f"damaged: {drop.damage}; see rig recover SESSION",)
+        return DropResult(run, drop.attempt, "void", why, NO_EDGES, damaged=True), None
+    known = {} if known is None else known
+    return _fitted(protocol, run, drop, scale, components, known, explain=explain)
 
 
 def _fitted(

@@ -13,6 +13,7 @@ _COMPARE = (
     "channels"
 )
 _REMEDIES: tuple[tuple[str, str], ...] = (
+    ("^damaged: ", "rig recover SESSION says what is whole, and with -o NEW saves it"),
     ("likeliest, but not clearly", _COMPARE),  # names several things, of which one may be true
     ("in the wrong way round", "exchange the two plugs, or their channels in the protocol"),
     ("pile up", "incline the surface more, or hang fewer rods"),

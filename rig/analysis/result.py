@@ -137,6 +137,9 @@ class Audit:
         return {name: getattr(self, name) for name in names}
 
 
+NO_EDGES = Audit(*[0] * 5)
+
+
 @dataclass(frozen=True, slots=True)
 class DropResult:
     """Everything that a drop says.
@@ -155,6 +158,8 @@ class DropResult:
         Every edge that is missing or belongs to no rod, and why.
     limits
         The verdict that a rejected drop has by its limits.
+    damaged
+        Whether its stored record is damaged, which tells nothing of the rig.
     gates
         How one object passed each gate.
     last_passages
@@ -172,6 +177,7 @@ class DropResult:
     learned: bool = False
     unmatched: tuple[UnmatchedEdge, ...] = ()
     limits: Verdict | None = None
+    damaged: bool = False
     last_passages: Mapping[str, Measured] = field(default_factory=dict)
     gates: tuple[GatePassage, ...] = ()
 
@@ -183,6 +189,7 @@ class DropResult:
             "incline_deg": self.run.incline_deg,
             "impact_chain": self.run.impact,
         }
+        found |= {"damaged": True} if self.damaged else {}
         found |= {name: value.json() for name, value in self.quantities.items()}
         if self.gates:
             found["gates"] = [one.json() for one in self.gates]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol
+    from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop, Job
 
     Progress = Callable[[int, int], None]
@@ -72,6 +72,19 @@ class Analysis:
     effects: tuple[Effects, ...] = ()
     with_rejected: tuple[Incline, ...] = ()
     unsettled: bool = False
+
+    @property
+    def damaged(self) -> tuple[DropResult, ...]:
+        """Drops whose stored record is damaged."""
+        return tuple(one for one in (*self.runs, *self.superseded) if one.damaged)
+
+    @property
+    def damage(self) -> list[str]:
+        """A line that counts and names the damaged drops; none where there are none."""
+        names = "; ".join(f"run {one.run.number}, attempt {one.attempt}" for one in self.damaged)
+        count = f"{len(self.damaged)} of {len(self.runs) + len(self.superseded)} drops"
+        line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
+        return [line] if names else []
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
@@ -137,21 +150,31 @@ def analyze(
     results: list[DropResult] = []
     fits: list[Fit | None] = []
     for number, drop in enumerate(drops, start=1):
-        if drop.run not in planned:
-            raise InputError(
-                f"run {drop.run} is not in the plan, which has {len(planned)} runs",
-                "is it the right protocol? rig check PROTOCOL shows the plan",
-            )
+        run = planned_run(planned, drop)
         # What is wrong with a rig is wrong in drop after drop: some of them tell it.
-        told = sum(one.verdict == "void" for one in results) >= _EXPLAINED
-        result, fit = fit_drop(
-            protocol, planned[drop.run], drop, scale(drop), explain=not told, known=known
-        )
+        told = sum(one.verdict == "void" and not one.damaged for one in results) >= _EXPLAINED
+        result, fit = fit_drop(protocol, run, drop, scale(drop), explain=not told, known=known)
         results.append(overruled(result, rejected.get((drop.run, drop.attempt))))
         fits.append(fit)
         if progress is not None:
             progress(number, len(drops))
     return gather(protocol, results, fits)
+
+
+def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
+    """Find the run of the plan that a drop was.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    if drop.run not in planned:
+        raise InputError(
+            f"run {drop.run} is not in the plan, which has {len(planned)} runs",
+            "is it the right protocol? rig check PROTOCOL shows the plan",
+        )
+    return planned[drop.run]
 
 
 def overruled(result: DropResult, causes: Sequence[str] | None) -> DropResult:

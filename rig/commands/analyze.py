@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.video import VideoFall, video_fall
 from rig.commands.output import print_results, progress, show
-from rig.errors import SessionError
 from rig.measurands import acceleration_in
 from rig.report.columns import aligned
 from rig.report.numbers import plus_minus
 from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
-from rig.results import keep, results
+from rig.results import results
 from rig.session.store import Session
 from rig.timers.video import read_video
 
@@ -20,23 +18,19 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator
 
-    from rig.analysis.identified import Identified
     from rig.analysis.result import Measured
-    from rig.records import Job
     from rig.results import SessionResults
 
 
 def main(arguments: Namespace) -> int:
-    """Compute the results of a session and keep them in it."""
+    """Compute the results of a session."""
     if arguments.budget is not None:
         from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
 
         return budget.main(arguments)
     track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
-        extent = session.extent()
-        known: dict[Job, Identified] = {}
-        found = results(session, progress("analysing run"), known)
+        found = results(session, progress("analysing run"))
     more: dict[str, Any] = {}
     if arguments.session_trials is not None:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - likewise
@@ -49,10 +43,6 @@ def main(arguments: Namespace) -> int:
     video = None if track is None else video_fall(*track)
     if video is not None and not found.blind:
         more["video"] = video.json(_by_gates(found))
-    # A session that is being written, or on a read-only disk, is analysed all the same.
-    with suppress(SessionError), Session.open(arguments.session) as session:
-        if session.extent() == extent:  # else it went on meanwhile, and these are out of date
-            keep(session, found, known)
     code = print_results(found, as_json=arguments.json, more=more)
     if not arguments.json:
         asked = [scatter_part(found.analysis.summary)] if arguments.scatter else []

@@ -16,17 +16,15 @@ from rig.analysis.monte_carlo import (
     until_decided,
 )
 from rig.analysis.result import Measured
-from rig.commands.output import print_json
+from rig.analysis.session import planned_run
+from rig.commands.output import print_json, tell_damage
 from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs
-from rig.records import Job
 from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.results import (
     calibration,
     check_open,
-    kept,
-    kept_identified,
     protocol_of,
     results,
 )
@@ -47,16 +45,18 @@ _LEAST = 0.001  # in the finer unit: less is none
 def main(arguments: Namespace) -> int:
     """Print a run's budget in the session's light, and by itself beside Monte Carlo trials."""
     with Session.open(arguments.session, readonly=True) as session:
-        found = budget(session, arguments.budget, arguments.trials, SEED)
+        found, analysis = budget(session, arguments.budget, arguments.trials, SEED)
     if arguments.json:
         print_json(found)
     else:
         print("\n".join(_table(found)))
-    return 0
+    return tell_damage(analysis)
 
 
-def budget(session: Reader, number: int, trials: int | str | None, seed: int) -> dict[str, Any]:
-    """Account for the uncertainty of a run's results.
+def budget(
+    session: Reader, number: int, trials: int | str | None, seed: int
+) -> tuple[dict[str, Any], Analysis]:
+    """Account for the uncertainty of a run's results, beside the analysis of all.
 
     Parameters
     ----------
@@ -76,13 +76,12 @@ def budget(session: Reader, number: int, trials: int | str | None, seed: int) ->
         raise InputError(f"run {number} has no drop in this session")
     protocol = protocol_of(session)
     check_open(session, protocol)
-    planned = next(run for run in runs(protocol) if run.number == number)
-    known = kept_identified(session, {Job(drop.run, drop.attempt): drop})
-    alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop), known=known)
+    planned = planned_run({run.number: run for run in runs(protocol)}, drop)
+    alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
         raise InputError(f"run {number} is void: {'; '.join(alone.reasons)}")
-    # What was worked out and kept is not worked out again: the other runs are most of the work.
-    records = kept(session) or results(session).records()
+    whole = results(session)
+    records = whole.records()
     record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
     if trials is None:
         trial, drawn = until_decided(fit, alone.quantities, seed)
@@ -106,7 +105,7 @@ def budget(session: Reader, number: int, trials: int | str | None, seed: int) ->
                 for name, one in trial.items()
             },
         },
-    }
+    }, whole.analysis
 
 
 def _measured(record: Mapping[str, Any], name: str) -> Measured:

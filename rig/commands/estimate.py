@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.likeness import likeness
-from rig.commands.output import print_json, progress, say
+from rig.commands.output import print_json, progress, say, tell_damage
 from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
 from rig.report.estimate import estimate_text
@@ -42,4 +42,4 @@ def main(arguments: Namespace) -> int:
             say(f"{folder / name}.svg")
     for sentence in sections.failed.values():
         say(sentence)
-    return 0
+    return tell_damage(analysis)

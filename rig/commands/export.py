@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.commands.output import progress, say
+from rig.commands.output import progress, say, tell_damage
 from rig.files import make_folder
 from rig.results import results, tick_rates
 from rig.session.export import export_csv
@@ -21,4 +21,4 @@ def main(arguments: Namespace) -> int:
         found = results(session, progress("analysing run"))
         export_csv(arguments.csv, session, found.json(), tick_rates(session))
     say(f"CSV files: {arguments.csv}")
-    return 0
+    return tell_damage(found.analysis)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from rig.analysis.session import Analysis
     from rig.results import SessionResults
 
 VOID = 3
@@ -186,5 +187,13 @@ def print_results(
 
         if not found.blind:
             show(summary_table(found.analysis.summary).splitlines())
-        show([*void_lines(found.analysis), *remarks(found)])
-    return VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0
+        show([*void_lines(found.analysis), *found.analysis.damage, *remarks(found)])
+    void = any(one.verdict == "void" for one in found.analysis.runs) or found.analysis.damaged
+    return VOID if void else 0
+
+
+def tell_damage(analysis: Analysis) -> int:
+    """Say which drops are damaged; the exit code tells it too."""
+    for line in analysis.damage:
+        say(line)
+    return VOID if analysis.damaged else 0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.analysis.curves import model_curves
-from rig.commands.output import progress, say, stage
+from rig.commands.output import progress, say, stage, tell_damage
 from rig.estimate.session import estimate
 from rig.files import check_place, make_folder, write_atomic
 from rig.films import read_films
@@ -95,7 +95,7 @@ def main(arguments: Namespace) -> int:
                 },
                 identities=[identity for _, identity in session.identities()],
                 clock=found.clock.details,
-                notes=remarks(found),
+                notes=[*found.analysis.damage, *remarks(found)],
                 operator_notes=_noted(session),
                 deviations=deviations(protocol, found.analysis, session.states()),
                 parts=parts,
@@ -116,7 +116,7 @@ def main(arguments: Namespace) -> int:
     for sentence in (*(estimated.failed if estimated else ()), *sections.failed.values()):
         say(sentence)
     say(f"report: {arguments.output}")
-    return 0
+    return tell_damage(found.analysis)
 
 
 def _version(package: str) -> str:

@@ -10,7 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig import __version__
 from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.messages import TEST_RUN, Reason
 from rig.link.refusals import DeviceRefusedError
@@ -147,9 +146,6 @@ class Controller:
             self._session, self._protocol = opened, scene
             check_recordable(scene, self.connect().capabilities())
             self._locator.bound = True
-            with self.interrupts.held():
-                opened.put_results([], __version__)  # of less than there will be
-                opened.commit()
             fetched = self.settle()
         except BaseException as error:
             # With other input it would be another protocol's, or of another kind of port: in the

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.printable import printable
-from rig.recover.drops import Fate, Recovered, recover_drops
+from rig.recover.drops import Recovered, recover_drops
 from rig.recover.pages import MAGIC, Pages, read_pages
 from rig.recover.rows import Rows, find_rows, gaps
 from rig.recover.snapshot import SessionCopy, take_snapshot
+from rig.session.drop_check import Fate
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 
 if TYPE_CHECKING:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from rig.recover.pages import read_cells
-from rig.session.foreign import members, texts
-from rig.session.schema import RunState
+from rig.session.rows import COLUMNS, RowError, check_row
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rig.recover.pages import PageCell, Pages, Value
 
 Row: TypeAlias = "tuple[Value, ...]"
 
-_STATES = frozenset(RunState)
-_U32 = 1 << 32
+_TABLES = ("bytes", "identity", "ping", "host_break", "reference", "run_state", "drop")
+_LENGTHS = {"drop": {14, 15, 20}}  # of each format
 _TRIP_NS = 60 * 10**9  # no answer takes longer
 
 
@@ -64,53 +61,30 @@ def gaps(numbers: dict[int, Row]) -> int:
 
 
 def _sort(rows: Rows, cell: PageCell) -> None:
+    """Put a record where it belongs by its shape; one that is no row of a session is left out."""
     rowid, values = cell
-    if rowid is None:
-        match values:
-            case (int(drop), int(index), int(), int(), 0 | 1):
-                rows.edge.setdefault(drop, {}).setdefault(index, values)
-        return
-    if rowid < 1:
-        return
-    match values:
-        case (str(key), str(value)):
+    match rowid, values:
+        case None, (int(drop), int(index), *_) if _fits("edge", values):
+            rows.edge.setdefault(drop, {}).setdefault(index, values)
+        case None, _:
+            return
+        case int(), (str(key), str(value)):
             rows.meta.setdefault(key, value)
-        case (None, str(source), str(text)):
+        case int(), (None, str(source), str(text)):
             rows.protocol = rows.protocol or (source, text)
-        case (None, int(), "rx" | "tx", bytes()):
-            rows.bytes.setdefault(rowid, values)
-        case (None, int(), str(text)) if _reads(members, text):
-            rows.identity.setdefault(rowid, values)
-        case (None, int(sent), int(received), int(tick)):
-            trip = 0 <= received - sent <= _TRIP_NS and 0 <= tick < _U32
-            (rows.ping if trip else rows.host_break).setdefault(rowid, values)
-        case (None, int(), int(), int(), int()):
-            rows.reference.setdefault(rowid, values)
-        case (None, int(run), int(), str(state), str(reasons), int()) if (
-            run >= 1 and state in _STATES and _reads(texts, reasons)
-        ):
-            rows.run_state.setdefault(rowid, values)
-        case (None, int(run), int(attempt), int(hz), *_) if _is_drop(values, run, attempt, hz):
-            rows.drop.setdefault(rowid, values)
+        case int(), (None, *rest):
+            row = (rowid, *rest)  # SQLite leaves the number out of the record
+            table = next((name for name in _TABLES if _fits(name, row)), None)
+            if table is not None:
+                getattr(rows, table).setdefault(rowid, row)
 
 
-def _is_drop(values: Row, run: int, attempt: int, hz: int) -> bool:
-    if len(values) not in {14, 15, 20} or run < 1 or attempt < 1 or hz < 1:
+def _fits(table: str, row: Row) -> bool:
+    if len(row) not in _LENGTHS.get(table, {len(COLUMNS[table])}):
         return False
-    numbers = [*values[4:11], values[12], *values[14:]]
-    return (
-        all(value is None or isinstance(value, int) for value in numbers)
-        and isinstance(values[5], int)
-        and len({value is None for value in values[6:11]}) == 1  # of a certificate all or nothing
-        and isinstance(values[11], str)
-        and _reads(texts, values[11])
-        and isinstance(values[13], str)
-    )
-
-
-def _reads(read: Callable[[str], object], text: str) -> bool:
     try:
-        read(text)
-    except (TypeError, ValueError, RecursionError):
+        check_row(table, row)
+    except RowError:
         return False
-    return True
+    # Breaks of the host have the same columns.
+    return table != "ping" or 0 <= cast("int", row[2]) - cast("int", row[1]) <= _TRIP_NS

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import sqlite3
 from contextlib import closing
@@ -12,6 +11,8 @@ from tempfile import TemporaryDirectory
 
 from rig.errors import SessionError
 from rig.files import require_file
+from rig.session.database import copy_session
+from rig.session.lock import writer_of
 from rig.session.store import Session
 
 _TROUBLE = (sqlite3.Error, UnicodeDecodeError)
@@ -58,7 +59,7 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
         There is nothing that can be read.
     """
     place = Path(os.path.realpath(path))
-    writer, logged = _writer(place), None
+    writer, logged = writer_of(place), None
     try:
         require_file(place)
         with TemporaryDirectory(prefix="rig-recover-") as folder:
@@ -66,10 +67,8 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
             if writer:
                 _copy_beside_writer(place, copy)
             else:
-                copy.write_bytes(place.read_bytes())
-                beside = place.with_name(place.name + "-wal")
-                if beside.is_file() and (log := beside.read_bytes()):
-                    copy.with_name("copy-wal").write_bytes(log)
+                copy_session(place, Path(folder))
+                if copy.with_name("copy-wal").exists():
                     logged = _fold_in(copy)
             data = copy.read_bytes()
             complaints = _complaints(copy)
@@ -84,20 +83,6 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
     return SessionCopy(
         place, data, logged, writer, os.access(place, os.W_OK), complaints, unreadable
     )
-
-
-def _writer(place: Path) -> str:
-    """Ask the writer's lock, see `rig.session.lock`, without making one."""
-    try:
-        with place.with_name(place.name + ".lock").open("rb") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                owner = lock.read(32).decode("ascii", "replace").strip()
-                return f"process {owner}" if owner else "another process"
-    except OSError:
-        return ""
-    return ""
 
 
 def _copy_beside_writer(place: Path, copy: Path) -> None:

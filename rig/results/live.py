@@ -16,12 +16,13 @@ from rig.analysis.drop import fit_drop
 from rig.analysis.gravity import free_gravity
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
-from rig.analysis.session import gather, overruled, sum_up
+from rig.analysis.session import gather, overruled, planned_run, sum_up
 from rig.clock.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
 from rig.results.blind import kept_back, veiled, veiled_drop
-from rig.results.whole import kept_identified, protocol_of, rejected
+from rig.results.whole import protocol_of, rejected
+from rig.session.drop_check import ByteReplay
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -141,6 +142,7 @@ class LiveAnalysis:
     _curves: dict[str, Any] | None = None
     _joint_fit: _JointFit | None = None
     _calibrator: Calibrator = field(default_factory=Calibrator)
+    _replay: ByteReplay = field(default_factory=ByteReplay)
     _scene: tuple[Protocol, dict[int, Run]] | None = None
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
@@ -162,7 +164,7 @@ class LiveAnalysis:
         """
         protocol, plan = self._planned(session)
         scale, known = self.clock(session).scale(drop), self.identified
-        found, _ = fit_drop(protocol, plan[drop.run], drop, scale, known=known)
+        found, _ = fit_drop(protocol, planned_run(plan, drop), drop, scale, known=known)
         return veiled_drop(found) if kept_back(session, protocol) else found
 
     def read(self) -> SessionView:
@@ -178,15 +180,14 @@ class LiveAnalysis:
                 protocol, plan = self._planned(session)
                 clock, states = self.clock(session), tuple(session.states())
                 if states != self._log:  # records are only added, and that is logged
-                    self._drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
+                    checked = session.drops(self._replay)
+                    self._drops = {Job(drop.run, drop.attempt): drop for drop in checked}
                     self._log = states
                 causes, blind = rejected(session), kept_back(session, protocol)
-                if not self._readings:
-                    self.identified = kept_identified(session, self._drops) | self.identified
             drops = self._drops
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
             for job, drop in drops.items():
-                self._analyse(protocol, plan[job.run], job, drop, scales[job])
+                self._analyse(protocol, planned_run(plan, drop), job, drop, scales[job])
             results = {job: overruled(self._known[job].result, causes.get(job)) for job in drops}
             if self._curves is None:
                 self._curves = model_curves(protocol)
@@ -257,21 +258,11 @@ class LiveAnalysis:
     ) -> None:
         known = self._known.get(job)
         if known is None or not _as_good(known.hz, scale):
-            result, fit = self._alone(protocol, run, job, drop, scale)
+            result, fit = fit_drop(protocol, run, drop, scale, known=self.identified)
             falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)
         self.done = len(self._known)
-
-    def _alone(
-        self, protocol: Protocol, run: Run, job: Job, drop: Drop, scale: TimeScale
-    ) -> tuple[DropResult, Fit | None]:
-        """Say what a drop says by itself; what was kept of that needs no fit until a joint one."""
-        one = self.identified.get(job)
-        kept = one.alone if one else None
-        if kept and kept.result.run == run and _as_good(kept.hz, scale):
-            return kept.result, None
-        return fit_drop(protocol, run, drop, scale, known=self.identified)
 
 
 def _as_good(hz: float, scale: TimeScale) -> bool:

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
-from rig import __version__
 from rig.analysis.gravity import check_gravity
-from rig.analysis.identified import Identified
 from rig.analysis.session import analyze
 from rig.clock.calibration import Calibrator
 from rig.protocol import reader
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
-from rig.session.reading import BESIDE
 from rig.session.schema import RunState, noted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, MutableMapping
 
     from rig.analysis.gravity import GravityCheck
+    from rig.analysis.identified import Identified
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.session.reading import Reader
-    from rig.session.store import Session
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +58,7 @@ class SessionResults:
         return self.clock.said | _checked(self.clock.said["notes"], self.gravity)
 
     def records(self) -> list[dict[str, Any]]:
-        """Return each drop as JSON has it, those with a later attempt last, as a session keeps."""
+        """Return each drop as JSON has it, those with a later attempt last."""
         found = self.json()
         return [*found["runs"], *found.get("superseded", [])]
 
@@ -75,53 +70,6 @@ class SessionResults:
         head = {"simulated": self.simulated, "clock": self.clock.details}
         head |= {"blind": True} if self.blind else {}
         return head | {"calibration": self.calibration} | said
-
-
-def keep(
-    session: Session, found: SessionResults, known: Mapping[Job, Identified] | None = None
-) -> None:
-    """Keep results in the session that they are of, as it stands.
-
-    Parameters
-    ----------
-    known
-        What was found out about its drops, for the next who opens it.
-    """
-    records = found.records()
-    if known and not found.blind:  # else it would tell what is kept back
-        drops = {Job(drop.run, drop.attempt): drop for drop in session.drops()}
-        for one in records:
-            job = Job(one["run"], one["attempt"])
-            if job in known:
-                text = json.dumps(known[job].json())
-                one[BESIDE] = [_seal(text, drops[job]), text]
-    session.put_results(records, _version(session))
-
-
-def kept_identified(session: Reader, drops: Mapping[Job, Drop]) -> dict[Job, Identified]:
-    """Return what is kept of which rods the edges of drops are.
-
-    Nothing of another version of the program, or that is not as it was written.
-    """
-    found = {}
-    for at, beside in session.beside_results(__version__).items():
-        match Job(*at), beside:
-            case job, [seal, str(text)] if job in drops and seal == _seal(text, drops[job]):
-                found[job] = Identified.read(json.loads(text))
-    return found
-
-
-def _seal(text: str, drop: Drop) -> str:
-    return sha256(f"{json.dumps(drop.edges)}\n{text}".encode()).hexdigest()
-
-
-def kept(session: Reader) -> list[dict[str, Any]]:
-    """Return kept records of the drops; none where the session went on, or the program did."""
-    return session.results_of(_version(session))
-
-
-def _version(session: Reader) -> str:
-    return f"{__version__} of {session.extent()}"
 
 
 def protocol_of(session: Reader) -> Protocol:

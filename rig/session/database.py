@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sqlite3
 from contextlib import closing
-from typing import TYPE_CHECKING
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rig.errors import SessionError
 from rig.files import require_file, sync_directory
 from rig.session.faults import not_a_session, translated
 from rig.session.foreign import check_schema, guard
+from rig.session.lock import writer_of
 from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION, UPGRADES
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _BUSY_S = 2.0  # only a program other than this one can hold the database for longer
 
@@ -103,7 +103,7 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
     # Never read the header by hand: closing a second handle on the file would drop the POSIX
     # locks of a writer in this very process.
     with translated(path):
-        connection = _connect(path, _reading_mode(path) if readonly else "rw")
+        connection = _reading(path) if readonly else _connect(path, "rw")
         try:
             guard(connection)
             check_schema(path, connection, _format(path, connection))
@@ -135,6 +135,49 @@ def _upgrade(connection: sqlite3.Connection) -> None:
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
     uri = f"{path.as_uri()}?mode={mode}"
     return sqlite3.connect(uri, uri=True, timeout=_BUSY_S, isolation_level=None)
+
+
+def copy_session(path: Path, folder: Path) -> Path:
+    """Copy a session that nobody writes, with the log (``-wal``) beside it.
+
+    Raises
+    ------
+    SessionError
+        It cannot be read, or there is no room for it.
+    """
+    copy = folder / "copy"
+    log = path.with_name(path.name + "-wal")
+    try:
+        shutil.copyfile(path, copy)
+        if log.is_file() and log.stat().st_size:
+            shutil.copyfile(log, folder / "copy-wal")
+    except OSError as error:
+        raise SessionError(
+            f"cannot read {path}: {error.strerror or error}",
+            "check its name and permissions, and that there is room for a copy in TMPDIR",
+        ) from error
+    return copy
+
+
+def _reading(path: Path) -> sqlite3.Connection:
+    """Open a session so that its file, and what lies beside it, stay as they are."""
+    # A log whose writer is gone would be brought into the file by whoever closes it last.
+    left = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
+    if left and not writer_of(path):
+        connection = _read_copy(path)
+        if not writer_of(path):  # else it may have been copied in the middle of a write
+            return connection
+        connection.close()
+    return _connect(path, _reading_mode(path))
+
+
+def _read_copy(path: Path) -> sqlite3.Connection:
+    with TemporaryDirectory(prefix="rig-session-") as folder:
+        copy = copy_session(path, Path(folder))
+        with closing(_connect(copy, "rw")) as source:
+            memory = sqlite3.connect(":memory:", isolation_level=None)
+            source.backup(memory)
+    return memory
 
 
 def _reading_mode(path: Path) -> str:

@@ -7,17 +7,15 @@ first row is read.
 
 from __future__ import annotations
 
-import json
 import sqlite3
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from rig.errors import SessionError
 from rig.session.schema import CREATE, LATER
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     Shape: TypeAlias = tuple[object, ...]
@@ -28,7 +26,6 @@ LONGEST_VALUE = 1 << 26
 _STEPS = 1 << 20  # of SQLite's machine, between two looks at how many there were
 _MOST_STEPS = 1 << 31
 """Of one statement: reading a session of a day takes a hundredth."""
-_KINDS = {"i": int, "t": str, "b": bytes}
 _OF_ANALYZE = {"sqlite_stat1", "sqlite_stat4"}  # left behind by somebody's ANALYZE
 
 
@@ -99,77 +96,4 @@ def _schema(connection: sqlite3.Connection) -> dict[str, Shape]:
             found[name] = (kind, table_kind, *how, *columns)
         else:
             found[name] = (kind, of, " ".join((sql or "").split()))
-    return found
-
-
-@contextmanager
-def readable(path: Path) -> Iterator[None]:
-    """Raise what comes of values of a wrong kind or form as `SessionError`.
-
-    Raises
-    ------
-    SessionError
-        Text that is no JSON or none of the words it must be, a number where text belongs.
-    """
-    try:
-        yield
-    except SessionError:
-        raise
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        raise SessionError(f"{path} has a record that makes no sense", RECOVER) from error
-
-
-def fitting(row: tuple[Any, ...], kinds: str) -> tuple[Any, ...]:
-    """Look at a row: one letter a column, small for what must be there.
-
-    Parameters
-    ----------
-    row
-        The values.
-    kinds
-        ``i`` a whole number, ``t`` text, ``b`` bytes; a capital where there may be none.
-
-    Raises
-    ------
-    TypeError
-        Another kind.
-    """
-    if tuple(map(type, row)) == _types(kinds):  # as nearly all are, and edges are many
-        return row
-    for value, kind in zip(row, kinds, strict=True):
-        if type(value) is not _KINDS[kind.lower()] and not (value is None and kind.isupper()):
-            raise TypeError(f"{value!r:.40} is not {kind}")
-    return row
-
-
-@cache
-def _types(kinds: str) -> tuple[type, ...]:
-    return tuple(_KINDS[kind.lower()] for kind in kinds)
-
-
-def texts(told: str) -> tuple[str, ...]:
-    """Read a JSON list of texts.
-
-    Raises
-    ------
-    TypeError, ValueError
-        It is something else.
-    """
-    found = json.loads(told)
-    if not isinstance(found, list) or not all(isinstance(one, str) for one in found):
-        raise TypeError(f"{told:.40} is no list of texts")
-    return tuple(found)
-
-
-def members(told: str) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Raises
-    ------
-    TypeError, ValueError
-        It is something else.
-    """
-    found = json.loads(told)
-    if not isinstance(found, dict):
-        raise TypeError(f"{told:.40} is no object")
     return found

@@ -86,6 +86,20 @@ class WriterLock:
         self._handle = None
 
 
+def writer_of(session: Path) -> str:
+    """Name the process that has a session open for writing; empty without one."""
+    try:
+        with session.with_name(session.name + ".lock").open("rb") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                owner = lock.read(32).decode("ascii", "replace").strip()
+                return f"process {owner}" if owner else "another process"
+    except OSError:
+        return ""
+    return ""
+
+
 def _refuse_second_name(session: Path) -> None:
     """A hard link has a lock and a log of its own: two writers would destroy the file."""
     with suppress(FileNotFoundError):

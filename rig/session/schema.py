@@ -134,6 +134,7 @@ CREATE TABLE run_state (
 
 CREATE INDEX run_state_by_run ON run_state (run, id);
 
+-- Of older programs; results are derived, and nothing writes or reads them here any more.
 CREATE TABLE result (
     run INTEGER NOT NULL,
     attempt INTEGER NOT NULL,

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from rig import __version__
 from rig.errors import InputError, SessionError
@@ -52,7 +52,7 @@ class Session(Reader):
         self._gone: SessionError | None = None
         self.rescued = False  # saved elsewhere, whole, since the file is not at its place any more
         # Counted here, not by SQLite, so that a commit tried again writes the same rows.
-        self._last_drop = int(self._one('SELECT coalesce(max(id), 0) FROM "drop"', "i"))
+        self._last_drop = max((row[0] for row in self._raw("drop", "")), default=0)
 
     @classmethod
     def create(
@@ -369,33 +369,8 @@ class Session(Reader):
         """
         now = datetime.now(UTC).isoformat(timespec="seconds")
         self._add("INSERT INTO meta VALUES (?, ?)", (UNBLINDED, now))
-        self.put_results([], __version__)  # of less than is told now
         self.commit()
         self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
-
-    def put_results(self, results: Iterable[Mapping[str, Any]], analysis_version: str) -> None:
-        """Replace all derived results in the open transaction.
-
-        Parameters
-        ----------
-        results
-            One JSON object an attempt, each with ``run`` and ``attempt``.
-        analysis_version
-            Of the program that made them.
-        """
-        rows = [
-            (
-                result["run"],
-                result["attempt"],
-                analysis_version,
-                json.dumps(dict(result), ensure_ascii=False, allow_nan=False),
-            )
-            for result in results
-        ]
-        self._writable().add(
-            Statement("DELETE FROM result", [()]),
-            Statement("INSERT INTO result VALUES (?, ?, ?, ?)", rows),
-        )
 
     def _writable(self) -> Journal:
         self._opened()

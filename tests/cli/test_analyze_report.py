@@ -31,22 +31,6 @@ def test_the_table_is_the_one_of_the_run(call, finished):
     assert done.out == finished.table.out
 
 
-def test_analysing_changes_nothing_but_the_results(call, finished, tmp_path):
-    session = finished.copy(tmp_path)
-
-    def contents():
-        with Session.open(session, readonly=True) as opened:
-            return (
-                *(list(opened.byte_log()), opened.pings(), list(opened.drops())),
-                *(opened.states(), opened.results(), opened.identities(), dict(opened.meta)),
-            )
-
-    before = contents()
-    assert call("analyze", session).code == 0
-    assert contents() == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["copy.session"]
-
-
 def test_a_write_protected_session_is_analysed(finished, analysis, tmp_path):
     session = finished.copy(tmp_path)
     session.chmod(0o444)

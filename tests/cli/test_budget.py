@@ -6,9 +6,6 @@ import json
 
 import pytest
 
-from rig.records import ClockSample
-from rig.results import keep, kept, results
-from rig.session.store import Session
 from tests.cli.lab import rig
 
 
@@ -34,27 +31,6 @@ def test_a_mistyped_number_of_trials_is_told_both_ways():
     done = rig("analyze", "any.session", "--budget", 1, "--trials", "adaptve")
     assert done.returncode == 2
     assert "found 'adaptve', neither a whole number nor adaptive" in done.stderr
-
-
-def test_kept_results_are_the_budget_s_as_long_as_the_session_does_not_go_on(finished, tmp_path):
-    """To work them out again is most of the work, and says the same to the last digit."""
-    session = finished.copy(tmp_path)
-    asked = ("analyze", session, "--budget", 2, "--trials", 2, "--json")
-    with Session.open(session, readonly=True) as opened:
-        records = kept(opened)
-    assert [one["run"] for one in records] == [1, 2, 3, 4]
-    quick = rig(*asked)
-    with Session.open(session) as opened:
-        opened.put_results([one | {"learned": None} for one in records], "another program's")
-        assert kept(opened) == []
-    whole = rig(*asked)
-    assert quick.stdout == whole.stdout
-    assert json.loads(whole.stdout)["learned"] is True
-    with Session.open(session) as opened:
-        keep(opened, results(opened))
-        assert kept(opened) == records
-        opened.add_ping(ClockSample(1, 2, 3))
-        assert kept(opened) == []
 
 
 def test_a_run_that_is_not_there_is_bad_input(finished):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import replace
 from itertools import pairwise
@@ -133,7 +134,11 @@ def test_gravity_that_is_not_the_places_is_said(measure, call, tmp_path, fence):
     session, _ = measure()
     wrong = session.with_name("wrong")
     wrong.write_bytes(session.read_bytes())
-    tamper(wrong, "UPDATE protocol SET text = replace(text, 'gravity: 9.81', 'gravity: 9.91')")
+    text = text.replace("gravity: 9.81", "gravity: 9.91")
+    tamper(wrong, "UPDATE protocol SET text = ?", text)
+    assert "its protocol was altered" in call("analyze", wrong).err
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    tamper(wrong, "UPDATE meta SET value = ? WHERE key = 'protocol_sha256'", digest)
     found = json.loads(call("analyze", wrong, "--json").out)
     assert not found["calibration"]["gravity"]["agrees"]
     assert found["calibration"]["gravity"]["normalized_error"] < -1.0

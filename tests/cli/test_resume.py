@@ -209,33 +209,6 @@ def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
     assert_whole(tmp_path / "s", 2)
 
 
-def test_results_of_less_than_there_is_are_not_called_different(run, call, tmp_path, monkeypatch):
-    """Half a session is analysed, goes on, and is cut off before it is analysed again."""
-
-    def stop_after(drops):
-        add_drop, number = Session.add_drop, count(1)
-
-        def add(session, drop, **more):
-            add_drop(session, drop, **more)
-            if next(number) == drops:
-                signal.raise_signal(signal.SIGTERM)
-
-        monkeypatch.setattr(Session, "add_drop", add)
-        assert run().code == 130
-        monkeypatch.undo()
-
-    stop_after(1)
-    assert call("analyze", tmp_path / "s").code == 0
-    assert call("replay", tmp_path / "s").code == 0
-    stop_after(1)
-    done = call("replay", tmp_path / "s")
-    assert done.code == 0, done.out
-    assert "results: none stored yet" in done.out
-    assert run().code == 0
-    done = call("replay", tmp_path / "s")
-    assert done.out.splitlines()[-2:] == ["results: 2 identical", "identical"]
-
-
 def test_reading_that_was_broken_off_outlives_the_session(finished):
     """A traceback keeps the reading alive until the session is closed."""
     session = Session.open(finished.session, readonly=True)

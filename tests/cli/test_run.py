@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 from itertools import count
 
@@ -14,8 +13,6 @@ from serial import SerialException
 
 from rig.analysis import identified
 from rig.analysis.identify import identify
-from rig.commands import analyze
-from rig.records import ClockSample
 from rig.replay import replay
 from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
@@ -425,27 +422,3 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path):
     assert writer.returncode == 130, err
     with Session.open(session, readonly=True) as opened:
         assert replay(opened).differences == ()
-
-
-def test_results_of_a_session_that_went_on_meanwhile_are_not_kept(
-    call, finished, tmp_path, monkeypatch
-):
-    session = finished.copy(tmp_path)
-    compute = analyze.results
-
-    def slowly(opened, *given):
-        found = compute(opened, *given)
-        with Session.open(session) as writer:
-            writer.add_ping(ClockSample(1, 2, 3))
-            writer.put_results([], "a later one")
-        return found
-
-    monkeypatch.setattr(analyze, "results", slowly)
-    assert call("analyze", session).code == 0
-    monkeypatch.undo()
-    with sqlite3.connect(session) as connection:
-        assert connection.execute("SELECT count(*) FROM result").fetchone() == (0,)
-    connection.close()
-    assert call("analyze", session).code == 0
-    with Session.open(session, readonly=True) as opened:
-        assert len(opened.results()) == 4

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 
 import pytest
 
-from rig import __version__
 from rig.analysis import identified
-from rig.analysis.alone import Alone
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import FEWEST
 from rig.clock.calibration import TimeScale
 from rig.records import Job
 from rig.results import detailed, results
 from rig.results.live import LiveAnalysis
-from rig.results.whole import kept_identified
-from rig.session.reading import BESIDE
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import rig, short
@@ -97,59 +92,3 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
         monkeypatch.setattr(identified, "identify", None)
         for before in (known, live.identified):
             assert results(opened, known=before).json() == cold
-
-
-def test_what_a_run_found_out_about_its_drops_is_not_found_out_again(
-    session, tmp_path, monkeypatch
-):
-    """Nor fitted before a joint fit asks for it, which says the same."""
-    bare = shutil.copy(session, tmp_path / "bare.session")
-    with Session.open(bare) as opened:
-        opened.put_results([], "none")
-        opened.commit()
-    anew, opener = LiveAnalysis(bare), LiveAnalysis(session)
-    expected = anew.read()
-    anew.fit_jointly(expected)
-    monkeypatch.setattr(identified, "identify", None)
-    with monkeypatch.context() as without:
-        without.setattr("rig.results.live.fit_drop", None)
-        kept = opener.read()
-    assert kept.results == expected.results
-    opener.fit_jointly(kept)
-    assert opener.read().analysis.json() == anew.read().analysis.json()
-    with Session.open(session, readonly=True) as opened:
-        assert (
-            opened.results() == results(opened, known=kept_identified(opened, kept.drops)).records()
-        )
-
-
-def test_what_a_drop_said_at_another_tick_rate_or_as_another_run_is_not_taken(session):
-    view = LiveAnalysis(session).read()
-    with Session.open(session, readonly=True) as opened:
-        known = kept_identified(opened, view.drops)
-    false = {job: replace(one.alone.result, verdict="void") for job, one in known.items()}
-    quick, other = Job(1, 1), Job(2, 1)
-    false[other] = replace(false[other], run=view.plan[1])
-    for job, one in known.items():
-        hz = one.alone.hz * (1.0 + 1e-5 * (job == quick))
-        known[job] = replace(one, alone=Alone(hz, false[job]))
-    taken = LiveAnalysis(session, identified=known).read().results
-    assert [job for job, one in taken.items() if one.verdict != "void"] == [quick, other]
-    assert all(taken[job] == view.results[job] for job in (quick, other))
-
-
-@pytest.mark.parametrize("altered", [None, 7, ["", "{}"], ["", 7], {}, "more edges"])
-def test_what_is_not_as_it_was_kept_is_found_out_anew(session, altered):
-    view = LiveAnalysis(session).read()
-    drops = dict(view.drops)
-    with Session.open(session) as opened:
-        beside = opened.beside_results(__version__)
-        assert beside.keys() == drops.keys()
-        if altered == "more edges":
-            drops[Job(1, 1)] = replace(drops[Job(1, 1)], edges=drops[Job(1, 1)].edges[1:])
-        else:
-            rows = opened.results()
-            for row in rows:
-                row[BESIDE] = altered if row["run"] == 1 else beside[row["run"], 1]
-            opened.put_results(rows, f"{__version__} of another extent")
-        assert kept_identified(opened, drops).keys() == drops.keys() - {Job(1, 1)}

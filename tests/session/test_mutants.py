@@ -120,10 +120,19 @@ def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp
 @pytest.mark.parametrize(
     ("sql", "what"),
     [
-        ("UPDATE bytes SET direction = 'up' WHERE id = 3", "bytes of no direction"),
-        ("UPDATE run_state SET reasons = '{}' WHERE id = 1", "makes no sense"),
-        ("UPDATE run_state SET reasons = '[1]' WHERE id = 1", "makes no sense"),
-        ("UPDATE identity SET json = '[]' WHERE id = 1", "makes no sense"),
+        (
+            "UPDATE bytes SET direction = 'up' WHERE id = 3",
+            "table bytes, row 3: direction 'up' is not",
+        ),
+        ("UPDATE run_state SET reasons = '{}' WHERE id = 1", "table run_state, row 1: reasons"),
+        (
+            "UPDATE identity SET host_ns = 9223372036854775807 WHERE id = 1",
+            "table identity, row 1: host_ns 9223372036854775807 is not",
+        ),
+        (
+            'UPDATE identity SET json = \'{"tick_hz": "x"}\' WHERE id = 1',
+            "table identity, row 1: json",
+        ),
     ],
 )
 def test_a_value_of_the_wrong_form_is_refused(sql, what, sound, tmp_path):
@@ -162,5 +171,5 @@ def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
             "WITH RECURSIVE n(i) AS (SELECT 1000 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
             "INSERT INTO edge SELECT 1, i, i, 0, 1 FROM n;"
         )
-    with pytest.raises(SessionError, match="run 1, attempt 1, has more than"):
+    with pytest.raises(SessionError, match="run 1, attempt 1: it has more than"):
         read_through(path)

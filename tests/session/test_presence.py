@@ -217,17 +217,6 @@ def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
     simulated.close()
 
 
-def test_results_of_less_than_there_will_be_are_gone_when_a_session_is_gone_on_with(rig, tmp_path):
-    made, protocol, session = rig
-    made.session.put_results([{"run": 1, "attempt": 1}], "0")
-    made.close()
-    again = Controller("sim://")
-    again.open_session(str(protocol), str(session))
-    with Session.open(session, readonly=True) as found:  # what is committed
-        assert found.results() == []
-    again.close()
-
-
 def test_a_scene_without_gates_makes_no_session(tmp_path):
     protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
     text = FENCE.replace("RUNS", "1")

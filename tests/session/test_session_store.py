@@ -142,22 +142,12 @@ def test_a_file_of_the_first_format_is_read_and_continued(path: Path) -> None:
 
 
 def test_latest_drops_are_the_last_attempts(path: Path) -> None:
-    second = Drop(run=1, attempt=2, tick_hz=1000, edges=())
+    second = replace(IMPORTED, attempt=2)
     with make(path) as session:
         session.add_drop(second)
         session.add_drop(IMPORTED)
         assert session.latest_drops() == [second]
         assert list(session.drops()) == [second, IMPORTED]
-
-
-def test_results_are_replaced_as_a_whole(path: Path) -> None:
-    with make(path) as session:
-        session.put_results([{"run": 1, "attempt": 1, "x": 1}, {"run": 2, "attempt": 1}], "1")
-        session.put_results([{"run": 1, "attempt": 1, "x": 2}], "2")
-        session.commit()
-        assert session.results() == [{"run": 1, "attempt": 1, "x": 2}]
-        with pytest.raises(ValueError, match="JSON"):
-            session.put_results([{"run": 1, "attempt": 1, "x": float("nan")}], "2")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,158 @@
+"""Whether a stored drop is the one that was recorded: its bytes say so, or its certificate's CRC.
+
+Everyone who reads drops, for results or to save what is left of a file, asks here.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import fields, replace
+from enum import StrEnum
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+from rig.link.messages import TEST_RUN
+from rig.link.transcript import Received, Transcript
+from rig.link.wiretypes import EVENTS
+from rig.records import Certificate, Drop, Job
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from typing import Literal
+
+    from rig.link.restarts import Restart
+    from rig.link.transcript import Record
+    from rig.records import ClockSample, Edge, Pulse
+
+_U32 = (1 << 32) - 1
+_LATER = [one.name for one in fields(Certificate) if one.default is None]
+"""What certificates of older formats do not have."""
+
+
+class Fate(StrEnum):
+    """What can be said of a drop, in the words that are shown."""
+
+    CONFIRMED = "whole, and the bytes say the same"
+    IMPORTED = "whole; it came from a file, so there are no bytes to compare"
+    UNCONFIRMED = "whole, but its bytes are not"
+    RESTORED = "put together again from its bytes"
+    PARTIAL = "not whole: neither the record nor the bytes have all of it"
+
+    @property
+    def whole(self) -> bool:
+        """Whether the stored record is the one that was made."""
+        return self in {Fate.CONFIRMED, Fate.IMPORTED, Fate.UNCONFIRMED}
+
+
+class ByteReplay:
+    """What the bytes of a session say, read as they grow.
+
+    Attributes
+    ----------
+    fed
+        Number of chunks taken.
+    records
+        All that was told but the messages themselves, in order.
+    """
+
+    def __init__(self) -> None:
+        self.fed = 0
+        self.records: list[Drop | ClockSample | Pulse | Restart] = []
+        self._transcript = Transcript()
+
+    def feed(self, chunks: Iterable[tuple[int, Literal["rx", "tx"], bytes]]) -> None:
+        """Take the next chunks: host time, direction and bytes."""
+        for host_ns, direction, data in chunks:
+            self.fed += 1
+            records: Iterable[Record] = self._transcript.feed(direction, host_ns, data)
+            self.records += [one for one in records if not isinstance(one, Received)]
+
+    def acknowledged(self) -> list[Drop]:
+        """List the drops that the host has read enough of, without those of no plan."""
+        drops = (record for record in self.records if isinstance(record, Drop))
+        return [drop for drop in drops if drop.run != TEST_RUN]
+
+    def unfinished(self) -> list[Drop]:
+        """List the drops that were never acknowledged, as far as they are there."""
+        return [drop for drop in self._transcript.unfinished() if drop.run != TEST_RUN]
+
+    def drops(self) -> dict[Job, Drop]:
+        """Give every drop once, as it was told last."""
+        drops = {Job(drop.run, drop.attempt): drop for drop in self.acknowledged()}
+        for drop in self.unfinished():
+            drops.setdefault(Job(drop.run, drop.attempt), drop)
+        return drops
+
+
+def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False) -> Fate:
+    """Compare a stored drop with what the bytes say, and where they are damaged, with itself.
+
+    Parameters
+    ----------
+    stored
+        As its rows give it.
+    replayed
+        From `ByteReplay.drops`.
+    torn
+        Whether rows of it are missing, or cannot be.
+    """
+    again = replayed.get(Job(stored.run, stored.attempt))
+    if again is None:
+        whole = not torn and _sound(stored) and not _under_another_name(stored, replayed)
+        good = Fate.IMPORTED if stored.certificate is None else Fate.UNCONFIRMED
+        return good if whole else Fate.PARTIAL
+    if not torn and as_old_as(stored, again) == stored:
+        return Fate.CONFIRMED
+    if again.certificate is not None and again.tick_hz:
+        right = _accounted(again, again.certificate)
+        if right or (right is None and not again.faults):
+            return Fate.RESTORED
+    return Fate.PARTIAL if torn or not _sound(stored) else Fate.UNCONFIRMED
+
+
+def _under_another_name(stored: Drop, replayed: Mapping[Job, Drop]) -> bool:
+    own = stored.certificate, stored.fire_tick
+    return stored.certificate is not None and any(
+        own == (drop.certificate, drop.fire_tick) for drop in replayed.values()
+    )
+
+
+def as_old_as(stored: Drop, drop: Drop) -> Drop:
+    """Leave out of a certificate what the format that the stored one has did not keep."""
+    if stored.certificate is None or drop.certificate is None:
+        return drop
+    if any(getattr(stored.certificate, name) is not None for name in _LATER):
+        return drop
+    none: dict[str, Any] = dict.fromkeys(_LATER)
+    return replace(drop, certificate=replace(drop.certificate, **none))
+
+
+def _sound(drop: Drop) -> bool:
+    """Whether nothing in a stored record contradicts it; one with faults is void by itself."""
+    if drop.faults:
+        return True
+    seen = drop.certificate
+    return bool(drop.edges) if seen is None else _accounted(drop, seen) is not False
+
+
+def _accounted(drop: Drop, seen: Certificate) -> bool | None:
+    """Whether edges are what the certificate says, their number and the CRC of their events.
+
+    `None` where pulses too short to be seen leave it open: nobody knows when these events were.
+    """
+    events = [(tick, [*edges]) for tick, edges in groupby(drop.edges, lambda edge: edge.tick)]
+    if not len(events) <= seen.events <= len(drop.edges) + seen.glitches:
+        return False
+    if len(events) < seen.events or drop.fire_tick is None:
+        return None
+    return _crc32(drop, drop.fire_tick, events) == seen.crc32
+
+
+def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]]) -> int:
+    """CRC-32 of the events that edges were made of, as `rig.link.assembly.edges` reads them."""
+    state, snapshots = drop.initial_state, []
+    for tick, edges in events:
+        for _, channel, blocked in edges:
+            state = state | 1 << channel if blocked else state & ~(1 << channel)
+        snapshots.append(((fire_tick + tick) & _U32, state))
+    return zlib.crc32(EVENTS.pack(snapshots))

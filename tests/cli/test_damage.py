@@ -1,0 +1,179 @@
+"""Damage costs what is damaged: any value of any row altered, through every command that reads."""
+
+from __future__ import annotations
+
+import json
+import random
+import sqlite3
+from contextlib import closing
+
+import pytest
+
+from bench.mutants import VALUES, Mutants, make_session
+from rig import door
+from rig.analysis.session import analyze
+from rig.errors import RigError
+from rig.records import ClockSample, HostBreak, Job, Pulse
+from rig.results import calibration, protocol_of
+from rig.session.store import Session
+from tests.session.altering import unguarded
+
+RUNS = 3
+HZ = 16_000_000
+PARTS = 100
+OF_DROPS = {"drop", "edge", "bytes"}
+COMMANDS = {
+    "analyze": (),
+    "estimate": (),
+    "recover": (),
+    "replay": (),
+    "export": ("--csv", "tables"),
+    "report": ("-o", "page.html"),
+}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    path = make_session(tmp_path_factory.mktemp("sound"), RUNS)
+    with Session.open(path) as session:  # in which each table has rows
+        begun_ns, second = session.identities()[-1][0], 10**9
+        for number in range(1, 9):
+            at_ns, tick = begun_ns + number * second, number * HZ
+            session.add_ping(ClockSample(at_ns, at_ns + 1000, tick))
+            session.add_pulse(Pulse(at_ns, at_ns + 1000, number, tick))
+        session.add_host_break(HostBreak(begun_ns + 20 * second, second, 0))
+    return path
+
+
+@pytest.fixture(scope="module")
+def without(sound):
+    """What the drops say that are not among the given ones, as if these were not there."""
+    kept = {}
+    with Session.open(sound, readonly=True) as session:
+        drops, protocol, clock = [*session.drops()], protocol_of(session), calibration(session)
+
+    def numbers(damaged):
+        if damaged not in kept:
+            left = [drop for drop in drops if Job(drop.run, drop.attempt).run not in damaged]
+            runs = analyze(protocol, left, clock.scale).runs
+            kept[damaged] = [one.json() for one in runs]
+        return kept[damaged]
+
+    return numbers
+
+
+def read(call, path, folder, what):
+    """Call each command; return the exit codes and what `analyze` says in JSON, if it does."""
+    codes, found = {}, None
+    for command, more in COMMANDS.items():
+        given = [one if one.startswith("-") else folder / one for one in more]
+        done = call(command, path, *given, *(["--json"] if command == "analyze" else []))
+        codes[command] = done.code
+        # Where a replay differs it says so in a code of its own.
+        assert done.code in {0, 2, 3} | ({1} if command == "replay" else set()), (what, done.err)
+        assert "bug" not in done.err, (what, done.err)
+        if command == "analyze" and done.code != 2:
+            found = json.loads(done.out)
+    try:
+        with door.open(path) as session:
+            session.analyze()
+            session.edges(1)
+    except RigError:
+        pass
+    return codes, found
+
+
+def check(call, without, path, folder, table, what):
+    codes, found = read(call, path, folder, what)
+    if found is None or table not in OF_DROPS:
+        return
+    damaged = frozenset(run["run"] for run in found["runs"] if run.get("damaged"))
+    for run in found["runs"]:
+        if run["run"] in damaged:
+            assert run["verdict"] == "void", what
+            assert run["reasons"][0].startswith("damaged: "), what
+            assert len(run["reasons"]) == 1, what
+    left = [run for run in found["runs"] if run["run"] not in damaged]
+    for run in left:
+        del run["calibration"]
+    assert left == without(damaged), what
+    for command in ("analyze", "export", "report"):
+        assert codes[command] == (3 if damaged else 0), (what, command)
+    assert codes["recover"] == 2 or not damaged, what
+
+
+@pytest.mark.parametrize(
+    "part", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, PARTS))]
+)
+def test_any_value_altered_costs_its_own_drop_and_no_other(part, call, sound, without, tmp_path):
+    mutants = Mutants(sound, tmp_path)
+    every = [
+        (table, column, value, row)
+        for table, column in mutants.columns
+        for value in VALUES
+        for row in (0, 2)
+    ]
+    random.Random(1).shuffle(every)
+    path = tmp_path / "mutant"
+    for table, column, value, row in every[part::PARTS]:
+        what = mutants.alter(path, table, column, value, row=row)
+        check(call, without, path, tmp_path, table, what)
+
+
+ALTERED = (
+    'UPDATE edge SET tick = tick + 64 WHERE "drop" = 2 AND idx = 5',
+    'UPDATE edge SET channel = channel + 1 WHERE "drop" = 2 AND idx = 1',
+    'UPDATE edge SET blocked = 1 - blocked WHERE "drop" = 2 AND idx = 1',
+    'DELETE FROM edge WHERE "drop" = 2 AND idx > 3',
+    'UPDATE "drop" SET fire_tick = fire_tick + 1 WHERE id = 2',
+    'UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2',
+)
+BY_BYTES_ALONE = 'UPDATE "drop" SET tick_hz = tick_hz / 2 WHERE id = 2'
+
+
+@pytest.mark.parametrize(
+    ("sql", "bytes_too"),
+    [*((sql, lost) for sql in ALTERED for lost in (False, True)), (BY_BYTES_ALONE, False)],
+)
+def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
+    sql, bytes_too, call, sound, without, tmp_path
+):
+    path = tmp_path / "altered"
+    path.write_bytes(sound.read_bytes())
+    with unguarded(path) as connection:
+        if bytes_too:
+            connection.execute("DELETE FROM bytes")
+        connection.execute(sql)
+    check(call, without, path, tmp_path, "edge", sql)
+    found = json.loads(call("analyze", "--json", path).out)
+    assert [run["run"] for run in found["runs"] if run.get("damaged")] == [2]
+    assert "1 of 3 drops (run 2, attempt 1)" in call("analyze", path).out
+    assert "see rig recover SESSION" in call("export", path, "--csv", tmp_path / "tables").err
+    page = tmp_path / "page.html"
+    assert "1 of 3 drops (run 2, attempt 1)" in page.read_text("utf-8")
+
+
+def test_what_recover_saves_of_a_damaged_drop_is_whole_again(call, sound, tmp_path):
+    path, new = tmp_path / "altered", tmp_path / "new"
+    path.write_bytes(sound.read_bytes())
+    with unguarded(path) as connection:
+        connection.execute('UPDATE edge SET tick = tick + 64 WHERE "drop" = 2 AND idx = 5')
+    assert call("recover", path, "-o", new).code == 0
+    assert call("analyze", new).code == call("analyze", sound).code == 0
+    with Session.open(new, readonly=True) as again, Session.open(sound, readonly=True) as before:
+        assert [*again.drops()] == [*before.drops()]
+
+
+def test_a_byte_of_the_log_altered_costs_no_drop(call, sound, tmp_path):
+    """The edges have their certificate's CRC."""
+    path = tmp_path / "altered"
+    with closing(sqlite3.connect(sound)) as connection:
+        count = connection.execute("SELECT count(*) FROM bytes").fetchone()[0]
+    for number in range(1, count + 1, max(1, count // 25)):
+        path.write_bytes(sound.read_bytes())
+        with unguarded(path) as connection:
+            connection.execute(
+                "UPDATE bytes SET data = zeroblob(length(data)) WHERE id = ?", (number,)
+            )
+        with Session.open(path, readonly=True) as session:
+            assert [drop.run for drop in session.drops() if drop.damage] == []

@@ -1,0 +1,154 @@
+"""No command that only reads alters a session: not a byte, not its time, no file beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+
+import pytest
+
+from bench.mutants import make_session
+from rig import door
+from rig.results.live import LiveAnalysis
+
+WRITER = """
+import os, sys
+from rig.session.schema import RunState
+from rig.session.store import Session
+session = Session.open(sys.argv[1])
+session.add_state(1, 1, RunState.RECORDED, 1)
+session.commit()
+if sys.argv[2] == "die":
+    os._exit(9)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+COMMANDS = [
+    ("analyze", "SESSION"),
+    ("analyze", "SESSION", "--json"),
+    ("analyze", "SESSION", "--budget", "1", "--trials", "2"),
+    ("estimate", "SESSION"),
+    ("report", "SESSION", "-o", "OUT/page.html"),
+    ("export", "SESSION", "--csv", "OUT/tables"),
+    ("replay", "SESSION"),
+    ("recover", "SESSION"),
+    ("recover", "SESSION", "-o", "OUT/saved"),
+    ("doctor", "--session", "SESSION"),
+]
+
+
+def fresh(session):
+    assert session.exists()
+
+
+def of_the_first_format(session):
+    with closing(sqlite3.connect(session)) as connection:
+        connection.execute("DROP TABLE reference")
+        connection.execute("DROP TABLE host_break")
+        for column in ("release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv"):
+            connection.execute(f'ALTER TABLE "drop" DROP COLUMN {column}')
+        connection.execute('ALTER TABLE "drop" DROP COLUMN lowest_mv')
+        connection.execute("PRAGMA user_version = 1")
+
+
+def with_kept_results(session):
+    """As programs before this one left them."""
+    with closing(sqlite3.connect(session)) as connection, connection:
+        connection.execute("INSERT INTO result VALUES (1, 1, '0.1.0', '{\"run\": 1}')")
+
+
+def interrupted(session):
+    """Its writer was killed: what came last is in the log beside it only."""
+    subprocess.run([sys.executable, "-c", WRITER, session, "die"], check=False)
+    assert session.with_name(session.name + "-wal").stat().st_size
+
+
+def emptied_log(session):
+    session.with_name(session.name + "-wal").touch()
+
+
+def read_only(session):
+    session.chmod(0o400)
+
+
+def read_only_folder(session):
+    session.parent.chmod(0o500)
+
+
+def state(folder):
+    return {
+        path.name: (hashlib.sha256(path.read_bytes()).hexdigest(), path.stat().st_mtime_ns)
+        for path in folder.iterdir()
+        if not path.name.endswith("-shm")  # where SQLite notes who reads
+    } | {"names": sorted(path.name for path in folder.iterdir())}
+
+
+def read_all(call, session, out):
+    out.mkdir(exist_ok=True)
+    for number, words in enumerate(COMMANDS):
+        (out / str(number)).mkdir()
+        given = [
+            word.replace("SESSION", str(session)).replace("OUT", str(out / str(number)))
+            for word in words
+        ]
+        done = call(*given)
+        # A doctor's word is of this computer too, and a fence has no impacts to estimate.
+        assert done.code == 0 or words[0] in {"doctor", "estimate"}, (words, done.err)
+        yield words
+    with door.open(session) as opened:
+        opened.analyze()
+        opened.edges(1)
+    yield ("rig.open",)
+    LiveAnalysis(session).read()
+    yield ("the terminal",)
+
+
+@pytest.mark.parametrize(
+    "prepare",
+    [
+        fresh,
+        of_the_first_format,
+        with_kept_results,
+        interrupted,
+        emptied_log,
+        read_only,
+        read_only_folder,
+    ],
+)
+def test_reading_alters_nothing(prepare, call, tmp_path):
+    folder = tmp_path / "sessions"
+    folder.mkdir()
+    session = make_session(folder)
+    prepare(session)
+    before = state(folder)
+    try:
+        for words in read_all(call, session, tmp_path / "out"):
+            assert state(folder) == before, words
+    finally:
+        folder.chmod(0o700)
+
+
+def test_reading_beside_a_writer_alters_nothing(call, tmp_path):
+    folder = tmp_path / "sessions"
+    folder.mkdir()
+    session = make_session(folder)
+    command = [sys.executable, "-c", WRITER, session, "wait"]
+    with subprocess.Popen(command, stdin=-1, stdout=-1, text=True) as writer:
+        assert writer.stdout.readline() == "ready\n"
+        before = state(folder)
+        for words in read_all(call, session, tmp_path / "out"):
+            assert state(folder) == before, words
+        writer.stdin.close()
+    assert not session.with_name(session.name + "-wal").exists()
+
+
+def test_what_an_interrupted_writer_committed_is_read(tmp_path):
+    session = make_session(tmp_path)
+    with door.open(session) as opened:
+        before = len(opened._file.states())
+    interrupted(session)
+    with door.open(session) as opened:
+        assert len(opened._file.states()) == before + 1
