@@ -256,7 +256,7 @@ class RunResult(_Quantities):
             incline_deg=one.run.incline_deg,
             impact_chain=one.run.impact,
             verdict=one.verdict,
-            reasons=one.reasons,
+            reasons=tuple(reason.text for reason in one.reasons),
             gates=one.gates,
         )
 

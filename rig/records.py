@@ -6,7 +6,10 @@ These are the words in which link, session and analysis speak to each other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from rig.reasons import Reason
 
 
 class Edge(NamedTuple):
@@ -133,5 +136,5 @@ class Drop:
     fire_tick: int | None = None
     initial_state: int = 0
     certificate: Certificate | None = None
-    faults: tuple[str, ...] = ()
+    faults: tuple[Reason, ...] = ()
     damage: str = ""

@@ -34,6 +34,7 @@ from rig.measurands import told
 from rig.protocol import reader
 from rig.protocol.measurable import check_recordable
 from rig.protocol.plan import runs
+from rig.reasons import sentences
 from rig.recorder.interrupts import Interrupts
 from rig.records import Job
 from rig.report.numbers import plus_minus, signed
@@ -324,5 +325,5 @@ def narration(result: DropResult, planned: int) -> str:
         for row in told()
         if row.name in found
     ]
-    parts.append(": ".join(filter(None, [result.verdict, signed("; ".join(result.reasons))])))
+    parts.append(": ".join(filter(None, [result.verdict, signed(sentences(result.reasons))])))
     return "  ".join(parts)

@@ -7,16 +7,17 @@ asked where something here, or in the adjustment itself, is odd.
 from __future__ import annotations
 
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.equations import scaled
-from rig.analysis.faults import name_of
+from rig.analysis.faults import gate_values
 from rig.analysis.identify import MISSED
+from rig.reasons import Reason, Severity, make_reason
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -42,13 +43,12 @@ _WHOLE = 0.9  # share of its edges that says that a gate sees every rod
 _ABOUT = 0.1  # by which a gate may see more rods than one above it
 _ENOUGH = 3  # gates that see every rod
 _SOME = 3  # edges expected of a gate that say too little when they are missing
-_DEAD = "dead or not plugged in"
 _PAIR = 2  # edges of a rod
 _BY_CHANCE = 1e-4  # probability below which a rod that nobody saw is none
 
 
 class Diagnosis(NamedTuple):
-    """What is wrong, in words: beyond use, and worth a remark.
+    """What is wrong with gates and chains.
 
     Attributes
     ----------
@@ -61,8 +61,7 @@ class Diagnosis(NamedTuple):
         rest above gates, or one is missing.
     """
 
-    void: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     suspects: tuple[int, ...] = ()
     odd: bool = False
     known: bool = False
@@ -71,32 +70,32 @@ class Diagnosis(NamedTuple):
 def diagnose(fit: Fit) -> Diagnosis:
     """Look for gates that do not see the chains of the protocol."""
     model = fit.model
-    gates = _gates(fit)
-    void: list[str] = []
+    gates, words = _gates(fit), model.protocol.vocabulary
     doubts = silent(model.protocol, model.records.values())
+    reasons: list[Reason] = []
     alive = [one for one in gates if one.train.times.size]
     under: list[_Seen] = []
     if not any(one.strange for one in alive if one.role == "free"):  # where nothing piles up
         under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
     if under:
-        return Diagnosis((_rods_missed(model.protocol, under),), tuple(doubts), known=True)
+        return Diagnosis((_rods_missed(model.protocol, under), *doubts), known=True)
     absent = [
-        why
+        reason
         for role, record in model.records.items()
-        if (why := _no_rod(record, [one for one in alive if one.role == role]))
+        for reason in _missing_rod(
+            model.protocol, record, [gate for gate in alive if gate.role == role]
+        )
     ]
     if absent and not any(one.strange for one in alive):
-        return Diagnosis(tuple(absent), tuple(doubts), known=True)
+        return Diagnosis((*absent, *doubts), known=True)
     for gate in alive:
-        name = _name(model.protocol, gate.train)
+        where = _values(model.protocol, gate.train)
         if gate.strange:
             # Two edges may be missed by chance, and a gate without any bears on nothing.
-            (void if gate.match.size > _SOME else doubts).append(
-                f"{name} sees something else than this chain: only {gate.share:.0%} of its "
-                "expected edges are there"
-            )
+            code = "gate_disagrees" if gate.match.size > _SOME else "gate_disagrees_few"
+            reasons.append(make_reason(code, words, **where, share=gate.share))
         elif gate.off > IMPLAUSIBLE:
-            void.append(f"{name} is off its height by {gate.off:.0f} times its uncertainty")
+            reasons.append(make_reason("gate_off", words, **where, deviations=gate.off))
     # An exchanged gate fits what it should not see rods away, or at another height.
     displaced = [one for one in alive if one.extra >= _PAIR and one.unseen & one.ends]
     displaced += [one for pair in combinations(alive, 2) if _counts_crossed(*pair) for one in pair]
@@ -106,13 +105,15 @@ def diagnose(fit: Fit) -> Diagnosis:
     if strange and len(gates) <= FEW_GATES:
         # A side of few gates is read well as another fall where one of them is the other side's.
         suspects = dict.fromkeys([*strange, *(one.train.gate for one in alive)])
-    odd = bool(void) or len(displaced) >= _PAIR
+    odd = any(reason.severity is Severity.VOID for reason in reasons) or len(displaced) >= _PAIR
     odd |= any(_other_ends([one for one in alive if one.role == role]) for role in model.records)
-    return Diagnosis(tuple(void), tuple(doubts), tuple(suspects), odd)
+    return Diagnosis((*reasons, *doubts), tuple(suspects), odd)
 
 
-def _no_rod(record: ChainRecord, gates: Sequence[_Seen]) -> str:
-    """Say which rod no gate saw, while its neighbours passed; nothing where that may be chance."""
+def _missing_rod(
+    protocol: Protocol, record: ChainRecord, gates: Sequence[_Seen]
+) -> Iterator[Reason]:
+    """Name the rod that no gate saw, while its neighbours passed, unless that may be chance."""
     rods = record.chain.chain.rods
     due, seen = np.zeros(rods), np.zeros(rods)
     for one in gates:  # at each of which a rod that leaves no trace leaves none of either side
@@ -120,19 +121,22 @@ def _no_rod(record: ChainRecord, gates: Sequence[_Seen]) -> str:
         seen[np.unique(one.train.rods[one.match >= 0])] += 1.0
     absent = np.flatnonzero((due > 0.0) & (seen == 0.0))
     if absent.size != 1 or absent[0] in (0, rods - 1):
-        return ""  # at an end the chain may have less of them, or hang elsewhere
+        return  # at an end the chain may have less of them, or hang elsewhere
     rod = int(absent[0])
     others = due.sum() - due[rod]
     missed = max(MISSED, (others - seen.sum()) / max(1.0, others))
-    if rods * missed ** due[rod] > _BY_CHANCE:
-        return ""
-    return (
-        f"no gate saw rod {rod + 1} of {rods} (from the bottom) of chain {record.chain.name} on "
-        f"the {record.role} side: it is missing there"
-    )
+    if rods * missed ** due[rod] <= _BY_CHANCE:
+        yield make_reason(
+            "rod_missing",
+            protocol.vocabulary,
+            rod=rod + 1,
+            rods=rods,
+            name=record.chain.name,
+            side=record.role,
+        )
 
 
-def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[str]:
+def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[Reason]:
     """Name the gates that gave no edges, while the others gave theirs."""
     gates = [train for record in records for train in record.trains if train.rods.size]
     others = [train for train in gates if train.times.size]
@@ -142,9 +146,12 @@ def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[str]:
     for record in records:
         dead = [one for one in record.trains if one.rods.size and not one.times.size]
         if len(dead) == len(record.trains) > 1:
-            found.append(f"the gates of the {record.role} side gave no edges: {_DEAD}")
+            found.append(make_reason("side_silent", protocol.vocabulary, side=record.role))
         else:
-            found += [f"{_name(protocol, one)} gave no edges: {_DEAD}" for one in dead]
+            found += [
+                make_reason("gate_silent", protocol.vocabulary, **_values(protocol, train))
+                for train in dead
+            ]
     return found
 
 
@@ -208,9 +215,9 @@ def _gates(fit: Fit) -> list[_Seen]:
     ]
 
 
-def _name(protocol: Protocol, train: EdgeTrain) -> str:
+def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
     assert protocol.gates is not None
-    return name_of(protocol.gates.gates[train.gate])
+    return gate_values(protocol.gates.gates[train.gate])
 
 
 def _counts_crossed(one: _Seen, other: _Seen) -> bool:
@@ -247,18 +254,12 @@ def _buried(protocol: Protocol, gates: Sequence[_Seen]) -> list[_Seen]:
     return gates[:under] if passed and fewer and clear else []
 
 
-def _rods_missed(protocol: Protocol, gates: Sequence[_Seen]) -> str:
-    names = " and ".join(_name(protocol, one.train) for one in gates)
-    verb = "does" if len(gates) == 1 else "do"
-    if np.count_nonzero(gates[0].match[-_PAIR * _LAST :] < 0) < _PAIR:  # one edge by chance
-        return (
-            f"{names} {verb} not see every rod pass, while the gates above do; the last rods pass "
-            "and none lie there: those before them strike too early, or the gate misses some"
-        )
-    return (
-        f"rods pile up on the surface: {names} {verb} not see them all pass, while the gates above "
-        "do; the last rods strike those that lie there"
-    )
+def _rods_missed(protocol: Protocol, gates: Sequence[_Seen]) -> Reason:
+    # One edge of the last rods may be missed by chance.
+    passed = np.count_nonzero(gates[0].match[-_PAIR * _LAST :] < 0) < _PAIR
+    code = "low_gates_miss_rods" if passed else "rods_pile_up"
+    at = [_values(protocol, gate.train) for gate in gates]
+    return make_reason(code, protocol.vocabulary, at=at)
 
 
 def _other_ends(gates: list[_Seen]) -> bool:

@@ -20,8 +20,9 @@ from rig.analysis.identified import Identified, identified
 from rig.analysis.last_passages import last_passages
 from rig.analysis.quantities import measured, quantities
 from rig.analysis.result import NO_EDGES, Audit, DropResult
-from rig.analysis.verdict import judge
+from rig.analysis.verdict import judge, judge_record, verdict_of
 from rig.protocol.contact import at_contact
+from rig.reasons import make_reason
 from rig.records import Job
 from rig.threads import one_thread
 
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
-
-_NO_FIT = "the fit did not converge: no fall in this scene fits these edges"
 
 
 def analyze_drop(
@@ -84,7 +83,7 @@ def fit_drop(
         the same with it and without.
     """
     if drop.damage:  # the file's, and no finding about chains or gates
-        why = (f"damaged: {drop.damage}; see rig recover SESSION",)
+        why = (make_reason("record_damaged", text=drop.damage),)
         return DropResult(run, drop.attempt, "void", why, NO_EDGES, damaged=True), None
     known = {} if known is None else known
     return _fitted(protocol, run, drop, scale, components, known, explain=explain)
@@ -113,8 +112,8 @@ def _fitted(
     one = known.get(job)
     if one is None or one.scale != rough:
         one = known[job] = identified(protocol, run, drop, rough, components)
-    said = dict.fromkeys([*one.unlike.values(), *(silent(protocol, records) if one.unlike else ())])
-    early = judge(protocol, run, drop, said, blank, {}, None)
+    unlike = {reason.text: reason for reason in one.unlike.values()}.values()
+    early = judge_record(drop, blank, [*unlike, *(silent(protocol, records) if one.unlike else ())])
     if early.verdict == "void" or one.begun is None:
         reasons = early.reasons
         if one.unlike and explain:
@@ -125,7 +124,8 @@ def _fitted(
                 if not strange and len(gates) <= FEW_GATES:
                     strange = [*range(len(gates))]  # each may see nearly what another should
                 weigh = _explainer(protocol, run, drop, rough, components, strange)
-                one = replace(one, explained=tuple(explained(weigh.explain(None))))
+                why = explained(weigh.explain(None), protocol.vocabulary)
+                one = replace(one, explained=tuple(why))
                 known[job] = one
             reasons = (*reasons, *(one.explained or ()))
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
@@ -138,21 +138,21 @@ def _fitted(
     audit = blank.count(fit.matched, count_unexplained(unmatched))
     found = quantities(fit.model, fit.estimate)
     if not all(math.isfinite(one.value) and math.isfinite(one.u) for one in found.values()):
-        return DropResult(run, drop.attempt, "void", (_NO_FIT,), blank), None
+        nothing = (make_reason("no_fall", protocol.vocabulary),)
+        return DropResult(run, drop.attempt, "void", nothing, blank), None
     alone = last_passages(fit)
-    end = judge(protocol, run, drop, (), audit, found, fit, alone, unmatched)
-    verdict, reasons = end.verdict, end.reasons
-    if not end.known and (explain or verdict != "void"):
+    end = judge(protocol, run, drop, audit, found, fit, alone, unmatched)
+    reasons = end.reasons
+    if not end.known and (explain or end.verdict != "void"):
         weigh = _explainer(protocol, run, drop, scale, components, end.suspects)
         if end.odd or weigh.asked(fit):
             whole = [one for one in weigh.explain(fit) if one.whole]
-            if why := tuple(explained(whole, end.accused)):
-                verdict = "void"
+            if why := explained(whole, protocol.vocabulary, end.accused):
                 reasons = (*(one for one in reasons if one not in end.accused), *why)
     result = DropResult(
         run,
         drop.attempt,
-        verdict,
+        verdict_of(reasons),
         reasons,
         audit,
         found,

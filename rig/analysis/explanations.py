@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from rig.analysis.identify import (
 )
 from rig.analysis.pattern import guesses
 from rig.analysis.score_test import scores
+from rig.reasons import make_reason
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -41,7 +42,9 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
     from rig.analysis.identify import Reading
     from rig.analysis.score_test import Score
+    from rig.reasons import Reason
     from rig.records import Drop
+    from rig.vocabulary import Vocabulary
 
 CLEAR = math.log(100.0)
 """Log odds by which a fault must beat every other one, and the protocol as it is, to be named."""
@@ -66,8 +69,8 @@ class Explanation:
     ----------
     fault
         Which.
-    words
-        With its size.
+    values
+        Of the reason that names it.
     log_odds
         Against the protocol as it is.
     whole
@@ -75,7 +78,7 @@ class Explanation:
     """
 
     fault: Fault
-    words: str
+    values: dict[str, Any]
     log_odds: float
     whole: bool
 
@@ -266,7 +269,7 @@ class Explainer:
         evidence = self._absolute(fault.change(self.setting, size), _freely(reading))
         return Explanation(
             fault,
-            fault.words(size, u),
+            fault.values(size, u),
             evidence - occam - RARE - stated,
             well_read(reading) and left < _LEFT,
         )
@@ -302,22 +305,23 @@ def _key(setting: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
     )  # fmt: skip
 
 
-def explained(found: Sequence[Explanation], accused: Sequence[str] = ()) -> list[str]:
-    """Put the weighed faults of a drop into words: the clear one, or what there is beside.
+def explained(
+    found: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
+) -> list[Reason]:
+    """Name the fault that explains a drop clearly, or the likeliest ones.
 
     Parameters
     ----------
+    words
+        Of the scene.
     accused
         What is said where no fault is clear.
     """
     second = max([0.0, *(one.log_odds for one in found[1:])])
     if found and found[0].whole and found[0].log_odds - second > CLEAR:
-        return [f"{found[0].words} (odds {_odds(found[0].log_odds - second)} to 1)"]
+        best, log_odds = found[0], found[0].log_odds - second
+        return [make_reason(best.fault.code, words, **best.values, log_odds=log_odds)]
     if not found or found[0].log_odds < CLEAR:
         return [*accused]
-    told = "; or ".join(one.words for one in found[:_NAMED])
-    return [f"likeliest, but not clearly: {told}"]
-
-
-def _odds(log_odds: float) -> str:
-    return f"{math.exp(log_odds):.0f}" if log_odds < math.log(1e4) else "more than 10000"
+    candidates = [{"code": one.fault.code, "values": one.values} for one in found[:_NAMED]]
+    return [make_reason("unclear_fault", words, candidates=candidates)]

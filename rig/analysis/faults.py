@@ -1,6 +1,6 @@
 """What may be otherwise at a rig than its protocol says: one thing each, of some size.
 
-A fault is a change of what a drop is read with, and the words for it.
+A fault is a change of what a drop is read with, and the reason that names it.
 `rig.analysis.explanations` weighs faults against each other.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -45,8 +45,10 @@ class Fault:
     ----------
     change
         The setting as it is with a fault of some size.
-    words
-        What to say of it, given size and standard uncertainty.
+    code
+        Of the reason that names it.
+    values
+        Of that reason, given size and standard uncertainty.
     sizes
         Tried at first; apart by no more than what a reading tolerates.
     shift
@@ -57,7 +59,8 @@ class Fault:
     """
 
     change: Callable[[Premise, float], Premise]
-    words: Callable[[float, float], str]
+    code: str
+    values: Callable[[float, float], dict[str, Any]]
     sizes: tuple[float, ...] = (0.0,)
     shift: Callable[[DropModel], Mapping[str, float | Array]] | None = None
     of_air: bool = False
@@ -99,15 +102,15 @@ def _grid(limit: float, step: float) -> tuple[float, ...]:
 def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
     """Faults of each chain, of both where they are alike, and of their places."""
     names = {role: name for role, name in (("impact", run.impact), ("free", run.free)) if name}
-    groups = [({name}, f"chain {name}") for name in names.values()]
+    groups = [({name}, name) for name in names.values()]
     if len(names) > 1:
-        groups.append((set(names.values()), "each chain"))
-    for group, who in groups:
+        groups.append((set(names.values()), ""))
+    for group, name in groups:
         one = protocol.chains[next(iter(group))]
         if one.chain.rods > 1:  # one object has no length, and is no chain with rods missing
-            yield _length(group, who, one.chain.heights[-1])
-            yield _rods(group, who, one.chain.rods)
-        yield _thickness(group, who, protocol.one_object, min(one.widths))
+            yield _length(group, name, one.chain.heights[-1])
+            yield _rods(group, name, one.chain.rods)
+        yield _thickness(group, name, min(one.widths))
     for role, name in names.items():
         if upside_down(protocol.chains[name]) is not None:
             yield _turned(name, role)
@@ -116,17 +119,16 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
             lambda setting, _: setting._replace(
                 run=replace(setting.run, impact=setting.run.free, free=setting.run.impact)
             ),
-            lambda _s, _u: f"chains {run.impact} and {run.free} hang on each other's side",
+            "chains_exchanged",
+            lambda _s, _u: {"impact": run.impact, "free": run.free},
         )
 
 
-def _length(names: set[str], who: str, top: float) -> Fault:
+def _length(names: set[str], name: str, top: float) -> Fault:
     return Fault(
         _with_chains(names, _stretched),
-        lambda s, u: (
-            f"{who} is {_size(s * top, u * top)} {'longer' if s > 0 else 'shorter'} than "
-            "the protocol says"
-        ),
+        "chain_length",
+        lambda s, u: {"name": name, "size_m": s * top, "U95_m": 2.0 * u * top},
         _grid(0.06, 0.015),
         lambda model: {
             f"{role} rods": np.array(record.chain.chain.heights)
@@ -136,22 +138,21 @@ def _length(names: set[str], who: str, top: float) -> Fault:
     )
 
 
-def _rods(names: set[str], who: str, rods: int) -> Fault:
+def _rods(names: set[str], name: str, rods: int) -> Fault:
     counts = tuple(float(n) for n in range(-_MORE, _MORE + 1) if n and rods + n >= 2)
     return Fault(
         _with_chains(names, _with_more),
-        lambda n, _: f"{who} has {rods + round(n)} rods, not {rods} as the protocol says",
+        "rod_count",
+        lambda n, _: {"name": name, "rods": rods + round(n), "stated": rods},
         counts,
     )
 
 
-def _thickness(names: set[str], who: str, one_object: bool, width: float) -> Fault:
+def _thickness(names: set[str], name: str, width: float) -> Fault:
     return Fault(
         _with_chains(names, _widened),
-        lambda d, u: (
-            f"{'what falls' if one_object else f'every rod of {who}'} looks {_size(d, u)} "
-            f"{'thicker' if d > 0 else 'thinner'} than the protocol says"
-        ),
+        "thickness",
+        lambda d, u: {"name": name, **_size(d, u)},
         (-_WIDER * width, _WIDER * width),
         lambda model: {
             f"{role} width": 1.0
@@ -164,7 +165,8 @@ def _thickness(names: set[str], who: str, one_object: bool, width: float) -> Fau
 def _turned(name: str, role: str) -> Fault:
     return Fault(
         _with_chains({name}, lambda chain, _: upside_down(chain) or chain),
-        lambda _size, _u: f"chain {name} hangs upside down on the {role} side",
+        "upside_down",
+        lambda _s, _u: {"name": name, "side": role},
     )
 
 
@@ -175,33 +177,31 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
             setting,
             drop=Quantity(setting.protocol.drop.value + d, setting.protocol.drop.u),
         ),
-        lambda d, u: (
-            f"{_hanging(protocol)} {_size(d, u)} "
-            f"{_above(d)} above the contact point than the protocol says"
-        ),
+        "drop_height",
+        _size,
         _grid(60e-3, 10e-3),
         lambda _: {"drop": 1.0},
     )
     yield Fault(
         lambda setting, e: setting._replace(hz=setting.hz * (1.0 - e)),
-        lambda e, u: f"the timer's clock is {_share(e, u)} {'slow' if e > 0 else 'fast'}",
+        "clock",
+        _share,
         _grid(0.05, 0.01),
         lambda _: {"clock": 1.0},
     )
     if protocol.drag is not None:
         yield Fault(
             lambda setting, _: _protocol(setting, drag=None),
-            other_air,
+            "air",
+            lambda kappa, u: {"kappa": kappa, "U95": 2.0 * u},
             of_air=True,
         )
     if protocol.surface is None:
         return  # from beam to beam nobody knows the contact point, and gravity is what is measured
     yield Fault(
         lambda setting, c: _moved(setting, c, lambda _gate: True),
-        lambda c, u: (
-            f"all gates are {_size(c, u)} {_above(c)} above the contact point than the "
-            "protocol says"
-        ),
+        "all_gates",
+        _size,
         _grid(40e-3, 10e-3),
         lambda _: {"datum": 1.0},
     )
@@ -212,24 +212,18 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
                 setting.protocol.gravity.value * (1.0 + e), setting.protocol.gravity.u
             ),
         ),
-        lambda e, u: (
-            f"gravity is {_share(e, u)} {'more' if e > 0 else 'less'} than the protocol says"
-        ),
+        "gravity",
+        _share,
         _grid(0.10, 0.02),
         lambda model: {"gravity": model.protocol.gravity.value},
     )
 
 
-def _hanging(protocol: Protocol) -> str:
-    if protocol.one_object:
-        return "it begins"
-    return "the chains hang" if protocol.two_chains else "the chain hangs"
-
-
 def _post(side: str) -> Fault:
     return Fault(
         lambda setting, c: _moved(setting, c, lambda gate: gate.side == side),
-        lambda c, u: f"the {side} side's post is {_size(c, u)} {_above(c)} than the protocol says",
+        "post",
+        lambda c, u: {"side": side, **_size(c, u)},
         _grid(40e-3, 10e-3),
         lambda model: {"datum": np.array(_placed(model.protocol).posts) == side},
     )
@@ -238,7 +232,8 @@ def _post(side: str) -> Fault:
 def _gate_off(number: int, gate: Gate) -> Fault:
     return Fault(
         lambda setting, c: _moved(setting, c, lambda one: one.channel == gate.channel),
-        lambda c, u: f"{name_of(gate)} is {_size(c, u)} {_above(c)} than the protocol says",
+        "gate_height",
+        lambda c, u: {**gate_values(gate), **_size(c, u)},
         _grid(40e-3, 10e-3),
         lambda model: {"beams": np.eye(len(_placed(model.protocol).gates))[number]},
     )
@@ -256,26 +251,14 @@ def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
         found[b] = replace(gates[b], channel=gates[a].channel)
         return _with_gates(setting, found)
 
-    return Fault(change, lambda _s, _u: exchanged(gates[a], gates[b]))
+    both = [gate_values(gates[a]), gate_values(gates[b])]
+    return Fault(change, "gates_exchanged", lambda _s, _u: {"at": both})
 
 
-def other_air(kappa: float, u: float) -> str:
-    """Say what the air takes, where that is not what was stated."""
-    return (
-        f"the air holds the chains back by κ = {kappa:.2g} ± {max(2.0 * u, 1e-4):.1g} per m, and "
-        "not as the protocol says"
-    )
-
-
-def exchanged(one: Gate, other: Gate) -> str:
-    """Say that two gates changed places."""
-    return f"{name_of(one)} and {name_of(other)} are plugged in the wrong way round"
-
-
-def name_of(gate: Gate) -> str:
-    """Say which gate, so that one can find it."""
+def gate_values(gate: Gate) -> dict[str, Any]:
+    """Return the values by which a reason names a gate, so that one can find it."""
     height = gate.height if gate.stated is None else gate.stated
-    return f"the gate on channel {gate.channel} ({gate.side} side, {height * 1e3:g} mm)"
+    return {"channel": gate.channel, "side": gate.side, "height_m": height}
 
 
 def _protocol(setting: Premise, **changes: object) -> Premise:
@@ -359,13 +342,9 @@ def upside_down(chain: RodChain) -> RodChain | None:
     return replace(chain, chain=turned, widths=widths)
 
 
-def _above(metres: float) -> str:
-    return "higher" if metres > 0 else "lower"
+def _size(metres: float, u: float) -> dict[str, Any]:
+    return {"size_m": metres, "U95_m": 2.0 * u}
 
 
-def _size(metres: float, u: float) -> str:
-    return f"{abs(metres) * 1e3:.1f} ± {max(2e3 * u, 0.1):.1f} mm"
-
-
-def _share(share: float, u: float) -> str:
-    return f"{abs(share):.2%} ± {max(2.0 * u, 1e-4):.2%}"
+def _share(share: float, u: float) -> dict[str, Any]:
+    return {"share": share, "U95": 2.0 * u}

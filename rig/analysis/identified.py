@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rig.analysis.components import Components
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
+    from rig.reasons import Reason
     from rig.records import Drop
 
 
@@ -42,10 +43,10 @@ class Identified:
     """
 
     scale: TimeScale
-    unlike: Mapping[str, str]
+    unlike: Mapping[str, Reason]
     poor: tuple[str, ...] = ()
     begun: Begun | None = None
-    explained: tuple[str, ...] | None = None
+    explained: tuple[Reason, ...] | None = None
 
 
 def identified(
@@ -55,7 +56,7 @@ def identified(
     window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
     records = chain_records(protocol, run, drop, scale.hz)
     found = identify(protocol, records, scale.u, components, window)
-    unlike, fit = pattern_faults(found), found.fit
+    unlike, fit = pattern_faults(found, protocol.vocabulary), found.fit
     if unlike or fit is None:
         poor = tuple(role for role, share in found.shares.items() if share < SUPPORT)
         return Identified(scale, unlike, poor)

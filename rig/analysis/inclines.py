@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
 from rig.model.predict import expected_alpha
+from rig.reasons import Reason, make_reason
 
 if TYPE_CHECKING:
     from rig.analysis.fit import Fit
@@ -23,7 +24,7 @@ _MODEL = 0.15
 """Of α, one standard deviation of what the model may be off: resolved rods give up to 40 % more."""
 
 
-def other_incline(fit: Fit, run: Run) -> tuple[str, ...]:
+def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
     """Say of which other incline the impacts are; nothing where they may well be of the run's."""
     model, estimate, incline = fit.model, fit.estimate, run.incline_deg
     surface = model.protocol.surface
@@ -53,6 +54,7 @@ def other_incline(fit: Fit, run: Run) -> tuple[str, ...]:
     if likely[best][0] > _FITS or likely[best][1] - likely[incline][1] < CLEAR:
         return ()
     return (
-        f"its impacts (α = {alpha:.3f} ± {2 * u:.1g}) are those of an incline of {best:g} deg, not "
-        f"{incline:g} deg, or the surface is not as stated",
+        make_reason(
+            "other_incline", alpha=alpha, U95=2.0 * u, likelier_deg=best, stated_deg=incline
+        ),
     )

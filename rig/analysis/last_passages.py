@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.result import Measured
-from rig.units import Quantity, format_quantity
+from rig.reasons import Reason, make_reason
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -106,27 +106,26 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     return found
 
 
-def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) -> list[str]:
+def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) -> list[Reason]:
     """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
-    said = []
-    for name, symbol, unit in (
-        ("speed_m_s", "V", "m/s"),
-        ("separation_raw_m", "Δz as it fell", "mm"),
+    reasons = []
+    for name, code, unit in (
+        ("speed_m_s", "last_speed_differs", "m_s"),
+        ("separation_raw_m", "last_separation_differs", "m"),
     ):
         if name not in found or name not in alone:
             continue
         one, other = found[name], alone[name]
         # They share their last edges and so the errors of these: they are nearer than that.
         if abs(one.value - other.value) > _APART * math.hypot(one.u, other.u):
-            last, whole = (
-                format_quantity(Quantity(measured.value, measured.expanded), unit)
-                for measured in (other, one)
-            )
-            said.append(
-                f"the last passages alone have {symbol} = {last}, the whole fall {whole}: "
-                "its end does not fall as the model says"
-            )
-    return said
+            values = {
+                f"alone_{unit}": other.value,
+                "alone_U95": other.expanded,
+                f"whole_{unit}": one.value,
+                "whole_U95": one.expanded,
+            }
+            reasons.append(make_reason(code, **values))
+    return reasons
 
 
 def _passages(fit: Fit, role: str) -> _Passages:

@@ -43,9 +43,9 @@ def later_passages(
     Returns
     -------
     set of int
-        Numbers of the edges in the train; empty for a chain that strikes a surface.
+        Numbers of the edges in the train; empty for a chain, whose rods too many would look alike.
     """
-    if record.ratios is not None or not (match >= 0).any():
+    if record.ratios is not None or record.chain.chain.rods > 1 or not (match >= 0).any():
         return set()
     later = np.arange(int(match.max()) + 1, train.times.size)
     if not train.blocked.all():

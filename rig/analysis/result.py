@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
+from rig.reasons import reasons_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.gate_passages import GatePassage
     from rig.protocol.protocol import Run
+    from rig.reasons import Reason
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
@@ -169,7 +171,7 @@ class DropResult:
     run: Run
     attempt: int
     verdict: Verdict
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     audit: Audit
     quantities: Mapping[str, Measured] = field(default_factory=dict)
     matches: Mapping[int, int] = field(default_factory=dict)
@@ -203,7 +205,7 @@ class DropResult:
             found["last_passages"] = {n: one.json() for n, one in self.last_passages.items()}
         found["learned"] = self.learned
         found["verdict"] = self.verdict
-        found["reasons"] = list(self.reasons)
+        found |= reasons_json(self.reasons)
         found["degrees"] = {
             name: value.degrees if math.isfinite(value.degrees) else None
             for name, value in self.quantities.items()

@@ -16,6 +16,7 @@ from rig.analysis.summary import Incline, summarize
 from rig.errors import InputError
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
+from rig.reasons import make_reason
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
+    from rig.reasons import Reason
     from rig.records import Drop, Job
 
     Progress = Callable[[int, int], None]
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
 _EXPLAINED = 6  # void drops of a session, after which it is not sought what else the next ones are
 _KEPT = 0.9
 """Share of its edges that a drop must keep among others: without them priors are all it has."""
-_MOVED = "somebody may have moved its gates or chains; it is judged and measured by itself"
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +114,7 @@ def analyze(
     protocol: Protocol,
     drops: Sequence[Drop],
     scale: Callable[[Drop], TimeScale],
-    rejected: Mapping[tuple[int, int], Sequence[str]] | None = None,
+    rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
     progress: Progress | None = None,
     known: MutableMapping[Job, Identified] | None = None,
 ) -> Analysis:
@@ -177,7 +178,7 @@ def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
     return planned[drop.run]
 
 
-def overruled(result: DropResult, causes: Sequence[str] | None) -> DropResult:
+def overruled(result: DropResult, causes: Sequence[Reason] | None) -> DropResult:
     """Put the operator's causes to reject a drop, if there are any, above its limits."""
     if causes is None:
         return result
@@ -198,7 +199,7 @@ def gather(
     results, fits
         Of each drop, as `rig.analysis.drop.fit_drop` gives them.
     """
-    found, joint, adjusted, unsettled = _fit_jointly(results, fits)
+    found, joint, adjusted, unsettled = _fit_jointly(protocol, results, fits)
     return replace(sum_up(protocol, found, joint, adjusted), unsettled=unsettled)
 
 
@@ -231,7 +232,7 @@ def sum_up(
 
 
 def _fit_jointly(
-    results: Sequence[DropResult], fits: Sequence[Fit | None]
+    protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
 ) -> tuple[list[DropResult], JointFit | None, dict[tuple[int, int], Fit | JointDrop], bool]:
     """Give good drops the numbers that they have in the light of all of them.
 
@@ -252,7 +253,12 @@ def _fit_jointly(
             joint, unsettled = None, True
             break
         fewer = {
-            n: f"only {drop.matched} of its {fit.matched} edges go with the other runs: {_MOVED}"
+            n: make_reason(
+                "differs_from_session",
+                protocol.vocabulary,
+                matched=drop.matched,
+                alone=fit.matched,
+            )
             for (n, fit), drop in zip(good.items(), joint.drops, strict=True)
             if drop.matched < _KEPT * fit.matched
         }

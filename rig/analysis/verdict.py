@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.deciding import deciding_gate
 from rig.analysis.diagnoses import IMPLAUSIBLE, diagnose
 from rig.analysis.distributions import most_by_chance
-from rig.analysis.faults import other_air
 from rig.analysis.identify import MISSED
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import disagreements
+from rig.reasons import Reason, Severity, make_reason
+from rig.vocabulary import ANY_SCENE
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from rig.analysis.adjust import Estimate
     from rig.analysis.edge_classes import UnmatchedEdge
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import Audit, Measured, Verdict
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
+    from rig.vocabulary import Vocabulary
 
 SUPPORT = 0.6
 """Share of the expected edges that must be where the first guess puts them."""
@@ -59,26 +60,55 @@ class Judgement(NamedTuple):
         Whether the reason explains all else that is odd, so that no other is to be sought.
     """
 
-    verdict: Verdict
-    reasons: tuple[str, ...]
-    accused: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...]
+    accused: tuple[Reason, ...] = ()
     odd: bool = False
     suspects: tuple[int, ...] = ()
     known: bool = False
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the gravest reason makes of the drop."""
+        return verdict_of(self.reasons)
+
+
+def verdict_of(reasons: Iterable[Reason]) -> Verdict:
+    """Return the verdict that the gravest of some reasons makes of a drop."""
+    gravest = max((reason.severity for reason in reasons), default=Severity.REMARK)
+    verdicts: dict[Severity, Verdict] = {
+        Severity.VOID: "void",
+        Severity.DOUBT: "marginal",
+        Severity.REMARK: "accepted",
+    }
+    return verdicts[gravest]
+
+
+def judge_record(drop: Drop, audit: Audit, unlike: Iterable[Reason] = ()) -> Judgement:
+    """Judge whether a drop can be analysed at all.
+
+    Parameters
+    ----------
+    unlike
+        Why its edges are not one fall of each chain.
+    """
+    faults = {reason.code: reason for reason in drop.faults}
+    if audit.lost:
+        faults.setdefault("edges_lost", make_reason("edges_lost", lost=audit.lost))
+    unlike = tuple(unlike)
+    return Judgement((*faults.values(), *unlike), odd=bool(unlike))
 
 
 def judge(
     protocol: Protocol,
     run: Run,
     drop: Drop,
-    unlike: Collection[str],
     audit: Audit,
     found: Mapping[str, Measured],
-    fit: Fit | None,
-    alone: Mapping[str, Measured] = MappingProxyType({}),
-    unmatched: Collection[UnmatchedEdge] = (),
+    fit: Fit,
+    alone: Mapping[str, Measured],
+    unmatched: Collection[UnmatchedEdge],
 ) -> Judgement:
-    """Judge a drop; without a `fit`, only whether it can be analysed at all.
+    """Judge a drop by what was fitted.
 
     Parameters
     ----------
@@ -87,92 +117,64 @@ def judge(
     unmatched
         Edges that are missing or belong to no rod.
     """
-    void = [*drop.faults]
-    doubts: list[str] = []
-    accused: tuple[str, ...] = ()
-    suspects: tuple[int, ...] = ()
-    odd = False
-    remarks: tuple[str, ...] = ()
-    if audit.lost:
-        void.append(f"the device lost {audit.lost} edges: its memory was full")
-    odd = bool(unlike)
-    void += unlike
-    if fit is not None:
-        faults = diagnose(fit)
-        if faults.known:  # all else that is odd follows from it
-            return Judgement("void", (*void, *faults.void), known=True)
-        # A motion in the wrong air tells nothing of the gates.
-        accused, suspects = _other_air(fit) or faults.void, faults.suspects
-        void += _limits(protocol, audit, found)
-        void += accused
-        void += _blown(fit)
-        estimate, missed = (
-            fit.estimate,
-            audit.missed > _most_missed(audit.expected, protocol.accept.missed_edges),
-        )
-        if void:
-            void += faults.doubts  # which may be why
-        doubts += faults.doubts
-        doubts += _doubts(protocol, drop, audit, found, fit.estimate)
-        pushed = _pushed(fit)
-        remarks = other_incline(fit, run)
-        accused += (*pushed, *remarks)
-        doubts += pushed
-        restless = estimate.scatter > RESTLESS or not estimate.settled
-        odd = faults.odd or bool(pushed) or missed or restless
-        doubts += disagreements(found, alone)
-    if void:
-        return Judgement("void", tuple(void), accused, odd, suspects)
+    record = judge_record(drop, audit).reasons
+    faults = diagnose(fit)
+    void = [reason for reason in faults.reasons if reason.severity is Severity.VOID]
+    if faults.known:  # all else that is odd follows from it
+        return Judgement((*record, *void), known=True)
+    # A motion in the wrong air tells nothing of the gates.
+    accused = _other_air(fit) or tuple(void)
+    void = [*record, *_limits(protocol, audit, found), *accused, *_blown(fit)]
+    doubts = [reason for reason in faults.reasons if reason.severity is not Severity.VOID]
+    pushed = _pushed(fit)
+    remarks = other_incline(fit, run)
+    estimate = fit.estimate
+    missed = audit.missed > _most_missed(audit.expected, protocol.accept.missed_edges)
+    restless = estimate.scatter > RESTLESS or not estimate.settled
+    odd = faults.odd or bool(pushed) or missed or restless
+    accused += (*pushed, *remarks)
+    if void:  # what is doubtful about gates may be why
+        return Judgement((*void, *doubts), accused, odd, faults.suspects)
+    doubts += [*_doubts(protocol, drop, audit, found, estimate), *pushed]
+    doubts += disagreements(found, alone)
     # A drop is as good where the model's α is not its own: that is what is measured.
-    verdict: Verdict = "marginal" if doubts else "accepted"
-    remarks += _later_passages(unmatched)
-    return Judgement(verdict, (*doubts, *remarks), accused, odd, suspects)
+    remarks += _later_passages(protocol, unmatched)
+    return Judgement((*doubts, *remarks), accused, odd, faults.suspects)
 
 
-def pattern_faults(identified: Identification) -> dict[str, str]:
+def pattern_faults(identified: Identification, words: Vocabulary = ANY_SCENE) -> dict[str, Reason]:
     """Say why the edges are not one fall of each chain, by role; nothing where they are."""
     found = {
-        role: f"the {role} side does not look like this chain falling: only {share:.0%} of the "
-        "expected edges are where one fall would put them"
+        role: make_reason("few_edges_fit", words, side=role, share=share)
         for role, share in identified.shares.items()
         if share < SUPPORT
     }
     if not found and identified.fit is None:
-        return dict.fromkeys(
-            identified.shares,
-            "this does not look like this chain falling: no motion fits edges enough of both sides"
-            if len(identified.shares) > 1
-            else "this does not look like this chain falling: no motion fits its edges",
-        )
+        return dict.fromkeys(identified.shares, make_reason("no_fall", words))
     if not found and identified.log_odds < LEAD:
-        return dict.fromkeys(identified.shares, _ambiguous(identified))
+        return dict.fromkeys(identified.shares, _ambiguous(words, identified))
     return found
 
 
-def _ambiguous(identified: Identification) -> str:
+def _ambiguous(words: Vocabulary, identified: Identification) -> Reason:
     """Say that two falls fit, and with which further gate only one of them would."""
     odds = math.exp(identified.log_odds)
-    text = f"these edges fit two falls: the odds of the likelier one are only {odds:.3g} to 1"
     if identified.fit is None or identified.other is None:
-        return text
+        return make_reason("two_falls", words, odds=odds)
     side, height = deciding_gate(identified.fit, identified.other)
-    return f"{text}; a further {side} gate at {height * 1e3:.0f} mm would tell which"
+    return make_reason("two_falls_gate", words, odds=odds, side=side, height_m=height)
 
 
-def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> list[str]:
-    """Return what is beyond the protocol's ``accept``."""
-    accept = protocol.accept
-    void = []
+def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> Iterator[Reason]:
+    """Yield what is beyond the protocol's ``accept``."""
+    accept, words = protocol.accept, protocol.vocabulary
     if audit.missed > _most_missed(audit.expected, accept.missed_edges):
-        void.append(_many_missed(audit, accept.missed_edges))
+        yield _many_missed("edges_missed", words, audit, accept.missed_edges)
     if audit.unexplained > _most_unexplained(audit.received, accept.unexplained_edges):
-        void.append(_many_unexplained(audit, accept.unexplained_edges))
+        yield _many_unexplained("edges_unexplained", words, audit, accept.unexplained_edges)
     skew = found.get("release_skew_s")
     if skew is not None and _too_late(skew, accept.release_skew):
-        void.append(
-            f"release skew {skew.value * 1e3:.2f} ms is beyond {accept.release_skew * 1e3:g} ms"
-        )
-    return void
+        yield make_reason("release_skew", skew_s=skew.value, limit_s=accept.release_skew)
 
 
 def _too_late(skew: Measured, limit: float) -> bool:
@@ -192,9 +194,8 @@ def _most_missed(expected: int, limit: float) -> float:
     return max(limit * expected, most_by_chance(expected, min(MISSED, limit / 2.0)))
 
 
-def _many_missed(audit: Audit, limit: float) -> str:
-    share = audit.missed / audit.expected
-    return f"{audit.missed} of {audit.expected} edges missed ({share:.1%}), more than {limit:.1%}"
+def _many_missed(code: str, words: Vocabulary, audit: Audit, limit: float) -> Reason:
+    return make_reason(code, words, missed=audit.missed, expected=audit.expected, limit=limit)
 
 
 def _most_unexplained(received: int, limit: float) -> float:
@@ -202,18 +203,15 @@ def _most_unexplained(received: int, limit: float) -> float:
     return max(limit * received, _PULSE)
 
 
-def _many_unexplained(audit: Audit, limit: float) -> str:
-    share = audit.unexplained / audit.received
-    return (
-        f"{audit.unexplained} of {audit.received} edges unexplained ({share:.1%}), more than "
-        f"{limit:.1%}"
-    )
+def _many_unexplained(code: str, words: Vocabulary, audit: Audit, limit: float) -> Reason:
+    counts = {"unexplained": audit.unexplained, "received": audit.received}
+    return make_reason(code, words, **counts, limit=limit)
 
 
-def _later_passages(unmatched: Collection[UnmatchedEdge]) -> tuple[str, ...]:
+def _later_passages(protocol: Protocol, unmatched: Collection[UnmatchedEdge]) -> tuple[Reason, ...]:
     """Say how many edges of later passages a result is without."""
-    later = sum(edge.kind == "later passage" for edge in unmatched)
-    return (f"{later} edges after the passage were left out: it came back",) if later else ()
+    edges = sum(edge.kind == "later passage" for edge in unmatched)
+    return (make_reason("later_passages", protocol.vocabulary, edges=edges),) if edges else ()
 
 
 def _doubts(
@@ -222,50 +220,44 @@ def _doubts(
     audit: Audit,
     found: Mapping[str, Measured],
     estimate: Estimate,
-) -> list[str]:
-    """Return what makes a drop marginal."""
-    doubts = []
+) -> Iterator[Reason]:
+    """Yield what makes a drop marginal."""
     missed, unexplained = protocol.accept.missed_edges, protocol.accept.unexplained_edges
+    words = protocol.vocabulary
     if missed * audit.expected < audit.missed <= _most_missed(audit.expected, missed):
-        doubts.append(f"{_many_missed(audit, missed)}, which of so few edges may be chance")
+        yield _many_missed("edges_missed_few", words, audit, missed)
     if unexplained * audit.received < audit.unexplained <= _PULSE:
-        doubts.append(f"{_many_unexplained(audit, unexplained)}, which may be one stray pulse")
+        yield _many_unexplained("edges_unexplained_few", words, audit, unexplained)
     skew = found.get("release_skew_s")
     limit = protocol.accept.release_skew
     near = skew is not None and abs(abs(skew.value) - limit) < skew.expanded
     if skew is not None and near and not _too_late(skew, limit):
-        doubts.append(
-            f"release skew {skew.value * 1e3:.2f} ms is within its uncertainty of the limit"
-        )
+        yield make_reason("release_skew_near", skew_s=skew.value, limit_s=limit)
     if estimate.scatter > RESTLESS:
-        doubts.append(
-            f"edges scatter {estimate.scatter:.1f} times as much as assumed; "
-            "the uncertainties are enlarged to match"
-        )
+        yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:
-        doubts.append("the adjustment did not settle: no motion fits these edges well")
+        yield make_reason("not_converged")
     device, edges = drop.certificate, max(1, len(drop.edges))
     if device is not None and device.late > LATE * edges:
-        doubts.append(f"{device.late} time stamps may be late")
+        yield make_reason("late_stamps", edges=device.late)
     if device is not None and device.glitches > GLITCHES * edges:
-        doubts.append(f"{device.glitches} pulses were too short to be timed")
-    return doubts
+        yield make_reason("short_pulses", pulses=device.glitches)
 
 
-def _blown(fit: Fit) -> list[str]:
+def _blown(fit: Fit) -> Iterator[Reason]:
     """Air that nobody would expect explains much; where edges do not fit even so, it is no fall."""
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start
-    if estimate.scatter <= RESTLESS or abs(estimate.x[at]) <= _BEYOND * estimate.sd[at]:
-        return []
-    return [
-        "this does not look like this chain falling: even with what air would have to take "
-        f"(κ = {model.kappa(estimate.x):.2g} per m) edges scatter {estimate.scatter:.1f} times as "
-        "much as assumed"
-    ]
+    if estimate.scatter > RESTLESS and abs(estimate.x[at]) > _BEYOND * estimate.sd[at]:
+        yield make_reason(
+            "air_implausible",
+            model.protocol.vocabulary,
+            kappa=float(model.kappa(estimate.x)),
+            factor=estimate.scatter,
+        )
 
 
-def _other_air(fit: Fit) -> tuple[str, ...]:
+def _other_air(fit: Fit) -> tuple[Reason, ...]:
     """Edges tell the air better than a protocol does: where it is not as stated, that is said."""
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start
@@ -275,18 +267,17 @@ def _other_air(fit: Fit) -> tuple[str, ...]:
     # By the edges alone, without what the protocol makes of them.
     share = 1.0 / (1.0 - min(float(estimate.covariance[at, at]), 0.9))
     kappa = model.kappa(estimate.x) + (share - 1.0) * off
-    return (other_air(kappa, math.sqrt(share * estimate.covariance[at, at]) * sd),)
+    u = math.sqrt(share * estimate.covariance[at, at]) * sd
+    return (make_reason("air", model.protocol.vocabulary, kappa=float(kappa), U95=2.0 * u),)
 
 
-def _pushed(fit: Fit) -> tuple[str, ...]:
+def _pushed(fit: Fit) -> tuple[Reason, ...]:
     """Air only holds back: where it seems to push, something is not as it is said to be."""
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start
-    kappa = model.kappa(estimate.x)
+    kappa = float(model.kappa(estimate.x))
     u = math.sqrt(estimate.covariance[at, at]) * float(estimate.sd[at])
     if kappa >= -_SURE * u:
         return ()
-    return (
-        f"these are edges of a fall that the air speeds up (κ = {kappa:.2g} ± {2 * u:.1g} per m): "
-        "the clock, the gates' heights or gravity are not as stated",
-    )
+    words = model.protocol.vocabulary
+    return (make_reason("air_accelerates", words, kappa=kappa, U95=2.0 * u),)

@@ -23,7 +23,7 @@ from rig.bench.accuracy import Errors
 from rig.bench.falls import Asked, falls, time_scale
 from rig.bench.fast_accuracy import blocks, with_setting
 from rig.bench.layout_catalogue import STANDARD, GateLayout
-from rig.bench.wrong_rigs import WRONG_RIGS, WrongRig
+from rig.bench.wrong_rigs import NAMELESS, WRONG_RIGS, WrongRig
 from rig.clock.calibration import TimeScale
 from rig.estimate.session import estimate
 from rig.protocol import reader
@@ -133,13 +133,13 @@ def _from_board(scene: dict[str, Any], mm: float) -> bool:
 
 _KNOWN = {one.name: one for one in WRONG_RIGS}
 MISFITS = (
-    WrongRig("rod off its place", "", (2.0,), "mm", _rod),
+    WrongRig("rod off its place", NAMELESS, (2.0,), "mm", _rod),
     replace(_KNOWN["post's datum"], sizes=(0.5, 1.0, 2.0)),
-    WrongRig("wide beam", "", (2.0,), "mm", _wide),
+    WrongRig("wide beam", NAMELESS, (2.0,), "mm", _wide),
     replace(_KNOWN["gravity"], sizes=(0.2,)),
     replace(_KNOWN["clock"], sizes=(-0.3,)),
     replace(_KNOWN["chain stretched"], sizes=(1.0,)),
-    WrongRig("heights from the board", "", (_FORGOTTEN_MM,), "mm", _from_board),
+    WrongRig("heights from the board", NAMELESS, (_FORGOTTEN_MM,), "mm", _from_board),
 )
 """What a rig may be wrong in without its protocol allowing for it."""
 
@@ -359,7 +359,7 @@ def misfits(folder: str, rigs: int) -> Iterator[tuple[str, Held]]:
     """
     stated = FULL.protocol()
     protocol = reader.parse(stated)
-    none = WrongRig("nothing", "")
+    none = WrongRig("nothing", NAMELESS)
     for fault in (none, *MISFITS):
         for size, text in fault.rigs(stated):
             path = Path(folder) / "wrong.yaml"

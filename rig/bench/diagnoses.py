@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from rig.bench.wrong_rigs import WRONG_RIGS
 from rig.clock.calibration import TimeScale
 from rig.protocol import reader
 from rig.protocol.plan import runs
+from rig.reasons import sentences
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ OUTCOMES = ("right", "likely", "unnamed", "wrong", "unnoticed")
 """Named rightly; among the likeliest of several; void or remarked without a name; something else
 is accused; accepted without a word."""
 NONE = "no fault"
-_UNCLEAR = "likeliest, but not clearly"
 _STRIDE = 5  # from run to run of a plan: all inclinations and either chain come soon
 _BY_NAME = {kind.name: kind for kind in KINDS}
 LAYOUTS = (
@@ -87,7 +86,7 @@ class DiagnosisTally:
         outcome = judged(self.fault, result)
         self.outcomes[outcome] += 1
         if outcome in {"wrong", "unnamed"}:
-            self.said.append("; ".join(result.reasons))
+            self.said.append(sentences(result.reasons))
 
     def json(self) -> dict[str, Any]:
         """Return the figures to report."""
@@ -97,16 +96,18 @@ class DiagnosisTally:
 
 def judged(fault: str, result: DropResult) -> str:
     """Return which of `OUTCOMES` the reasons of a drop with a fault are."""
-    clear = [reason for reason in result.reasons if _UNCLEAR not in reason]
-    accused = {one.name for one in WRONG_RIGS if any(re.search(one.said, why) for why in clear)}
+    codes = {reason.code for reason in result.reasons}
+    accused = {rig.name for rig in WRONG_RIGS if rig.codes & codes}
     if accused == {fault}:
         return "right"
     if accused:
         return "wrong"
-    said = next((one.said for one in WRONG_RIGS if one.name == fault), None)
-    if said is not None and any(
-        re.search(said, part) for why in result.reasons for part in re.split(": |; or ", why)
-    ):
+    likely = {
+        candidate["code"]
+        for reason in result.reasons
+        for candidate in reason.values.get("candidates", ())
+    }
+    if any(rig.codes & likely for rig in WRONG_RIGS if rig.name == fault):
         return "likely"
     return "unnamed" if result.reasons else "unnoticed"
 

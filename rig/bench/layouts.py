@@ -123,7 +123,7 @@ class Cell:
             return
         self.verdicts[result.verdict] += 1
         if result.verdict not in GOOD:
-            self.reasons.update(_NUMBER.sub("…", reason) for reason in result.reasons)
+            self.reasons.update(reason.code for reason in result.reasons)
             return
         begin = time.process_time()
         plain_fit(protocol, fall.drop, result, HZ)

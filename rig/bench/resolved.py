@@ -147,7 +147,7 @@ def _judged(case: str, protocol: Protocol, result: DropResult, fall: SimulatedDr
         result.run.incline_deg,
         result.run.number,
         result.verdict,
-        result.reasons,
+        tuple(reason.code for reason in result.reasons),
         abs(truth["release_skew_s"]) > protocol.accept.release_skew,
         errors,
         fall.rods(result.matches)[0] if result.verdict in GOOD else 0,
@@ -170,7 +170,7 @@ def summary(drops: Sequence[JudgedDrop]) -> dict[str, Any]:
     for one in drops:
         for name, (error, expanded, u) in one.errors.items():
             errors.setdefault(name, Errors()).add(error, expanded, u=u)
-    reasons = Counter(_NUMBER.sub("…", reason) for one in void for reason in one.reasons)
+    reasons = Counter(reason for one in void for reason in one.reasons)
     return {
         "drops": len(drops),
         "beyond": len(drops) - len(fair),

@@ -32,8 +32,8 @@ class WrongRig:
     ----------
     name
         In words, as the table has them.
-    said
-        Regular expression of a reason that names it.
+    codes
+        Of the reasons that name it.
     sizes
         How wrong, in `unit`; none for what is only right or wrong.
     unit
@@ -47,7 +47,7 @@ class WrongRig:
     """
 
     name: str
-    said: str
+    codes: frozenset[str]
     sizes: tuple[float, ...] = (0.0,)
     unit: str = ""
     change: Callable[[Scene, float], bool] = lambda _scene, _size: True
@@ -209,29 +209,37 @@ def _tilted(scene: Scene, forgotten: float) -> bool:
     return len(inclines) > 1
 
 
+NAMELESS: frozenset[str] = frozenset()
+"""Codes of what no reason names."""
+
+
+def _codes(*codes: str) -> frozenset[str]:
+    return frozenset(codes)
+
+
 WRONG_RIGS = (
-    WrongRig("chain stretched", "longer|shorter", (0.3, -1.0, 3.0), "%", _stretched),
-    WrongRig("other number of rods", r"has \d+ rods, not", (-1.0, 1.0, 2.0), "rods", _more_rods),
-    WrongRig("rod missing", "no gate saw rod", change=_rod_missing),
-    WrongRig("rods thicker", "looks .* (thicker|thinner)", (25.0, -20.0), "%", _thicker),
-    WrongRig("drop height", "chains? hangs? .*(higher|lower)", (8.0, -15.0, 30.0), "mm", _hung),
-    WrongRig("contact level", "all gates are", (3.0, -6.0, 15.0), "mm", _contact),
+    WrongRig("chain stretched", _codes("chain_length"), (0.3, -1.0, 3.0), "%", _stretched),
+    WrongRig("other number of rods", _codes("rod_count"), (-1.0, 1.0, 2.0), "rods", _more_rods),
+    WrongRig("rod missing", _codes("rod_missing"), change=_rod_missing),
+    WrongRig("rods thicker", _codes("thickness"), (25.0, -20.0), "%", _thicker),
+    WrongRig("drop height", _codes("drop_height"), (8.0, -15.0, 30.0), "mm", _hung),
+    WrongRig("contact level", _codes("all_gates"), (3.0, -6.0, 15.0), "mm", _contact),
     WrongRig(
-        "clock", "clock is", (0.1, -0.5, 2.0), "%", slow=lambda percent: percent / 100.0
+        "clock", _codes("clock"), (0.1, -0.5, 2.0), "%", slow=lambda percent: percent / 100.0
     ),
-    WrongRig("gravity", "gravity is", (0.5, -2.0, 5.0), "%", _attracted),
+    WrongRig("gravity", _codes("gravity"), (0.5, -2.0, 5.0), "%", _attracted),
     WrongRig(
         "air",
-        "the air holds",
+        _codes("air"),
         (0.01, 0.03, 0.08),
         "per m",
         settings=lambda size: {"drag": f"{size}"},
     ),
-    WrongRig("post's datum", "post is", (2.0, 5.0, 15.0), "mm", _post),
-    WrongRig("gate off", "^the gate on .*(higher|lower) than", (3.0, -8.0, 20.0), "mm", _one_gate),
-    WrongRig("gate dead", "gave no edges", change=_dead),
-    WrongRig("gates exchanged", "wrong way round", (1.0, 2.0), "sides", _exchanged),
-    WrongRig("chains exchanged", "on each other's side", change=_crossed),
-    WrongRig("chain upside down", "upside down", change=_turned),
-    WrongRig("wrong incline", "incline|board is at", (1.0, 2.0), "inclines", _tilted),
+    WrongRig("post's datum", _codes("post"), (2.0, 5.0, 15.0), "mm", _post),
+    WrongRig("gate off", _codes("gate_height"), (3.0, -8.0, 20.0), "mm", _one_gate),
+    WrongRig("gate dead", _codes("gate_silent", "side_silent"), change=_dead),
+    WrongRig("gates exchanged", _codes("gates_exchanged"), (1.0, 2.0), "sides", _exchanged),
+    WrongRig("chains exchanged", _codes("chains_exchanged"), change=_crossed),
+    WrongRig("chain upside down", _codes("upside_down"), change=_turned),
+    WrongRig("wrong incline", _codes("other_incline"), (1.0, 2.0), "inclines", _tilted),
 )  # fmt: skip

@@ -10,7 +10,8 @@ from rig.link.refusals import DeviceRefusedError
 if TYPE_CHECKING:
     from rig.campaign.voids import VoidRow
     from rig.errors import RigError
-    from rig.link.messages import Reason
+    from rig.link.messages import Reason as Refusal
+    from rig.reasons import Reason
     from rig.records import Job
 
 
@@ -73,7 +74,7 @@ class Judged(NamedTuple):
 
     ticket: int
     verdict: str
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     row: VoidRow | None = None
 
 
@@ -90,7 +91,7 @@ class EffectFailed(NamedTuple):
 
     ticket: int
     trouble: str
-    reason: Reason | None = None
+    reason: Refusal | None = None
     detail: int = 0
 
 
@@ -200,7 +201,7 @@ class Log(NamedTuple):
 
     job: Job
     state: str
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
 
 
 class Stop(NamedTuple):

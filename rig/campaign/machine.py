@@ -39,13 +39,14 @@ from rig.campaign.events import (
     Warned,
 )
 from rig.campaign.voids import after, why_halted
-from rig.link.messages import Reason
+from rig.link.messages import Reason as Refusal
+from rig.reasons import NOTE, OPERATOR, plain_reason
 from rig.records import Job
-from rig.session.schema import NOTE
 
 if TYPE_CHECKING:
     from rig.campaign.events import Effect, Event
     from rig.campaign.voids import VoidRow
+    from rig.reasons import Reason
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""
@@ -59,9 +60,9 @@ BEFORE_RELEASE = (
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
-_PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
+_PASSING = (Refusal.COOLING, Refusal.GATE_BLOCKED, Refusal.STOPPED)
 """Refusals to arm that end by themselves, or that somebody at the rig can end."""
-_DISTURBED = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED)
+_DISTURBED = (Refusal.GATE_BLOCKED, Refusal.GATE_UNSTEADY, Refusal.NOT_ARMED, Refusal.STOPPED)
 """Refusals to fire after which the drop can be prepared again."""
 
 Outcome: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
@@ -108,8 +109,8 @@ class Flow:
     left_s: float = 0.0
     logged: bool = True
     verdict: str = ""
-    reasons: tuple[str, ...] = ()
-    judged: tuple[str, tuple[str, ...]] = ("", ())
+    reasons: tuple[Reason, ...] = ()
+    judged: tuple[str, tuple[Reason, ...]] = ("", ())
     trouble: str = ""
     home: Stage = Stage.PREPARE
     not_armed: int = 0
@@ -156,23 +157,25 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             if flow.verdict != "rejected":
                 flow = replace(flow, judged=(flow.verdict, flow.reasons))
-            return _relogged(flow, "rejected", (cause.strip(), *_notes(flow)))
+            return _relogged(
+                flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow))
+            )
         case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
             return _relogged(flow, verdict, (*_noteless(reasons), *_notes(flow)))
         case Note(text) if flow.stage is Stage.RESULT:
-            note = (f"{NOTE}{text.strip()}",) if text.strip() else ()
+            note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != _notes(flow):  # what was noted before stays in the log
                 return _relogged(flow, flow.verdict, (*_noteless(flow.reasons), *note))
     return flow, ()
 
 
-def _notes(flow: Flow) -> tuple[str, ...]:
-    return tuple(reason for reason in flow.reasons if reason.startswith(NOTE))
+def _notes(flow: Flow) -> tuple[Reason, ...]:
+    return tuple(reason for reason in flow.reasons if reason.code == NOTE)
 
 
-def _noteless(reasons: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(reason for reason in reasons if not reason.startswith(NOTE))
+def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
+    return tuple(reason for reason in reasons if reason.code != NOTE)
 
 
 def _stopped(flow: Flow) -> Outcome:
@@ -234,7 +237,7 @@ def _not_armed(flow: Flow, event: EffectFailed) -> Outcome:
         return flow.to(flow.home, event.trouble), (GiveUp(),)
     if flow.attended:  # who has been asked, and arms again when all is well
         return flow.to(flow.home, event.trouble), ()
-    pause = event.detail / 1000 if event.reason is Reason.COOLING else LOOK_S
+    pause = event.detail / 1000 if event.reason is Refusal.COOLING else LOOK_S
     return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
 
 
@@ -290,7 +293,7 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _relogged(flow: Flow, state: str, reasons: tuple[str, ...]) -> Outcome:
+def _relogged(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
     """Log the drop once more."""
     job = flow.job
     assert job is not None

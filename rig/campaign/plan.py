@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from rig.protocol.protocol import Run
+    from rig.reasons import Reason
 
 ATTEMPTS = 3
 """How often a void run is made before it stays void."""
@@ -29,7 +30,7 @@ class RunLine(NamedTuple):
     free: str | None
     attempt: int = 0
     state: str = "planned"
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
 
 
 def next_job(runs: Iterable[RunLine], voids: Mapping[int, int]) -> Job | None:

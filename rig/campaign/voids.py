@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.reasons import summarize_reasons
 from rig.records import Job
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from rig.campaign.plan import RunLine
+    from rig.reasons import Reason
     from rig.session.reading import StateEntry
 
 MANY = 3
 """Voids of a kind in a row after which it is not the drop that is at fault."""
-_NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _VERDICTS = ("accepted", "marginal", "void", "rejected")
 
 
@@ -25,14 +25,14 @@ class Void(NamedTuple):
     """One void drop."""
 
     job: Job
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
 
 
 VoidRow = tuple[Void, ...]
 """The latest voids with no good drop between them, at most `MANY`."""
 
 
-def after(row: VoidRow, job: Job, verdict: str, reasons: tuple[str, ...]) -> VoidRow:
+def after(row: VoidRow, job: Job, verdict: str, reasons: tuple[Reason, ...]) -> VoidRow:
     """Take one more verdict; a second one of the same drop replaces the first."""
     if row and row[-1].job == job:
         row = row[:-1]
@@ -44,22 +44,13 @@ def after(row: VoidRow, job: Job, verdict: str, reasons: tuple[str, ...]) -> Voi
 def in_common(row: VoidRow) -> tuple[str, ...]:
     """Name the reasons that the last `MANY` voids share; none where there are fewer.
 
-    Reasons are of a kind when they are the same without their numbers. A number that is not the
-    same in all of them is shown as ``…``.
+    Reasons are of a kind when they are the same but for their numbers.
     """
     if len(row) < MANY:
         return ()
-    found = []
-    for reason in row[-1].reasons:
-        kind = _NUMBER.split(reason)
-        alike = [
-            next((one for one in void.reasons if _NUMBER.split(one) == kind), None) for void in row
-        ]
-        if None not in alike:
-            numbers = zip(*(_NUMBER.findall(one) for one in alike if one), strict=True)
-            shown = [each[0] if len(set(each)) == 1 else "…" for each in numbers]
-            found.append("".join(a + b for a, b in zip(kind, [*shown, ""], strict=True)))
-    return tuple(dict.fromkeys(found))
+    kinds = [{reason.kind: reason for reason in void.reasons} for void in row]
+    shared = [kind for kind in kinds[-1] if all(kind in other for other in kinds)]
+    return tuple(summarize_reasons([each[kind] for each in kinds]) for kind in shared)
 
 
 def why_halted(row: VoidRow) -> str:

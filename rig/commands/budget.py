@@ -21,6 +21,7 @@ from rig.commands.output import print_json, tell_damage
 from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs
+from rig.reasons import sentences
 from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.results import (
     calibration,
@@ -79,7 +80,7 @@ def budget(
     planned = planned_run({run.number: run for run in runs(protocol)}, drop)
     alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
-        raise InputError(f"run {number} is void: {'; '.join(alone.reasons)}")
+        raise InputError(f"run {number} is void: {sentences(alone.reasons)}")
     whole = results(session)
     records = whole.records()
     record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))

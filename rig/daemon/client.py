@@ -24,6 +24,7 @@ from rig.recorder.interrupts import Interrupts
 from rig.session.store import Session
 
 if TYPE_CHECKING:
+    from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.reading import Reader
     from rig.session.schema import RunState
@@ -173,10 +174,11 @@ class Client:
         return drop
 
     def log_state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()
+        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
     ) -> None:
         """Log a verdict."""
-        self.call("log_state", run=run, attempt=attempt, state=str(state), reasons=list(reasons))
+        records = [reason.record() for reason in reasons]
+        self.call("log_state", run=run, attempt=attempt, state=str(state), reasons=records)
 
     def stop(self, reason: str) -> None:
         """Have everything switched off."""

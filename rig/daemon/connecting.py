@@ -13,6 +13,7 @@ from rig.recorder.controller import Controller
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rig.reasons import Reason
     from rig.recorder.interrupts import Interrupts
     from rig.records import Drop
     from rig.session.reading import Reader
@@ -40,7 +41,7 @@ class Rig(Protocol):
     def collect(self, run: int, attempt: int) -> Drop: ...  # noqa: D102
 
     def log_state(  # noqa: D102
-        self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()
+        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
     ) -> None: ...
 
     def stop(self, reason: str) -> None: ...  # noqa: D102

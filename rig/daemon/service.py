@@ -13,6 +13,7 @@ from rig import __version__
 from rig.daemon import rpc
 from rig.errors import DeviceTimeoutError
 from rig.printable import encodable, one_line
+from rig.reasons import Reason, plain_reason, read_record
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -225,7 +226,7 @@ class Service:
         which = _whole(run, "run"), _whole(attempt, "attempt")
         if not isinstance(reasons, list):
             raise rpc.RpcError(rpc.BAD_PARAMS, "reasons: a list")
-        why = tuple(encodable(_text(reason, "reasons")) for reason in reasons)
+        why = tuple(_reason(reason) for reason in reasons)
         try:
             new = RunState(_text(state, "state"))
         except ValueError:
@@ -251,6 +252,15 @@ def _whole(value: object, name: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise rpc.RpcError(rpc.BAD_PARAMS, f"{name}: a whole number")
     return value
+
+
+def _reason(value: object) -> Reason:
+    if isinstance(value, str):
+        return plain_reason(encodable(value))
+    try:
+        return read_record(value)
+    except TypeError as error:
+        raise rpc.RpcError(rpc.BAD_PARAMS, f"reasons: {one_line(str(error), 80)}") from None
 
 
 def _text(value: object, name: str) -> str:

@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING
 from rig.boards import GATES
 from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, PulseEnd, unpack_label
 from rig.link.wiretypes import EVENTS
+from rig.reasons import make_reason
 from rig.records import Certificate, Drop, Edge
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from rig.link.messages import DropCertificate, EventsFrame
+    from rig.reasons import Reason
 
 ALL_GATES = (1 << GATES) - 1
 _WRAP = 1 << 32
 _CUT = {
-    PulseEnd.STOPPED: "the emergency stop was opened",
-    PulseEnd.ABORTED: "it was aborted",
-    PulseEnd.DEVICE: "the device found its release out of order and switched it off",
+    PulseEnd.STOPPED: "pulse_stopped",
+    PulseEnd.ABORTED: "pulse_aborted",
+    PulseEnd.DEVICE: "pulse_cut",
 }
 _HALF = _WRAP // 2
 
@@ -131,7 +133,7 @@ class Assembly:
             fire_tick=fire_tick,
             initial_state=initial,
             certificate=_account(seen) if seen else None,
-            faults=self._faults(tick_hz),
+            faults=tuple(self._faults(tick_hz)),
         )
 
     @property
@@ -172,30 +174,27 @@ class Assembly:
             found += edges(events, state, gates, fire_tick)
         return tuple(map(Edge._make, found))
 
-    def _faults(self, tick_hz: int) -> tuple[str, ...]:
-        faults = []
+    def _faults(self, tick_hz: int) -> Iterator[Reason]:
         if not tick_hz:
-            faults.append("the device never identified itself: its tick rate is unknown")
+            yield make_reason("no_identity")
         if self.reset and not self.sound():
-            faults.append("the device restarted before the drop was read")
+            yield make_reason("restarted")
         seen = self.certificate
         if seen is None:
-            faults.append("no certificate: the device did not close the record")
-            return tuple(faults)
+            yield make_reason("no_certificate")
+            return
         gaps = self.missing(at_most=_WRAP)
         if gaps:
             first = gaps[0][0]
-            count = sum(count for _, count in gaps)
-            how = "no longer kept by the device" if first < self.first_kept else "missing"
-            faults.append(f"{count} of {seen.events} events {how}, from number {first}")
+            code = "events_overwritten" if first < self.first_kept else "events_missing"
+            missing = sum(count for _, count in gaps)
+            yield make_reason(code, missing=missing, events=seen.events, first=first)
         elif self._crc() != seen.crc32:
-            faults.append("the events do not match the certificate's CRC-32")
+            yield make_reason("crc_mismatch")
         if seen.overflows:
-            faults.append(f"{seen.overflows} events lost: the device's memory was full")
+            yield make_reason("edges_lost", lost=seen.overflows)
         if isinstance(seen, DropCertificate2) and seen.pulse_end in _CUT and tick_hz:
-            lasted = f"{1e3 * seen.pulse_ticks / tick_hz:.3g} ms"
-            faults.append(f"the release pulse was cut after {lasted}: {_CUT[seen.pulse_end]}")
-        return tuple(faults)
+            yield make_reason(_CUT[seen.pulse_end], lasting_s=seen.pulse_ticks / tick_hz)
 
 
 def _account(seen: DropCertificate) -> Certificate:

@@ -11,6 +11,7 @@ from math import cos, hypot, nan, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.units import Quantity
+from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
 if TYPE_CHECKING:
     from rig.model.chain import Chain
@@ -319,6 +320,18 @@ class Protocol:
     def one_object(self) -> bool:
         """Whether a single body passes the gates: a ball, a card, a glider."""
         return all(rods.chain.rods == 1 for rods in self.chains.values())
+
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """The words of this kind of scene."""
+        if self.track is not None:
+            return TRACK
+        if self.one_object:
+            return OBJECT
+        if self.surface is not None:
+            return TWO_CHAINS if self.two_chains else ONE_CHAIN
+        strung = any(rods.tilt_deg for rods in self.chains.values())
+        return FREE_CHAIN if strung or len(self.chains) > 1 else FENCE
 
     @property
     def zero(self) -> str:

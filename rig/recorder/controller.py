@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError, InputError, RigError, SessionError
-from rig.link.messages import TEST_RUN, Reason
+from rig.link.messages import TEST_RUN
+from rig.link.messages import Reason as Refusal
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_recordable
+from rig.reasons import make_reason, plain_reason
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from rig.link.messages import Identity
     from rig.link.port import Port
     from rig.protocol.protocol import Protocol
+    from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.store import Session
 
@@ -280,7 +283,7 @@ class Controller:
             if entry.state not in _OPEN or (entry.run, entry.attempt) == held:
                 continue
             if self.session.drop(entry.run, entry.attempt) is None:
-                why = ("the connection ended before the drop was recorded",)
+                why = (make_reason("connection_ended"),)
                 recorder.state(entry.run, entry.attempt, RunState.INTERRUPTED, why)
         return held
 
@@ -353,7 +356,7 @@ class Controller:
         recorder = self.recorder
         if recorder is None or recorder.armed is None or recorder.lapsed is None:
             return
-        refusal = DeviceRefusedError(Reason.NOT_ARMED, 0, recorder.lapsed)
+        refusal = DeviceRefusedError(Refusal.NOT_ARMED, 0, recorder.lapsed)
         self.stop(refusal.message)
         self._unarmed = refusal
 
@@ -429,7 +432,7 @@ class Controller:
         return found
 
     def log_state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()
+        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
     ) -> None:
         """Log a verdict on a recorded drop.
 
@@ -472,7 +475,7 @@ class Controller:
             recorder.abort()
         finally:
             if armed is not None:
-                recorder.state(*armed, RunState.INTERRUPTED, (reason,))
+                recorder.state(*armed, RunState.INTERRUPTED, (plain_reason(reason),))
 
     def stop_past(self) -> bool:
         """Send ABORT from another thread than the controller's; `False` when nobody can hear it."""

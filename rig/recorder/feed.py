@@ -13,12 +13,14 @@ from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Received
 from rig.link.wiretypes import EVENTS
+from rig.reasons import published_reasons
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.link.transcript import Record
+    from rig.reasons import Reason
     from rig.recorder.published import PublishedState
     from rig.records import Drop, Edge
 
@@ -70,9 +72,9 @@ class StateFeed:
             case wire.DropCertificate():
                 self._published.set(phase="storing")
 
-    def state(self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...]) -> None:
+    def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
         """Take a line of the log of run states."""
-        self._published.run(run, attempt=attempt, state=str(state), reasons=list(reasons))
+        self._published.run(run, attempt=attempt, state=str(state), **published_reasons(reasons))
         if state is RunState.ARMED:
             self._armed(run, attempt)
         elif state is RunState.INTERRUPTED and self._label == wire.pack_label(run, attempt):

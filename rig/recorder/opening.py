@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
+from rig.reasons import published_reasons
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def shown(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[dic
                 "free": run.free,
                 "attempt": entry.attempt if entry else 0,
                 "state": str(entry.state) if entry else "planned",
-                "reasons": list(entry.reasons) if entry else [],
+                **published_reasons(entry.reasons if entry else ()),
             }
         )
     about = {

@@ -17,6 +17,7 @@ from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received
 from rig.ports import told
 from rig.protocol.measurable import record_ms
+from rig.reasons import sentences
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.records import ClockSample, Pulse
 from rig.session.schema import RunState
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from rig.link.port import Port
     from rig.link.transcript import Direction, Record
     from rig.protocol.protocol import Protocol
+    from rig.reasons import Reason
     from rig.recorder.feed import StateFeed
     from rig.recorder.sink import SessionSink
     from rig.records import Drop
@@ -325,13 +327,15 @@ class Recorder:
             finally:
                 self._disk_must_not_matter = False
 
-    def state(self, run: int, attempt: int, state: RunState, reasons: tuple[str, ...] = ()) -> None:
+    def state(
+        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
+    ) -> None:
         """Log where a run stands, on the disk when this returns."""
         with self.interrupts.held():
             self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
             self.session.commit()
             if state is RunState.INTERRUPTED:
-                log.info("run %d, attempt %d: interrupted: %s", run, attempt, "; ".join(reasons))
+                log.info("run %d, attempt %d: interrupted: %s", run, attempt, sentences(reasons))
             if self._feed is not None:
                 self._feed.state(run, attempt, state, reasons)
 

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rig.link.transcript import Direction
+    from rig.reasons import Reason
     from rig.records import ClockSample, Drop, HostBreak, Pulse
     from rig.session.schema import RunState
 
@@ -28,7 +29,7 @@ class SessionSink(Protocol):
     def add_drop(self, drop: Drop, *, host_ns: int | None, provenance: str) -> None: ...  # noqa: D102
 
     def add_state(  # noqa: D102
-        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[str] = ()
+        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None: ...
 
     def drop(self, run: int, attempt: int) -> Drop | None: ...  # noqa: D102
@@ -59,7 +60,7 @@ class NullSink:
         raise NotImplementedError
 
     def add_state(
-        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[str] = ()
+        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Refuse: a run belongs to a session."""
         raise NotImplementedError

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
+from rig.reasons import make_reason
 from rig.records import Job
 from rig.session.drop_check import ByteReplay, Fate, check_drop
 from rig.session.rows import drop_of
@@ -62,4 +63,4 @@ def _best(stored: Drop, replayed: Drop | None, fate: Fate) -> Drop:
 
 def _partial(drop: Drop) -> Drop:
     """Make a drop void that is not whole any more: its missing edges are no missed rods."""
-    return replace(drop, faults=(*drop.faults, "a part of the record was lost with its file"))
+    return replace(drop, faults=(*drop.faults, make_reason("record_torn")))

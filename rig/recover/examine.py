@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.printable import printable
+from rig.reasons import sentences
 from rig.recover.drops import Recovered, recover_drops
 from rig.recover.pages import MAGIC, Pages, read_pages
 from rig.recover.rows import Rows, find_rows, gaps
@@ -118,7 +119,7 @@ def _described(found: Examined) -> list[str]:
             )
     lines += [
         f"run {one.drop.run}, attempt {one.drop.attempt}: {len(one.drop.edges)} edges: {one.fate}"
-        + (f" (recorded with faults: {'; '.join(one.drop.faults)})" if one.drop.faults else "")
+        + (f" (recorded with faults: {sentences(one.drop.faults)})" if one.drop.faults else "")
         for one in found.drops
     ]
     lines += [f"damaged: {what}" for what in found.damage]

@@ -11,6 +11,7 @@ from rig.files import read_input
 from rig.ports import is_simulated
 from rig.records import ClockSample, HostBreak, Pulse
 from rig.recover.examine import protocol_sound
+from rig.session.reason_rows import read_reasons
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -111,7 +112,7 @@ def _drops(session: Session, found: Examined) -> list[str]:
     for _, row in sorted(found.rows.run_state.items()):
         run, attempt, state, reasons, last_ns = cast("Any", row)[1:]
         told.add((run, attempt))
-        session.add_state(run, attempt, RunState(state), last_ns, json.loads(reasons))
+        session.add_state(run, attempt, RunState(state), last_ns, read_reasons(reasons))
     notes = []
     for run, attempt in sorted(seen - told):
         session.add_state(run, attempt, RunState.RECORDED, last_ns)

@@ -8,9 +8,9 @@ from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.analysis.remedies import remedies
 from rig.analysis.result import GOOD
 from rig.measurands import SEPARATION_RAW, averaged
+from rig.reasons import remedies, sentences
 from rig.report.attachments import link
 from rig.report.columns import (
     AUDIT,
@@ -232,7 +232,7 @@ _VERDICTS: tuple[Column[DropResult], ...] = (
     Column("attempt", lambda one: str(one.attempt)),
     Column("incline (°)", run_incline),
     Column("verdict", lambda one: one.verdict, numeric=False),
-    Column("why", lambda one: signed("; ".join(one.reasons)), numeric=False),
+    Column("why", lambda one: signed(sentences(one.reasons)), numeric=False),
     Column(
         "what to do",
         lambda one: "; ".join(remedies(one.reasons)) if one.verdict == "void" else "",

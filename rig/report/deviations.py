@@ -6,6 +6,7 @@ from itertools import groupby, pairwise
 from typing import TYPE_CHECKING
 
 from rig.protocol.plan import runs as planned_runs
+from rig.reasons import sentences
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def _sentences(
         yield f"Made again: run {number} ({', '.join(earlier)})."
     for entry in states:
         if entry.state is RunState.INTERRUPTED:
-            why = f": {'; '.join(entry.reasons)}" if entry.reasons else ""
+            why = f": {sentences(entry.reasons)}" if entry.reasons else ""
             yield f"Interrupted: run {entry.run}, attempt {entry.attempt}{why}."
     rejected = [one.run.number for one in analysis.runs if one.verdict == "rejected"]
     if rejected:

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.likeness import likeness
-from rig.analysis.remedies import remedies
 from rig.analysis.result import Measured
 from rig.measurands import averaged
+from rig.reasons import remedies, sentences
 from rig.report.columns import run_incline
 from rig.report.numbers import decimals_for, fixed, plus_minus, signed
 
@@ -74,7 +74,7 @@ def void_lines(analysis: Analysis) -> list[str]:
     for one in voids:
         tilt = run_incline(one)
         at = f" at {tilt}°" if tilt else ""
-        reasons = signed("; ".join(one.reasons))
+        reasons = signed(sentences(one.reasons))
         lines.append(f"  run {one.run.number}, attempt {one.attempt}{at}: {reasons}")
     what = remedies(reason for one in voids for reason in one.reasons)
     return [*lines, "what to do:", *(f"  {one}" for one in what)]

@@ -9,9 +9,10 @@ from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
 from rig.clock.calibration import Calibrator
 from rig.protocol import reader
+from rig.reasons import notes_in
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
-from rig.session.schema import RunState, noted
+from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, MutableMapping
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
+    from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.reading import Reader
 
@@ -163,7 +165,7 @@ def _analysed(
     return found, clock, drops
 
 
-def rejected(session: Reader) -> dict[tuple[int, int], tuple[str, ...]]:
+def rejected(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
     """Drops whose last state is that the operator rejected them, with the causes."""
     last = {(entry.run, entry.attempt): entry for entry in session.states()}
     return {key: entry.reasons for key, entry in last.items() if entry.state is RunState.REJECTED}
@@ -172,7 +174,7 @@ def rejected(session: Reader) -> dict[tuple[int, int], tuple[str, ...]]:
 def notes(session: Reader) -> dict[Job, str]:
     """What operators noted to drops, of each the latest note, in order of recording."""
     last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
-    found = {job: " · ".join(noted(entry.reasons)) for job, entry in last.items()}
+    found = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
     return {job: text for job, text in found.items() if text}
 
 

@@ -118,7 +118,9 @@ def _under_another_name(stored: Drop, replayed: Mapping[Job, Drop]) -> bool:
 
 
 def as_old_as(stored: Drop, drop: Drop) -> Drop:
-    """Leave out of a certificate what the format that the stored one has did not keep."""
+    """Leave out what the format of the stored drop did not keep: of certificates and of faults."""
+    if [fault.code for fault in stored.faults] == [fault.code for fault in drop.faults]:
+        drop = replace(drop, faults=stored.faults)  # older formats keep sentences without values
     if stored.certificate is None or drop.certificate is None:
         return drop
     if any(getattr(stored.certificate, name) is not None for name in _LATER):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
+from rig.reasons import sentences
 from rig.text_table import csv_text
 from rig.timers.edges_csv import edges_text
 
@@ -130,7 +131,7 @@ def csv_files(
             for line in run.get("budget", [])
         ],
         "states.csv": [
-            {**entry._asdict(), "reasons": "; ".join(entry.reasons)} for entry in session.states()
+            {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
         ],
         "pings.csv": [ping._asdict() for ping in session.pings()],
     }

@@ -13,7 +13,8 @@ from rig.records import ClockSample, Drop, HostBreak, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translated
 from rig.session.foreign import RECOVER, limit_steps
-from rig.session.rows import CERTIFICATE_AT, RowError, check_row, drop_of, identity, texts
+from rig.session.reason_rows import read_reasons
+from rig.session.rows import CERTIFICATE_AT, RowError, check_row, drop_of, identity
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
+    from rig.reasons import Reason
     from rig.records import Job
 
 Direction = Literal["rx", "tx"]
@@ -41,7 +43,7 @@ class StateEntry(NamedTuple):
     attempt: int
     state: RunState
     host_ns: int
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
 
 
 class ByteChunk(NamedTuple):
@@ -291,4 +293,4 @@ class Reader:
 
 def _state(row: tuple[Any, ...]) -> StateEntry:
     _, run, attempt, state, reasons, host_ns = row
-    return StateEntry(run, attempt, RunState(state), host_ns, texts(reasons))
+    return StateEntry(run, attempt, RunState(state), host_ns, read_reasons(reasons))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.boards import GATES
 from rig.records import Certificate, Drop, Edge
+from rig.session.reason_rows import read_reasons
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -64,20 +65,6 @@ def _json(name: str, accepted: str, read: Callable[[str], object]) -> ColumnRule
     return ColumnRule(name, accepted, accepts)
 
 
-def texts(told: str) -> tuple[str, ...]:
-    """Read a JSON list of texts.
-
-    Raises
-    ------
-    TypeError, ValueError
-        It is something else.
-    """
-    listed = json.loads(told)
-    if not isinstance(listed, list) or not all(isinstance(text, str) for text in listed):
-        raise TypeError(f"{told:.40} is no list of texts")
-    return tuple(listed)
-
-
 def identity(told: str) -> dict[str, Any]:
     """Read what a device or another timer is; what is calculated with must be possible.
 
@@ -104,7 +91,7 @@ _IDENTITY: Mapping[str, Callable[[Any], bool]] = {
 }
 _ID = _whole("id", 1, _INT64)
 _RUN = _whole("run", 1, _INT64)
-_REASONS = _json("reasons", "a JSON list of texts", texts)
+_REASONS = _json("reasons", "a JSON list of reasons", read_reasons)
 COLUMNS: Mapping[str, Sequence[ColumnRule]] = {
     "meta": (_text("key"), _text("value")),
     "protocol": (_ID, _text("source"), _text("text")),
@@ -135,7 +122,7 @@ COLUMNS: Mapping[str, Sequence[ColumnRule]] = {
             _whole(name, 0, _U32, or_none=True)
             for name in ("events", "crc32", "overflows", "glitches", "late")
         ),
-        _json("faults", "a JSON list of texts", texts),
+        _json("faults", "a JSON list of reasons", read_reasons),
         _whole("host_ns", -_NS, _NS, or_none=True),
         _text("provenance"),
         _whole("release_sense", -_U32, _U32, or_none=True),
@@ -201,5 +188,5 @@ def drop_of(row: Sequence[Any], edges: Iterable[Sequence[Any]]) -> Drop:
         initial_state=initial_state,
         # A row of the first format has no release sense.
         certificate=None if events is None else Certificate(events, *counts, *row[ACCOUNT_AT:]),
-        faults=texts(row[FAULTS_AT]),
+        faults=read_reasons(row[FAULTS_AT]),
     )

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
@@ -27,15 +23,6 @@ class RunState(StrEnum):
     VOID = "void"
     REJECTED = "rejected"
     INTERRUPTED = "interrupted"
-
-
-NOTE = "note: "
-"""With what a reason begins that is the operator's note to a drop, and no reason."""
-
-
-def noted(reasons: Sequence[str]) -> list[str]:
-    """Take the notes from a drop's reasons."""
-    return [reason.removeprefix(NOTE) for reason in reasons if reason.startswith(NOTE)]
 
 
 _STATES = ", ".join(f"'{state}'" for state in RunState)

@@ -25,10 +25,12 @@ from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
+from rig.session.reason_rows import write_reasons
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from rig.reasons import Reason
     from rig.records import ClockSample, Drop, HostBreak, Pulse
     from rig.session.schema import RunState
 
@@ -321,7 +323,7 @@ class Session(Reader):
             )
         )
         head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
-        faults = json.dumps(drop.faults, ensure_ascii=False)
+        faults = write_reasons(drop.faults)
         tail = (
             (None,) * 6
             if certificate is None
@@ -350,13 +352,13 @@ class Session(Reader):
         )
 
     def add_state(
-        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[str] = ()
+        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Add one line to the log of run states."""
-        told = json.dumps(list(reasons), ensure_ascii=False)
+        text = write_reasons(reasons)
         self._add(
             "INSERT INTO run_state (run, attempt, state, reasons, host_ns) VALUES (?, ?, ?, ?, ?)",
-            (run, attempt, str(state), encodable(told), host_ns),
+            (run, attempt, str(state), encodable(text), host_ns),
         )
 
     def unblind(self) -> None:

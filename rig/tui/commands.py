@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopped, Try, Warned
 from rig.campaign.plan import again
 from rig.errors import RigError
-from rig.session.schema import noted
+from rig.reasons import notes_in
 from rig.tui import selectors
 from rig.tui.screens.ask import Ask, AskReason, Confirm
 from rig.tui.screens.help import Help
@@ -151,7 +151,7 @@ def _note(app: CommandContext) -> None:
         if text is not None:
             app.driver.take(Note(text))
 
-    app.ask(Ask("Note on this drop:", " · ".join(noted(app.driver.flow.reasons))), given)
+    app.ask(Ask("Note on this drop:", " · ".join(notes_in(app.driver.flow.reasons))), given)
 
 
 def _filter(app: CommandContext) -> None:

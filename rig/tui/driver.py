@@ -124,12 +124,12 @@ class Driver:
                 case Log(job, state, reasons):
                     await client.call(
                         "log_state", run=job.run, attempt=job.attempt, state=state,
-                        reasons=list(reasons),
+                        reasons=[reason.record() for reason in reasons],
                     )  # fmt: skip
                 case Judge(job):
                     result = (await self._follower.read()).results[job]
                     row = self._follower.voids.row
-                    self.take(Judged(ticket, result.verdict, tuple(result.reasons), row))
+                    self.take(Judged(ticket, result.verdict, result.reasons, row))
                     return
         except RigError as error:
             self.take(effect_failed(ticket, error))

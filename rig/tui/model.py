@@ -13,6 +13,7 @@ from rig.campaign.voids import Voids
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
     from rig.protocol.protocol import Protocol, Run
+    from rig.reasons import Reason
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators
@@ -122,7 +123,7 @@ class Model:
         return self.view.plan.get(self.job.run)
 
     @property
-    def verdict(self) -> tuple[str, tuple[str, ...]]:
+    def verdict(self) -> tuple[str, tuple[Reason, ...]]:
         """Verdict and reasons of the attempt in hand; empty before there are any."""
         if self.flow.stage is Stage.RESULT and self.flow.job == self.job:
             return self.flow.verdict, self.flow.reasons

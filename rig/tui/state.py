@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rig.campaign.plan import RunLine
+from rig.reasons import read_record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -108,7 +109,7 @@ def _line(run: Mapping[str, Any]) -> RunLine:
         run["free"],
         run["attempt"],
         run["state"],
-        tuple(run["reasons"] or ()),
+        tuple(map(read_record, run["reason_codes"] or ())),
     )
 
 

@@ -39,6 +39,11 @@ CLOCK_U = 1e-6  # what a minute of pings gives
 STRAY = -1
 
 
+def codes(result: DropResult) -> list[str]:
+    """What a drop's reasons are."""
+    return [reason.code for reason in result.reasons]
+
+
 def with_dials(**changes: float) -> Dials:
     """Nothing disturbed but what is named."""
     return Dials(**(asdict(Dials.quiet()) | changes))

@@ -15,6 +15,7 @@ from rig.predictions import predicted_run
 from rig.protocol import reader
 from rig.protocol.contact import at_contact, contact_level, touching_heights
 from rig.protocol.describe import describe
+from rig.reasons import sentences
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import GRADED, UNIFORM, case, with_dials
@@ -127,7 +128,7 @@ def test_gates_are_named_by_the_heights_of_the_file():
     one = case(BOARD, Dials(), incline=50.0)
     edges = [edge._replace(channel=swapped.get(edge.channel, edge.channel))
              for edge in one.drop.edges]  # fmt: skip
-    said = " ".join(one.with_edges(edges).analyze().reasons)
+    said = sentences(one.with_edges(edges).analyze().reasons)
     assert "42 mm" in said
     assert "90 mm" in said
 

@@ -19,7 +19,7 @@ from rig.protocol.reader import parse
 from rig.report.remarks import model_lines
 from rig.units import Quantity
 from sim.dials import Dials
-from tests.analysis.drops import HZ, STATED, UNIFORM, Case, case
+from tests.analysis.drops import HZ, STATED, UNIFORM, Case, case, codes
 from tests.analysis.sessions import MILD, analysis, cases
 
 GATES = {gate.channel: gate for gate in UNIFORM.gates.gates}
@@ -145,9 +145,8 @@ def test_rods_that_come_to_rest_above_the_lowest_gates_are_a_pile(gates):
     result = without(one, lost).analyze()
     assert result.verdict == "void"
     (reason,) = result.reasons
-    assert reason.startswith("rods pile up on the surface")
-    for gate in LOWEST:
-        assert (f"channel {gate.channel} " in reason) == (gate.channel in lost)
+    assert reason.code == "rods_pile_up"
+    assert {gate["channel"] for gate in reason.values["at"]} == set(lost)
 
 
 def test_where_the_last_rods_pass_the_lowest_gate_none_lie_there():
@@ -162,14 +161,14 @@ def test_where_the_last_rods_pass_the_lowest_gate_none_lie_there():
     result = one.with_edges(edges).analyze()
     assert result.verdict == "void"
     (reason,) = result.reasons
-    assert "the last rods pass and none lie there" in reason
-    assert f"channel {LOWEST[0].channel} " in reason
+    assert reason.code == "low_gates_miss_rods"
+    assert [gate["channel"] for gate in reason.values["at"]] == [LOWEST[0].channel]
 
 
 def test_a_gate_that_goes_blind_above_others_is_no_pile():
     one = case(UNIFORM, MILD, incline=40.0)
     result = without(one, {LOWEST[2].channel: 8}).analyze()
-    assert not any("pile" in reason for reason in result.reasons)
+    assert "rods_pile_up" not in codes(result)
 
 
 @pytest.mark.parametrize("above", [-0.01, 0.0, 0.015])

@@ -250,11 +250,13 @@ def test_what_cannot_be_told_is_void_and_the_odds_are_stated(written):
     assert found.evidence == pytest.approx(likeliest, abs=0.01)
     assert found.log_odds == pytest.approx(odds, abs=0.1)
     assert any(
-        f"{math.exp(found.log_odds):.3g} to 1" in why for why in pattern_faults(found).values()
+        reason.values["odds"] == math.exp(found.log_odds)
+        for reason in pattern_faults(found).values()
     )
     (reason,) = one.analyze().reasons
     side, height = deciding_gate(found.fit, found.other)
-    assert reason.endswith(f"; a further {side} gate at {height * 1e3:.0f} mm would tell which")
+    assert reason.code == "two_falls_gate"
+    assert (reason.values["side"], reason.values["height_m"]) == (side, height)
     assert {found.fit.rods[edge] for edge in found.fit.rods} != set(found.other.rods.values())
 
 

@@ -260,7 +260,7 @@ def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
     assert [result.learned for result in found.runs] == [True] * 7 + [False]
     assert found.runs[-1].quantities == alone.quantities
     assert found.runs[-1].verdict == "accepted"
-    assert "go with the other runs" in found.runs[-1].reasons[0]
+    assert found.runs[-1].reasons[0].code == "differs_from_session"
     without = analysis(rest)
     for one, other in zip(found.runs[:-1], without.runs, strict=True):
         assert one.quantities == other.quantities

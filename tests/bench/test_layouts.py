@@ -17,6 +17,7 @@ from rig.cli import main
 from rig.protocol.measurable import unmeasurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
+from rig.reasons import make_reason
 from sim.dials import Dials, read_dials
 from tests.analysis.drops import UNIFORM, case
 from tests.analysis.layouts import layouts
@@ -81,10 +82,13 @@ def test_a_wrong_rod_is_counted_and_a_right_one_is_not():
     assert (total["wrong"], total["drops"], total["void_share"]) == (1, 2, 0.0)
 
 
+MISSED = make_reason("edges_missed", missed=12, expected=30, limit=0.05)
+
+
 def test_a_void_drop_is_counted_with_its_reason_and_no_number():
-    cell = judged(lambda found: replace(found, verdict="void", reasons=("12 of 30 missed (40 %)",)))
+    cell = judged(lambda found: replace(found, verdict="void", reasons=(MISSED,)))
     assert cell.json()["void_share"] == 1.0
-    assert cell.json()["reasons"] == {"… of … missed (… %)": 1}
+    assert cell.json()["reasons"] == {"edges_missed": 1}
     assert cell.json()["z_rms"] is None
 
 

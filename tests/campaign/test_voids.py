@@ -6,13 +6,16 @@ import pytest
 
 from rig.campaign.plan import ATTEMPTS
 from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halted
+from rig.reasons import NOTE, make_reason, plain_reason
 from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
 
-SKEW = ["release skew 7.78 ms is beyond 5 ms", "release skew -10 ms is beyond 5 ms",
-        "release skew −1e-3 ms is beyond 5 ms"]  # fmt: skip
-LOST = "the device lost 3 edges: its memory was full"
+SKEW = [make_reason("release_skew", skew_s=skew, limit_s=5e-3) for skew in (7.78e-3, -0.01, 1.0)]
+LOST = make_reason("edges_lost", lost=3)
+DEAD = [make_reason("gate_silent", channel=n, side="free", height_m=0.1 * n) for n in (1, 2)]
+OTHER_SIDE = make_reason("gate_silent", channel=3, side="impact", height_m=0.3)
+A, B = plain_reason("a"), plain_reason("b")
 
 
 def row(*reasons):
@@ -25,16 +28,16 @@ def entries(*told):
 
 
 def test_reasons_are_of_a_kind_without_their_numbers():
-    skew = "release skew … ms is beyond 5 ms"
-    assert in_common(row(*((one,) for one in SKEW))) == (skew,)
-    assert in_common(row((SKEW[0],), (LOST, SKEW[1]), (SKEW[2], LOST))) == (skew,)
-    assert in_common(row((LOST,), (LOST,), (LOST,))) == (LOST,)
+    assert in_common(row(*((one,) for one in SKEW))) == ("release skew",)
+    assert in_common(row((SKEW[0],), (LOST, SKEW[1]), (SKEW[2], LOST))) == ("release skew",)
+    assert in_common(row((LOST,), (LOST,), (LOST,))) == (LOST.text,)
+    assert in_common(row((DEAD[0],), (DEAD[1],), (DEAD[0],))) == ("gate silent (free)",)
 
 
 @pytest.mark.parametrize(
     "reasons",
     [[], [SKEW[0]] * 2, [SKEW[0], LOST, SKEW[1]],
-     ["gate 1 is dead", "gate 2 is dead", "gate 3 is loose"]],
+     [*DEAD, OTHER_SIDE]],
 )  # fmt: skip
 def test_fewer_or_others_have_nothing_in_common(reasons):
     found = row(*((one,) for one in reasons))
@@ -43,15 +46,15 @@ def test_fewer_or_others_have_nothing_in_common(reasons):
 
 
 def test_a_good_drop_ends_the_row_and_a_rejected_one_leaves_it():
-    kept = after((), Job(1, 1), "void", ("a",))
+    kept = after((), Job(1, 1), "void", (A,))
     assert after(kept, Job(1, 2), "accepted", ()) == ()
     assert after(kept, Job(1, 2), "marginal", ()) == ()
-    assert after(kept, Job(1, 2), "rejected", ("b",)) == kept
-    assert after(kept, Job(1, 1), "rejected", ("b",)) == ()
-    noted = after(kept, Job(1, 1), "void", ("a", "note: b"))
+    assert after(kept, Job(1, 2), "rejected", (B,)) == kept
+    assert after(kept, Job(1, 1), "rejected", (B,)) == ()
+    noted = after(kept, Job(1, 1), "void", (A, plain_reason("b", NOTE)))
     assert [one.job for one in noted] == [Job(1, 1)]
     for n in range(2, 9):
-        kept = after(kept, Job(1, n), "void", ("a",))
+        kept = after(kept, Job(1, n), "void", (A,))
     assert len(kept) == MANY
 
 
@@ -60,7 +63,11 @@ def test_voids_for_which_it_halted_are_not_held_against_their_runs():
             (3, 1, "armed"), (3, 1, "recorded")]  # fmt: skip
     before = voids_of(entries(*told))
     assert before.counts() == {1: 1, 2: 2}
-    halted = [*told, (3, 1, "void", SKEW[2]), (3, 1, "void", SKEW[2], "note: a loose plug")]
+    halted = [
+        *told,
+        (3, 1, "void", SKEW[2]),
+        (3, 1, "void", SKEW[2], plain_reason("a loose plug", NOTE)),
+    ]
     found = voids_of(entries(*halted))
     assert found.row == ()
     assert found.counts() == {1: 1}

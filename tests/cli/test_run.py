@@ -13,6 +13,7 @@ from serial import SerialException
 
 from rig.analysis import identified
 from rig.analysis.identify import identify
+from rig.reasons import Reason
 from rig.replay import replay
 from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
@@ -199,19 +200,19 @@ def test_what_is_put_right_is_gone_on_with_by_the_same_command(call, tmp_path):
     args = ("run", tmp_path / "p.yaml", "--port", "sim://?skew_sd=6ms&seed=1", "--session")
     first = call(*args, tmp_path / "s")
     assert first.code == 3
-    assert "release skew … ms is beyond 5 ms" in first.err
+    assert "void for the same reason: release skew" in first.err
     assert [attempt for number, attempt in drops_of(tmp_path / "s") if number == 5] == [1, 2, 3]
     assert call(*args, tmp_path / "s").code == 0
     assert_whole(tmp_path / "s", 6)
 
 
 def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, protocol):
-    path, reasons = tmp_path / "s", ("a draught", "a lorry", "a moth")
+    path, reasons = tmp_path / "s", ("edges_lost", "rods_pile_up", "crc_mismatch")
     Session.create(path, protocol.read_text("utf-8"), protocol.name, simulated=True,
                    origin="sim://?seed=1").close()  # fmt: skip
     with Session.open(path) as session:
         for attempt, reason in enumerate(reasons, start=1):
-            session.add_state(1, attempt, RunState.VOID, 0, (reason,))
+            session.add_state(1, attempt, RunState.VOID, 0, (Reason(reason),))
         session.commit()
     assert run("s").code == 0
     assert [(run, len(entries)) for run, entries in log_of(path).items()] == [(1, 3), (2, 4)]

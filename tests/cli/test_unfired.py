@@ -6,6 +6,7 @@ from itertools import count
 
 import pytest
 
+from rig.reasons import sentences
 from rig.recorder.recorder import Recorder
 from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
@@ -82,7 +83,7 @@ def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, 
     assert drops_of(tmp_path / "s") == [(1, 3), (2, 1)]
     assert len(truth_of(tmp_path / "s")) == 2
     with Session.open(tmp_path / "s", readonly=True) as session:
-        assert session.states()[2].reasons == (why,)
+        assert sentences(session.states()[2].reasons) == why
     assert_whole(tmp_path / "s", 2)
 
 

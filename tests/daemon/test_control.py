@@ -16,6 +16,7 @@ from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase, Reason
 from rig.link.refusals import DeviceRefusedError
+from rig.reasons import sentences
 from rig.recorder.interrupts import StoppedError
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -106,7 +107,7 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
     with Session.open(processes.session, readonly=True) as session:
         (reason,) = session.latest_state(1).reasons
-    assert re.fullmatch(r"nothing was heard from one for \d\.\d s, so it lost control", reason)
+    assert re.fullmatch(r"nothing was heard from one for \d\.\d s, so it lost control", reason.text)
     one, token = armed
     with pytest.raises(StoppedError, match=reason):
         one.fire(token)
@@ -147,7 +148,7 @@ def test_any_client_stops_what_another_has_armed(processes, armed, client):
     with pytest.raises(StoppedError, match="somebody is under it"):
         one.fire(token)
     with Session.open(processes.session, readonly=True) as session:
-        assert session.latest_state(1).reasons == ("somebody is under it",)
+        assert sentences(session.latest_state(1).reasons) == "somebody is under it"
 
 
 def test_any_client_stops_a_recording_and_what_there_is_is_kept(processes, armed, client):

@@ -9,10 +9,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rig.analysis.remedies import ELSE, remedies, remedy
 from rig.analysis.result import Audit, DropResult
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
+from rig.reasons import (
+    OPERATOR,
+    ROWS,
+    SENTENCE,
+    Severity,
+    make_reason,
+    plain_reason,
+    remedies,
+    sentences,
+)
 from rig.report.remarks import air_lines, void_lines
 from tests.cli.lab import rig, short
 
@@ -22,51 +31,32 @@ def void(run, attempt, *reasons, verdict="void"):
     return DropResult(planned, attempt, verdict, reasons, Audit(0, 0, 0, 0, 0))
 
 
-SKEW, MISSED = (
-    "release skew 9.19 ms is beyond 5 ms",
-    "34 of 660 edges missed (5.2%), more than 5.0%",
-)
+SKEW = make_reason("release_skew", skew_s=9.19e-3, limit_s=5e-3)
+MISSED = make_reason("edges_missed", missed=34, expected=660, limit=0.05)
+MOTHS = plain_reason("moths")
 
 
 def test_every_void_drop_is_told_with_its_reasons_and_what_to_do():
-    last = void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, "moths")
+    last = void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, MOTHS)
     lines = void_lines(Analysis(last, (void(3, 1, SKEW),), ()))
     assert lines[1:4] == [
-        f"  run 2, attempt 1 at 40°: {SKEW}; {MISSED}",
+        f"  run 2, attempt 1 at 40°: {sentences([SKEW, MISSED])}",
         f"  run 3, attempt 1 at 40°: {SKEW}",
         "  run 4, attempt 1 at 40°: moths",
     ]
-    assert [line.strip() for line in lines[5:]] == [remedy(SKEW), remedy(MISSED)]
+    assert [line.strip() for line in lines[5:]] == remedies([SKEW, MISSED])
     assert void_lines(Analysis((void(1, 1, verdict="marginal"),), (), ())) == []
 
 
-@pytest.mark.parametrize(
-    ("reason", "what"),
-    [
-        ("the gate on channel 2 (impact side, 70 mm) gave no edges: it is dead", "plug"),
-        ("the gate on channel 2 (free side, 70 mm) is 3.1 ± 0.4 mm higher than it says", "gate's"),
-        ("the gate on channel 2 (free side, 70 mm) is off its height by 9 times", "gate's"),
-        ("all gates are 9.8 ± 0.4 mm lower above the contact point", "contact point"),
-        ("the free side's post is 2.0 ± 0.1 mm higher than the protocol says", "zero"),
-        ("the chains hang 9.8 ± 0.4 mm higher above the contact point", "the drop"),
-        ("the chain hangs 9.8 ± 0.4 mm lower above the contact point", "the drop"),
-        ("every rod of chain A looks 3.2 ± 0.1 mm thicker than the protocol says", "diameter"),
-        ("no gate saw rod 13 of 25 (from the bottom) of chain A on the free side", "spacing"),
-        ("chain A is 11.7 ± 0.4 mm longer than the protocol says", "length"),
-        ("chain A on the free side has 24 rods, not 25 as the protocol says", "its rods"),
-        ("chains A and B hang on each other's side", "two chains"),
-        ("likeliest, but not clearly: chain A is 1 mm longer; or gravity is 1 % less", "rig check"),
-        ("no certificate: the device did not close the record", "selftest"),
-        ("5 of 660 events missing, from number 3", "selftest"),
-    ],
-)
-def test_each_reason_has_its_remedy(reason, what):
-    assert what in remedy(reason)
-
-
-def test_what_nobody_foresaw_has_a_general_remedy_if_it_is_all_there_is():
-    assert remedies(["moths", "a lorry"]) == [ELSE]
-    assert remedies(["moths", SKEW, SKEW]) == [remedy(SKEW)] != [ELSE]
+def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_known():
+    known = {code: row.remedy for code, row in ROWS.items() if row.severity is Severity.VOID}
+    without = [code for code, remedy in known.items() if not remedy]
+    assert without == [OPERATOR]
+    assert [code for code, remedy in known.items() if remedy == ROWS["scatter"].remedy] == [
+        SENTENCE
+    ]
+    (general,) = remedies([MOTHS, plain_reason("a lorry")])
+    assert remedies([MOTHS, SKEW, SKEW]) == remedies([SKEW]) != [general]
 
 
 def test_a_session_without_a_good_run_says_why(tmp_path):

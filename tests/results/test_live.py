@@ -10,6 +10,7 @@ from rig.analysis import identified
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import FEWEST
 from rig.clock.calibration import TimeScale
+from rig.reasons import plain_reason
 from rig.records import Job
 from rig.results import detailed, results
 from rig.results.live import LiveAnalysis
@@ -37,7 +38,7 @@ def session(blocks, tmp_path):
 def reject(path, *runs):
     with Session.open(path) as session:
         for run in runs:
-            session.add_state(run, 1, RunState.REJECTED, 0, ("a draught",))
+            session.add_state(run, 1, RunState.REJECTED, 0, (plain_reason("a draught"),))
         session.commit()
 
 

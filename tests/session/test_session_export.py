@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from rig.errors import InputError
+from rig.reasons import plain_reason
 from rig.records import ClockSample, Drop, Edge
 from rig.session.export import export_csv, flatten
 from rig.session.schema import RunState
@@ -39,7 +40,9 @@ def session(tmp_path: Path):
     ) as session:
         session.add_drop(Drop(run=1, attempt=1, tick_hz=1000, edges=()))
         session.add_drop(Drop(run=1, attempt=2, tick_hz=1000, edges=edges, fire_tick=5))
-        session.add_state(1, 1, RunState.VOID, 10, ["lost edges", "twice"])
+        session.add_state(
+            1, 1, RunState.VOID, 10, [plain_reason("lost edges"), plain_reason("twice")]
+        )
         session.add_ping(ClockSample(1, 2, 3))
         yield session
 

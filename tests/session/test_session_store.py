@@ -14,6 +14,7 @@ import pytest
 
 import rig
 from rig.errors import SessionError
+from rig.reasons import make_reason, plain_reason
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 from rig.session.store import Session
@@ -30,7 +31,7 @@ DEVICE_DROP = Drop(
     certificate=Certificate(
         events=3, crc32=0xFFFF_FFFF, overflows=1, glitches=2, late=3, release_sense=-4
     ),
-    faults=("1 snapshot lost",),
+    faults=(make_reason("edges_lost", lost=1),),
 )
 IMPORTED = Drop(run=1, attempt=1, tick_hz=10**12, edges=(Edge(5, 15, False),))
 PULSE = Pulse(5, 9, 65_535, 2**32 - 1)
@@ -64,7 +65,7 @@ def fill(session: Session) -> None:
     session.add_drop(DEVICE_DROP, host_ns=99, provenance="device")
     session.add_drop(IMPORTED)
     session.add_state(2, 0, RunState.PLANNED, 1)
-    session.add_state(2, 1, RunState.VOID, 2, ["skew 7 ms", "β ≠ 0.5"])
+    session.add_state(2, 1, RunState.VOID, 2, [plain_reason("skew 7 ms"), plain_reason("β ≠ 0.5")])
 
 
 def python(code: str, *arguments: object) -> subprocess.Popen[str]:
@@ -103,7 +104,7 @@ def test_everything_comes_back_as_it_went_in(path: Path) -> None:
         assert [entry.state for entry in session.states()] == [RunState.PLANNED, RunState.VOID]
         last = session.latest_state(2)
         assert last is not None
-        assert last.reasons == ("skew 7 ms", "β ≠ 0.5")
+        assert [reason.text for reason in last.reasons] == ["skew 7 ms", "β ≠ 0.5"]
         assert session.latest_state(3) is None
         assert (session.protocol_text, session.protocol_source) == (TEXT, "uniform.yaml")
         assert session.simulated

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from textual.widgets import OptionList
 
+from rig.reasons import NOTE, plain_reason
 from rig.records import Job
 from rig.results import detailed
 from rig.results.live import LiveAnalysis
@@ -98,7 +99,7 @@ def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path
     mine = tmp_path / "mine.session"
     mine.write_bytes(recorded.read_bytes())
     with Session.open(mine) as session:
-        session.add_state(2, 1, RunState.ACCEPTED, 0, ["note: a [draught]"])
+        session.add_state(2, 1, RunState.ACCEPTED, 0, [plain_reason("a [draught]", NOTE)])
         session.commit()
     with Session.open(mine, readonly=True) as session:
         assert notes(session) == {Job(2, 1): "a [draught]"}

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from rig.campaign.machine import Flow, Stage
+from rig.reasons import plain_reason
 from rig.records import Job
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
@@ -36,7 +37,10 @@ MOMENTS = {
     ),
     "session": (Flow(Stage.DONE), {}),
     "help": (Flow(Stage.DEVICE), {}),
-    "note": (Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=("[a gate] was lost",)), {}),
+    "note": (
+        Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason("[a gate] was lost"),)),
+        {},
+    ),
 }
 
 

@@ -142,7 +142,11 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
 
     run(work())
     with Session.open(lab.session, readonly=True) as session:
-        told = [(entry.state, entry.reasons) for entry in session.states() if entry.attempt == 1]
+        told = [
+            (entry.state, tuple(reason.text for reason in entry.reasons))
+            for entry in session.states()
+            if entry.attempt == 1
+        ]
     note = "note: [/b] hm"
     assert told[-6:] == [
         (RunState.ACCEPTED, ()),

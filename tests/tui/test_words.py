@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from rig.analysis.remedies import remedy
 from rig.campaign.events import GoOn, Stage
 from rig.campaign.machine import Flow, step
+from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Job
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model
@@ -24,7 +24,7 @@ NASTY = ["[red]x[/", "[/]", "\x1b[2J\x07\x9b31m", "x" * 10_000, "[@click=app.exi
 def model(text):
     state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
              "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
-    flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(text,))
+    flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason(text),))
     return Model(typed(0, state), flow, Indicators(), connected=True, job=Job(1, 1), port=text)
 
 
@@ -42,8 +42,11 @@ def test_what_comes_from_outside_is_shown_as_text(text):
 
 
 def test_a_void_drop_says_what_to_do():
-    reason = "release skew 9.19 ms is beyond 5 ms"
-    assert verdict_words(model(reason)).plain.endswith(f"{reason}\n  → {remedy(reason)}")
+    reason = make_reason("release_skew", skew_s=9.19e-3, limit_s=5e-3)
+    flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(reason,))
+    (advice,) = remedies([reason])
+    words = verdict_words(replace(model("x"), flow=flow)).plain
+    assert words.endswith(f"{reason.text}\n  → {advice}")
 
 
 def test_enter_is_not_offered_before_the_verdict_is_kept():

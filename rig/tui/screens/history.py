@@ -11,8 +11,8 @@ from textual.content import Content
 
 from rig.films import read_films
 from rig.measurands import listed
+from rig.reasons import notes_in
 from rig.report.numbers import fixed
-from rig.session.schema import noted
 from rig.tui.choosing import chosen
 from rig.tui.motion import motions
 from rig.tui.plots import drop_pictures, laid_over, run_picture
@@ -232,7 +232,7 @@ def _which(view: SessionView, job: Job, page: HistoryPage) -> Content:
     place = page.jobs.index(job) + 1
     only = f" that are {plain(page.words, 40)}" if page.words else ""
     said = (one.reasons for one in reversed(view.states) if (one.run, one.attempt) == job)
-    note = "".join(f"\nnote: {plain(text, 160)}" for text in noted(next(said, ())))
+    note = "".join(f"\nnote: {plain(text, 160)}" for text in notes_in(next(said, ())))
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ still {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} of"

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from rig.analysis.remedies import remedies
 from rig.analysis.result import GOOD
+from rig.reasons import remedies
 from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
