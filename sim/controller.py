@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.link import messages as wire
-from rig.link.messages import DisarmReason, Phase, Reason
+from rig.link.messages import DisarmReason, Phase, RefusalReason
 from sim.recording import Recording
 from sim.release import Release
 from sim.snapshots import take_snapshots
@@ -153,11 +153,11 @@ class Microcontroller:
         """
         self._now_ns = now_ns
         if frame.type >= 0x80 or frame.type not in wire.TABLE:
-            return wire.Refused(Reason.UNKNOWN_MESSAGE, frame.type)
+            return wire.Refused(RefusalReason.UNKNOWN_MESSAGE, frame.type)
         try:
             request = wire.unpack(frame.type, frame.payload)
         except wire.MessageError:
-            return wire.Refused(Reason.BAD_PARAMETER, 0)
+            return wire.Refused(RefusalReason.BAD_PARAMETER, 0)
         match request:
             case wire.Identify():
                 return self._identify(request)
@@ -182,7 +182,7 @@ class Microcontroller:
     def _identify(self, request: wire.Identify) -> wire.DeviceMessage:
         version = self._identity.protocol_version
         if request.protocol_version != version:
-            return wire.Refused(Reason.VERSION, version)
+            return wire.Refused(RefusalReason.VERSION, version)
         self.restarts = 0
         return self._identity
 
@@ -196,9 +196,9 @@ class Microcontroller:
     def _arm(self, order: wire.Arm) -> wire.DeviceMessage:
         held = self.drop
         if self.end_ns is not None:
-            return wire.Refused(Reason.BUSY, 0)
+            return wire.Refused(RefusalReason.BUSY, 0)
         if held is not None and not (held.aborted and held.order.label == order.label):
-            return wire.Refused(Reason.HOLDING_A_DROP, held.order.label & 0xFFFF)
+            return wire.Refused(RefusalReason.HOLDING_A_DROP, held.order.label & 0xFFFF)
         if not (
             order.label
             and 0 < order.gates < 1 << self._identity.gates
@@ -208,14 +208,14 @@ class Microcontroller:
             and order.timeout_ms
             and order.record_ms
         ):
-            return wire.Refused(Reason.BAD_PARAMETER, 0)
+            return wire.Refused(RefusalReason.BAD_PARAMETER, 0)
         if self._inputs.stopped:
-            return wire.Refused(Reason.STOPPED, 0)
+            return wire.Refused(RefusalReason.STOPPED, 0)
         if order.release and (wait_ms := self.release.cooling_ms(self._now_ns)):
-            return wire.Refused(Reason.COOLING, wait_ms)
+            return wire.Refused(RefusalReason.COOLING, wait_ms)
         self.gates = self._lab.rest(order.label)
         if blocked := self.gates & order.gates:
-            return wire.Refused(Reason.GATE_BLOCKED, blocked)
+            return wire.Refused(RefusalReason.GATE_BLOCKED, blocked)
         self.drop = None
         self.order = order
         self._changed = 0
@@ -226,15 +226,15 @@ class Microcontroller:
     def _fire(self, request: wire.Fire) -> wire.DeviceMessage:
         order = self.order
         if order is None:
-            return wire.Refused(Reason.NOT_ARMED, 0)
+            return wire.Refused(RefusalReason.NOT_ARMED, 0)
         if request.token != self._token:
-            return wire.Refused(Reason.WRONG_TOKEN, 0)
+            return wire.Refused(RefusalReason.WRONG_TOKEN, 0)
         if self._inputs.stopped:
-            return wire.Refused(Reason.STOPPED, 0)
+            return wire.Refused(RefusalReason.STOPPED, 0)
         if blocked := self.gates & order.gates:
-            return wire.Refused(Reason.GATE_BLOCKED, blocked)
+            return wire.Refused(RefusalReason.GATE_BLOCKED, blocked)
         if self._changed:
-            return wire.Refused(Reason.GATE_UNSTEADY, self._changed)
+            return wire.Refused(RefusalReason.GATE_UNSTEADY, self._changed)
         tick = self._counter.tick_at(self._now_ns)
         if order.release:  # nothing is on outside of a recording
             pulse_us = min(order.pulse_us, order.record_ms * 1000)
@@ -278,28 +278,28 @@ class Microcontroller:
     def _read(self, request: wire.Read) -> wire.DeviceMessage:
         refused = self._not_held(request.label)
         if refused is not None or self.drop is None:
-            return refused or wire.Refused(Reason.NO_SUCH_DROP, 0)
+            return refused or wire.Refused(RefusalReason.NO_SUCH_DROP, 0)
         if request.count == 0:
             return self.drop.certificate()
         if request.first >= len(self.drop):
-            return wire.Refused(Reason.BAD_PARAMETER, 0)
+            return wire.Refused(RefusalReason.BAD_PARAMETER, 0)
         if request.first < self.drop.first_kept:
-            return wire.Refused(Reason.NOT_KEPT, self.drop.first_kept)
+            return wire.Refused(RefusalReason.NOT_KEPT, self.drop.first_kept)
         return self.drop.part(request.first, request.count)
 
     def _acknowledge(self, request: wire.Acknowledge) -> wire.DeviceMessage:
         refused = self._not_held(request.label)
         if refused is not None or self.drop is None:
-            return refused or wire.Refused(Reason.NO_SUCH_DROP, 0)
+            return refused or wire.Refused(RefusalReason.NO_SUCH_DROP, 0)
         if request.crc32 != self.drop.certificate().crc32:
-            return wire.Refused(Reason.WRONG_CRC, 0)
+            return wire.Refused(RefusalReason.WRONG_CRC, 0)
         self.drop = None
         return wire.Done()
 
     def _not_held(self, label: int) -> wire.Refused | None:
         """Say why a label's drop cannot be given, or `None`."""
         if self.end_ns is not None:
-            return wire.Refused(Reason.BUSY, 0)
+            return wire.Refused(RefusalReason.BUSY, 0)
         if self.drop is None or self.drop.order.label != label:
-            return wire.Refused(Reason.NO_SUCH_DROP, 0)
+            return wire.Refused(RefusalReason.NO_SUCH_DROP, 0)
         return None

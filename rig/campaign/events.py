@@ -10,7 +10,7 @@ from rig.link.refusals import DeviceRefusedError
 if TYPE_CHECKING:
     from rig.campaign.voids import VoidRow
     from rig.errors import RigError
-    from rig.link.messages import Reason as Refusal
+    from rig.link.messages import RefusalReason
     from rig.reasons import Reason
     from rig.records import Job
 
@@ -91,7 +91,7 @@ class EffectFailed(NamedTuple):
 
     ticket: int
     trouble: str
-    reason: Refusal | None = None
+    reason: RefusalReason | None = None
     detail: int = 0
 
 

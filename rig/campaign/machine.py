@@ -39,7 +39,7 @@ from rig.campaign.events import (
     Warned,
 )
 from rig.campaign.voids import after, why_halted
-from rig.link.messages import Reason as Refusal
+from rig.link.messages import RefusalReason
 from rig.reasons import NOTE, OPERATOR, plain_reason
 from rig.records import Job
 
@@ -60,9 +60,14 @@ BEFORE_RELEASE = (
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
-_PASSING = (Refusal.COOLING, Refusal.GATE_BLOCKED, Refusal.STOPPED)
+_PASSING = (RefusalReason.COOLING, RefusalReason.GATE_BLOCKED, RefusalReason.STOPPED)
 """Refusals to arm that end by themselves, or that somebody at the rig can end."""
-_DISTURBED = (Refusal.GATE_BLOCKED, Refusal.GATE_UNSTEADY, Refusal.NOT_ARMED, Refusal.STOPPED)
+_DISTURBED = (
+    RefusalReason.GATE_BLOCKED,
+    RefusalReason.GATE_UNSTEADY,
+    RefusalReason.NOT_ARMED,
+    RefusalReason.STOPPED,
+)
 """Refusals to fire after which the drop can be prepared again."""
 
 Outcome: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
@@ -237,7 +242,7 @@ def _not_armed(flow: Flow, event: EffectFailed) -> Outcome:
         return flow.to(flow.home, event.trouble), (GiveUp(),)
     if flow.attended:  # who has been asked, and arms again when all is well
         return flow.to(flow.home, event.trouble), ()
-    pause = event.detail / 1000 if event.reason is Refusal.COOLING else LOOK_S
+    pause = event.detail / 1000 if event.reason is RefusalReason.COOLING else LOOK_S
     return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
 
 

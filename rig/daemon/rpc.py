@@ -9,7 +9,7 @@ from typing import Any, NoReturn, TypeAlias
 
 from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, DeviceTimeoutError, InputError, RigError, SessionError
-from rig.link.messages import DisarmReason, Reason
+from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.interrupts import StoppedError
 
@@ -198,7 +198,9 @@ def error_from_data(data: dict[str, Any]) -> RigError:
     if data.get("kind") == "DeviceRefusedError":
         disarmed = data.get("disarmed")
         return DeviceRefusedError(
-            Reason[data["reason"]], data["detail"], DisarmReason[disarmed] if disarmed else None
+            RefusalReason[data["reason"]],
+            data["detail"],
+            DisarmReason[disarmed] if disarmed else None,
         )
     kind = _KINDS.get(str(data.get("kind")), RigError)
     error = kind(str(data.get("message", "")), str(data.get("hint", "")))

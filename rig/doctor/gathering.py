@@ -17,7 +17,7 @@ from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFac
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
 from rig.link.gatewatch import watch_gates
-from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
+from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.refusals import DeviceRefusedError
 from rig.link.restarts import Restart
 from rig.link.transcript import Transcript
@@ -39,7 +39,7 @@ _GLANCE_S = 0.3
 _PINGS = 40
 _LABEL = pack_label(TEST_RUN, 1)
 _TRIES = 40
-_AGAIN = (Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY)
+_AGAIN = (RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY)
 """Refusals that a flickering gate gives now and then."""
 
 
@@ -201,7 +201,7 @@ def _recorded(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str,
             )
             device.fire(token)
         except DeviceRefusedError as refusal:
-            why, stopped = refusal.message, refusal.reason is Reason.STOPPED
+            why, stopped = refusal.message, refusal.reason is RefusalReason.STOPPED
             if refusal.reason not in _AGAIN:
                 break
             continue

@@ -41,7 +41,7 @@ def header() -> str:
         _define("FRAME_LIMIT", frames.FRAME_LIMIT),
         _define("HOST_SILENCE_MS", wire.HOST_SILENCE_MS),
     ]
-    for values in (wire.Phase, wire.Reason, wire.DisarmReason, wire.PulseEnd):
+    for values in (wire.Phase, wire.RefusalReason, wire.DisarmReason, wire.PulseEnd):
         lines += ["", *_enum(values)]
     for code, message in wire.TABLE.items():
         lines += ["", *_message(code, message.__name__, wire.FIELDS[message])]
@@ -49,7 +49,7 @@ def header() -> str:
 
 
 def _enum(values: type[IntEnum]) -> list[str]:
-    prefix = _upper(values.__name__)
+    prefix = _upper(values.__name__).removeprefix("REFUSAL_")  # the board gives no other reasons
     return [_define(f"{prefix}_{value.name}", value) for value in values]
 
 

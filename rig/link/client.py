@@ -125,7 +125,7 @@ class Device:
         finally:
             line.expect_boot = False
         if identity.protocol_version != wire.PROTOCOL_VERSION:
-            raise DeviceRefusedError(wire.Reason.VERSION, identity.protocol_version)
+            raise DeviceRefusedError(wire.RefusalReason.VERSION, identity.protocol_version)
         return identity
 
     def statistics(self) -> dict[str, int]:
@@ -221,7 +221,7 @@ class Device:
         try:
             tick = self._line.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
         except DeviceRefusedError as refused:
-            if refused.reason is not wire.Reason.NOT_ARMED:
+            if refused.reason is not wire.RefusalReason.NOT_ARMED:
                 raise
             raise DeviceRefusedError(refused.reason, refused.detail, self._disarmed) from None
         return tick
@@ -357,7 +357,7 @@ class Device:
                 self._line.request(wire.Read(drop.label, first, count), wire.EventsFrame, tries=2)
             except DeviceRefusedError as refused:
                 # What it does not keep any more stays missing, and makes the drop faulty.
-                if refused.reason is not wire.Reason.NOT_KEPT or refused.detail <= first:
+                if refused.reason is not wire.RefusalReason.NOT_KEPT or refused.detail <= first:
                     raise
             except DeviceTimeoutError:
                 failures += 1

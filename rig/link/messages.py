@@ -76,9 +76,9 @@ __all__ = [
     "Pong",
     "PulseEnd",
     "Read",
-    "Reason",
     "Reference",
     "ReferencePulse",
+    "RefusalReason",
     "Refused",
     "State",
     "Status",
@@ -106,7 +106,7 @@ class Phase(IntEnum):
     HOLDING = 3
 
 
-class Reason(IntEnum):
+class RefusalReason(IntEnum):
     """Why a request was refused; `Refused.detail` says more where noted."""
 
     NOT_ARMED = 1
@@ -293,7 +293,7 @@ class Fired:
 class Refused:
     """The request was understood and not executed."""
 
-    reason: Annotated[Reason, BYTE_ENUM]
+    reason: Annotated[RefusalReason, BYTE_ENUM]
     detail: U16
 
 

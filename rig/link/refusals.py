@@ -6,63 +6,63 @@ from typing import TYPE_CHECKING
 
 from rig.boards import GATES
 from rig.errors import DeviceError
-from rig.link.messages import PROTOCOL_VERSION, DisarmReason, Reason
+from rig.link.messages import PROTOCOL_VERSION, DisarmReason, RefusalReason
 
 if TYPE_CHECKING:
     from rig.link.messages import Refused
 
-ADVICE: dict[Reason, tuple[str, str]] = {
-    Reason.NOT_ARMED: (
+ADVICE: dict[RefusalReason, tuple[str, str]] = {
+    RefusalReason.NOT_ARMED: (
         "the device is not armed",
         "it disarms itself when it has waited too long: arm again",
     ),
-    Reason.WRONG_TOKEN: (
+    RefusalReason.WRONG_TOKEN: (
         "the device was armed by somebody else",
         "make sure that only one program controls the device, then arm again",
     ),
-    Reason.GATE_BLOCKED: (
+    RefusalReason.GATE_BLOCKED: (
         "{gates} blocked",
         "move the chain or whatever else stands in the beam; check that the emitter has power",
     ),
-    Reason.GATE_UNSTEADY: (
+    RefusalReason.GATE_UNSTEADY: (
         "{gates} changed after arming",
         "let the chains come to rest, check for loose plugs and stray light, then arm again",
     ),
-    Reason.BAD_PARAMETER: (
+    RefusalReason.BAD_PARAMETER: (
         "the device cannot do what was asked",
         "compare gates, release and pulse of the protocol file with what the board has",
     ),
-    Reason.BUSY: ("the device is recording", "wait until the drop is over, or abort it"),
-    Reason.HOLDING_A_DROP: (
+    RefusalReason.BUSY: ("the device is recording", "wait until the drop is over, or abort it"),
+    RefusalReason.HOLDING_A_DROP: (
         "the device still holds the drop of run {detail}",
         "read and acknowledge that drop first: resume its session",
     ),
-    Reason.NO_SUCH_DROP: (
+    RefusalReason.NO_SUCH_DROP: (
         "the device does not hold this drop",
         "it was acknowledged before, or lost when the board restarted: repeat the run",
     ),
-    Reason.WRONG_CRC: (
+    RefusalReason.WRONG_CRC: (
         "the device holds different data than was acknowledged",
         "read the drop again",
     ),
-    Reason.VERSION: (
+    RefusalReason.VERSION: (
         "the board's firmware speaks protocol version {detail}, this program version "
         f"{PROTOCOL_VERSION}",
         "bring both to the same version: rig flash",
     ),
-    Reason.STOPPED: (
+    RefusalReason.STOPPED: (
         "the emergency stop is open",
         "see that nobody is in danger and close it, then arm again",
     ),
-    Reason.COOLING: (
+    RefusalReason.COOLING: (
         "the release must rest for {detail} ms more",
         "wait that long, then arm again: its coil may be on for a quarter of the time",
     ),
-    Reason.NOT_KEPT: (
+    RefusalReason.NOT_KEPT: (
         "the device keeps events from number {detail} on only",
         "repeat the run; a board with more memory keeps a drop whole",
     ),
-    Reason.UNKNOWN_MESSAGE: (
+    RefusalReason.UNKNOWN_MESSAGE: (
         "the device does not know this request",
         "its firmware is older than this program: rig flash",
     ),
@@ -79,7 +79,7 @@ DISARMED: dict[DisarmReason, tuple[str, str]] = {
     ),
     DisarmReason.STOPPED: (
         "the device disarmed itself: the emergency stop was opened",
-        ADVICE[Reason.STOPPED][1],
+        ADVICE[RefusalReason.STOPPED][1],
     ),
 }
 
@@ -97,13 +97,15 @@ class DeviceRefusedError(DeviceError):
         Why the device had disarmed itself before, where that is the cause.
     """
 
-    def __init__(self, reason: Reason, detail: int, disarmed: DisarmReason | None = None) -> None:
+    def __init__(
+        self, reason: RefusalReason, detail: int, disarmed: DisarmReason | None = None
+    ) -> None:
         message, hint = ADVICE[reason] if disarmed is None else DISARMED[disarmed]
         gates = [str(n) for n in range(GATES) if detail >> n & 1]
         named = f"gate {gates[0]} is" if len(gates) == 1 else f"gates {', '.join(gates)} are"
         if not gates:  # a flicker so short that the device cannot say whose
             named = "a gate is"
-        if reason is Reason.GATE_UNSTEADY:
+        if reason is RefusalReason.GATE_UNSTEADY:
             named = named.rsplit(" ", 1)[0]
         super().__init__(message.format(gates=named, detail=detail), hint)
         self.reason = reason

@@ -202,7 +202,7 @@ class Transcript:
                 if label in self._drops:
                     self._drops[label].fire_tick = tick
                     self._fired = label, host_ns
-            case wire.Refused(wire.Reason.NOT_KEPT, first) if isinstance(asked, wire.Read):
+            case wire.Refused(wire.RefusalReason.NOT_KEPT, first) if isinstance(asked, wire.Read):
                 self.assembly(asked.label).first_kept = first
             case wire.EventsFrame(label=label) if label not in self._given:
                 self.assembly(label).add(message)

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError, InputError, RigError, SessionError
-from rig.link.messages import TEST_RUN
-from rig.link.messages import Reason as Refusal
+from rig.link.messages import TEST_RUN, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
@@ -356,7 +355,7 @@ class Controller:
         recorder = self.recorder
         if recorder is None or recorder.armed is None or recorder.lapsed is None:
             return
-        refusal = DeviceRefusedError(Refusal.NOT_ARMED, 0, recorder.lapsed)
+        refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, recorder.lapsed)
         self.stop(refusal.message)
         self._unarmed = refusal
 

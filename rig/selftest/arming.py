@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
-from rig.link.messages import Phase, Reason
+from rig.link.messages import Phase, RefusalReason
 from rig.selftest.board import LABEL, insist_refused
 from rig.selftest.requests import BAD_ORDERS, beyond
 from rig.selftest.verdicts import CheckFailedError
@@ -24,23 +24,23 @@ def arm_and_abort(board: BoardUnderTest) -> str:
     board.answer(wire.Abort(), wire.Done)
     if board.phase() is not Phase.IDLE:
         raise CheckFailedError("ABORT did not disarm it")
-    board.refused(wire.Fire(token), Reason.NOT_ARMED)
+    board.refused(wire.Fire(token), RefusalReason.NOT_ARMED)
     return ""
 
 
 def fire_unarmed(board: BoardUnderTest) -> str:
     """See that FIRE alone does nothing."""
-    board.refused(wire.Fire(1), Reason.NOT_ARMED)
+    board.refused(wire.Fire(1), RefusalReason.NOT_ARMED)
     return ""
 
 
 def wrong_tokens(board: BoardUnderTest) -> str:
     """See that a token which is not the latest does not fire."""
     old = board.arm()
-    board.refused(wire.Fire(old ^ 1), Reason.WRONG_TOKEN)
+    board.refused(wire.Fire(old ^ 1), RefusalReason.WRONG_TOKEN)
     if board.arm() == old:
         raise CheckFailedError("armed twice, it gives the same token")
-    board.refused(wire.Fire(old), Reason.WRONG_TOKEN)
+    board.refused(wire.Fire(old), RefusalReason.WRONG_TOKEN)
     return ""
 
 
@@ -51,11 +51,11 @@ def bad_orders(board: BoardUnderTest) -> str:
     for changes in variants:
         what = "Arm with " + ", ".join(f"{name} {value}" for name, value in changes.items())
         answer = board.ask(replace(good, **changes))
-        insist_refused(answer, what, Reason.BAD_PARAMETER, 0)
+        insist_refused(answer, what, RefusalReason.BAD_PARAMETER, 0)
     board.settle()
     token = board.arm()
-    board.refused(board.order(gates=0), Reason.BAD_PARAMETER)
-    board.refused(wire.Fire(token ^ 1), Reason.WRONG_TOKEN)
+    board.refused(board.order(gates=0), RefusalReason.BAD_PARAMETER)
+    board.refused(wire.Fire(token ^ 1), RefusalReason.WRONG_TOKEN)
     if board.phase() is not Phase.ARMED:
         raise CheckFailedError("a refused order disarmed it")
     return f"{len(variants)} orders"
@@ -63,6 +63,6 @@ def bad_orders(board: BoardUnderTest) -> str:
 
 def no_drop(board: BoardUnderTest) -> str:
     """See that nothing is read or acknowledged while nothing is held."""
-    board.refused(wire.Read(LABEL, 0, 1), Reason.NO_SUCH_DROP)
-    board.refused(wire.Acknowledge(LABEL, 0), Reason.NO_SUCH_DROP)
+    board.refused(wire.Read(LABEL, 0, 1), RefusalReason.NO_SUCH_DROP)
+    board.refused(wire.Acknowledge(LABEL, 0), RefusalReason.NO_SUCH_DROP)
     return ""

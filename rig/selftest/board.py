@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import watch_gates
-from rig.link.messages import TEST_RUN, Phase, Reason, pack_label, unpack_label
+from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
 from rig.selftest.line import Heard, RawLine
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
@@ -142,7 +142,7 @@ class BoardUnderTest:
         return answer
 
     def refused(
-        self, message: wire.HostMessage, reason: Reason, detail: int | None = None
+        self, message: wire.HostMessage, reason: RefusalReason, detail: int | None = None
     ) -> wire.Refused:
         """Ask, and insist on being refused."""
         return insist_refused(self.ask(message), type(message).__name__, reason, detail)
@@ -191,9 +191,9 @@ class BoardUnderTest:
         match answer:
             case wire.Armed(token=token):
                 return token
-            case wire.Refused(reason=Reason.STOPPED):
+            case wire.Refused(reason=RefusalReason.STOPPED):
                 raise NotPossibleError("the emergency stop is open: close it")
-            case wire.Refused(reason=Reason.COOLING):
+            case wire.Refused(reason=RefusalReason.COOLING):
                 raise NotPossibleError("the release is still cooling: wait a few seconds")
         raise CheckFailedError(f"Arm is answered with {answer}")
 
@@ -302,7 +302,7 @@ class BoardUnderTest:
 
 
 def insist_refused(
-    answer: wire.Message, what: str, reason: Reason, detail: int | None = None
+    answer: wire.Message, what: str, reason: RefusalReason, detail: int | None = None
 ) -> wire.Refused:
     """Give an answer that is the right refusal.
 

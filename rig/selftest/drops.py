@@ -9,7 +9,7 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
-from rig.link.messages import TEST_RUN, Phase, Reason
+from rig.link.messages import TEST_RUN, Phase, RefusalReason
 from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
@@ -42,10 +42,10 @@ def busy(board: BoardUnderTest) -> str:
     state = board.answer(wire.Status(), wire.State)
     if (state.phase, state.label) != (Phase.RECORDING, LABEL):
         raise CheckFailedError(f"recording, it says {state}")
-    board.refused(board.order(label=OTHER_LABEL), Reason.BUSY)
-    board.refused(wire.Read(LABEL, 0, 0), Reason.BUSY)
-    board.refused(wire.Acknowledge(LABEL, 0), Reason.BUSY)
-    board.refused(wire.Fire(token), Reason.NOT_ARMED)
+    board.refused(board.order(label=OTHER_LABEL), RefusalReason.BUSY)
+    board.refused(wire.Read(LABEL, 0, 0), RefusalReason.BUSY)
+    board.refused(wire.Acknowledge(LABEL, 0), RefusalReason.BUSY)
+    board.refused(wire.Fire(token), RefusalReason.NOT_ARMED)
     board.ending(fired, _BUSY_MS)
     return ""
 
@@ -64,9 +64,9 @@ def holding(board: BoardUnderTest) -> str:
     """See that a held drop forbids arming, until it is aborted and armed anew."""
     board.drop()
     for label in (LABEL, OTHER_LABEL):
-        board.refused(board.order(label=label), Reason.HOLDING_A_DROP, TEST_RUN)
+        board.refused(board.order(label=label), RefusalReason.HOLDING_A_DROP, TEST_RUN)
     board.answer(wire.Abort(), wire.Done)
-    board.refused(board.order(label=OTHER_LABEL), Reason.HOLDING_A_DROP, TEST_RUN)
+    board.refused(board.order(label=OTHER_LABEL), RefusalReason.HOLDING_A_DROP, TEST_RUN)
     board.arm()
     return ""
 
@@ -82,8 +82,8 @@ def reading_again(board: BoardUnderTest) -> str:
         part = board.answer(wire.Read(LABEL, 0, 1), wire.EventsFrame)
         if part.events != recorded.events[:1]:
             raise CheckFailedError(f"it sends {recorded.events[0]}, then {part.events}")
-    board.refused(wire.Read(LABEL, count, 1), Reason.BAD_PARAMETER)
-    board.refused(wire.Read(OTHER_LABEL, 0, 0), Reason.NO_SUCH_DROP)
+    board.refused(wire.Read(LABEL, count, 1), RefusalReason.BAD_PARAMETER)
+    board.refused(wire.Read(OTHER_LABEL, 0, 0), RefusalReason.NO_SUCH_DROP)
     return f"{count} events"
 
 
@@ -91,12 +91,12 @@ def acknowledging(board: BoardUnderTest) -> str:
     """See that only the right label and CRC-32 let a drop be forgotten."""
     recorded = board.drop()
     crc32 = recorded.certificate.crc32
-    board.refused(wire.Acknowledge(LABEL, crc32 ^ 1), Reason.WRONG_CRC)
-    board.refused(wire.Acknowledge(OTHER_LABEL, crc32), Reason.NO_SUCH_DROP)
+    board.refused(wire.Acknowledge(LABEL, crc32 ^ 1), RefusalReason.WRONG_CRC)
+    board.refused(wire.Acknowledge(OTHER_LABEL, crc32), RefusalReason.NO_SUCH_DROP)
     board.acknowledge(recorded)
     if board.phase() is not Phase.IDLE:
         raise CheckFailedError("it was acknowledged, and is not idle")
-    board.refused(wire.Acknowledge(LABEL, crc32), Reason.NO_SUCH_DROP)
+    board.refused(wire.Acknowledge(LABEL, crc32), RefusalReason.NO_SUCH_DROP)
     return ""
 
 
@@ -108,7 +108,7 @@ def cooling(board: BoardUnderTest) -> str:
     recorded = board.ending(board.fire(board.armed_by(board.ask(order))), order.record_ms)
     board.acknowledge(recorded)
     # It must rest for 150 ms, of which a slow line takes some.
-    refused = board.refused(order, Reason.COOLING)
+    refused = board.refused(order, RefusalReason.COOLING)
     if not 0 < refused.detail <= 3 * PULSE_US // 1000 + 1:
         raise CheckFailedError(
             f"after {PULSE_US // 1000} ms it wants to rest for {refused.detail} ms more"

@@ -8,7 +8,7 @@ from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import listed
-from rig.link.messages import PROTOCOL_VERSION, Reason
+from rig.link.messages import PROTOCOL_VERSION, RefusalReason
 from rig.selftest.board import insist_refused
 from rig.selftest.requests import UNKNOWN_CODES, wrong_lengths
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
@@ -46,7 +46,7 @@ def handshake(board: BoardUnderTest) -> str:
 def another_version(board: BoardUnderTest) -> str:
     """See that clients of other versions are turned away."""
     for version in (0, PROTOCOL_VERSION + 1):
-        board.refused(wire.Identify(version), Reason.VERSION, PROTOCOL_VERSION)
+        board.refused(wire.Identify(version), RefusalReason.VERSION, PROTOCOL_VERSION)
     return ""
 
 
@@ -65,7 +65,7 @@ def unknown_messages(board: BoardUnderTest) -> str:
     for code in UNKNOWN_CODES:
         what = f"type 0x{code:02X}"
         answer = board.ask_raw(code, b"", what)
-        insist_refused(answer, what, Reason.UNKNOWN_MESSAGE, code)
+        insist_refused(answer, what, RefusalReason.UNKNOWN_MESSAGE, code)
     return ""
 
 
@@ -73,7 +73,7 @@ def other_lengths(board: BoardUnderTest) -> str:
     """See that a request that is too long or too short is refused."""
     for code, payload in wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
         what = f"{wire.TABLE[code].__name__} of {len(payload)} bytes"
-        insist_refused(board.ask_raw(code, payload, what), what, Reason.BAD_PARAMETER, 0)
+        insist_refused(board.ask_raw(code, payload, what), what, RefusalReason.BAD_PARAMETER, 0)
     return ""
 
 
@@ -103,7 +103,7 @@ def a_blocked_gate(board: BoardUnderTest) -> str:
         raise NotPossibleError("no gate is blocked; block one by hand to see this")
     gate = stuck & -stuck
     answer = board.ask(board.order(gates=gate))
-    if answer == wire.Refused(Reason.STOPPED, 0):
+    if answer == wire.Refused(RefusalReason.STOPPED, 0):
         board.armed_by(answer)
-    insist_refused(answer, "Arm", Reason.GATE_BLOCKED, gate)
+    insist_refused(answer, "Arm", RefusalReason.GATE_BLOCKED, gate)
     return listed(gate)

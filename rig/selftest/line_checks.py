@@ -10,7 +10,7 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.rate import tick_rate
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER
-from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, Reason
+from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
 from rig.records import ClockSample
 from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
@@ -71,7 +71,7 @@ def a_silent_host(board: BoardUnderTest) -> str:
     sent = board.clock.now_ns()
     board.arm()
     found = _disarms(board, DisarmReason.HOST_SILENT, HOST_SILENCE_MS, sent)
-    board.refused(wire.Fire(1), Reason.NOT_ARMED)
+    board.refused(wire.Fire(1), RefusalReason.NOT_ARMED)
     return found
 
 

@@ -34,7 +34,7 @@ from rig.campaign.events import (
     Wait,
 )
 from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, step
-from rig.link.messages import Reason
+from rig.link.messages import RefusalReason
 from rig.reasons import NOTE, OPERATOR, make_reason, plain_reason
 from rig.records import Job
 
@@ -147,7 +147,7 @@ events = st.one_of(
     st.just(Opened()), st.just(Closed()), st.just(Stopped()), st.builds(GoOn, st.none() | jobs),
     st.builds(Answered, tickets, st.none() | st.integers(0, 5)),
     st.builds(Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
-    st.builds(EffectFailed, tickets, st.just("no"), st.sampled_from(Reason)),
+    st.builds(EffectFailed, tickets, st.just("no"), st.sampled_from(RefusalReason)),
     st.builds(Tick, st.floats(0.0, 2.0)),
     st.just(Lost("gone")), st.builds(Found, jobs), st.builds(Reject, st.just("x")),
     st.builds(Note, st.just("y")), st.builds(Again, jobs),
@@ -187,14 +187,14 @@ def test_the_countdown_is_as_long_as_it_was_set():
     assert step(flow, Tick(0.11))[1] == (FireRelease(7),)
 
 
-PASSING = (Reason.COOLING, Reason.GATE_BLOCKED, Reason.STOPPED)
+PASSING = (RefusalReason.COOLING, RefusalReason.GATE_BLOCKED, RefusalReason.STOPPED)
 
 
 def arming(**more):
     return through(Flow(stage=Stage.PREPARE, **more), GoOn(JOB, 5.0), DONE)[0]
 
 
-@pytest.mark.parametrize("reason", [None, *Reason])
+@pytest.mark.parametrize("reason", [None, *RefusalReason])
 def test_whoever_is_there_begins_every_arming(reason):
     flow, effects = through(arming(), EffectFailed(-1, "no\ndo this", reason, 100))
     assert (flow.stage, flow.trouble, flow.job) == (Stage.PREPARE, "no\ndo this", JOB)
@@ -205,7 +205,7 @@ def test_whoever_is_there_begins_every_arming(reason):
 @pytest.mark.parametrize("reason", PASSING)
 def test_alone_what_passes_is_waited_for_a_few_times(reason):
     flow = arming(attended=False)
-    pause = 0.7 if reason is Reason.COOLING else LOOK_S
+    pause = 0.7 if reason is RefusalReason.COOLING else LOOK_S
     for _ in range(LOOKS - 1):
         flow, effects = through(flow, EffectFailed(-1, "no", reason, 700), DONE)
         assert effects == [Wait(pause), ArmRelease(JOB)]
@@ -214,7 +214,7 @@ def test_alone_what_passes_is_waited_for_a_few_times(reason):
 
 
 @pytest.mark.parametrize("attended", [True, False])
-@pytest.mark.parametrize("reason", [None, *Reason])
+@pytest.mark.parametrize("reason", [None, *RefusalReason])
 def test_what_is_not_let_go_is_switched_off_first(reason, attended):
     flow = Flow(stage=Stage.PREPARE, attended=attended)
     for number in range(1, LOOKS + 1):
@@ -227,7 +227,12 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
             EffectFailed(-1, "a gate moved\nhint", reason),
         )
         assert (flow.stage, effects[3]) == (Stage.PREPARE, Stop("a gate moved"))
-        again = {Reason.GATE_BLOCKED, Reason.GATE_UNSTEADY, Reason.NOT_ARMED, Reason.STOPPED}
+        again = {
+            RefusalReason.GATE_BLOCKED,
+            RefusalReason.GATE_UNSTEADY,
+            RefusalReason.NOT_ARMED,
+            RefusalReason.STOPPED,
+        }
         over = reason not in again or (number == LOOKS and not attended)
         assert effects[4:] == ([GiveUp()] if over else [])
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
-from rig.link.messages import Reason
+from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.published import PublishedState
 from tests.waiting import PATIENCE_S
@@ -24,7 +24,7 @@ def let_fall(ask: Callable[..., Any], run: int = 1) -> int:
         try:
             ask(lambda controller, at=attempt: controller.fire(controller.arm(run, at)))
         except DeviceRefusedError as refusal:
-            if refusal.reason is not Reason.NOT_ARMED:
+            if refusal.reason is not RefusalReason.NOT_ARMED:
                 raise
             ask(lambda controller: controller.stop("disarmed by itself"))
         else:

@@ -14,7 +14,7 @@ from rig.daemon.lease import ControlError, Lease
 from rig.errors import DeviceError, InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
-from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase, Reason
+from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import sentences
 from rig.recorder.interrupts import StoppedError
@@ -134,7 +134,7 @@ def test_a_device_that_disarms_itself_is_noticed(processes, armed):
     processes.await_phase(Phase.IDLE)
     with pytest.raises(DeviceRefusedError, match="the emergency stop was opened") as refused:
         one.fire(token)
-    assert refused.value.reason is Reason.NOT_ARMED
+    assert refused.value.reason is RefusalReason.NOT_ARMED
     processes.hand("stop 0")
     one.close()
     gone_on_with(processes)

@@ -23,7 +23,7 @@ from rig.errors import (
     RigError,
     SessionError,
 )
-from rig.link.messages import DisarmReason, Reason
+from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
@@ -35,8 +35,8 @@ ERRORS = [
     SessionError("the disk is full", "free some space"),
     DeviceError("connection lost", "check the cable"),
     DeviceTimeoutError("silent"),
-    DeviceRefusedError(Reason.GATE_BLOCKED, 0b101),
-    DeviceRefusedError(Reason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
+    DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b101),
+    DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
     ControlError("taken"),
     StoppedError("stopped"),
     rpc.VersionError("old"),

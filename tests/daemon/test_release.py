@@ -8,7 +8,7 @@ import pytest
 
 from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, InputError
-from rig.link.messages import Phase, Reason
+from rig.link.messages import Phase, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.interrupts import StoppedError
 from rig.replay import replay
@@ -45,7 +45,7 @@ def armed(driver):
     try:
         return driver.arm(1, 1)
     except DeviceRefusedError as refused:
-        if refused.reason is not Reason.COOLING:
+        if refused.reason is not RefusalReason.COOLING:
             raise
         return 0
 
@@ -88,7 +88,7 @@ def test_an_open_emergency_stop_refuses_it(processes, driver):
     until(lambda: driver.session.latest_state(1).state is RunState.INTERRUPTED)
     with pytest.raises(DeviceRefusedError) as refused:
         driver.call("test_release")
-    assert refused.value.reason is Reason.STOPPED
+    assert refused.value.reason is RefusalReason.STOPPED
     assert not driven(processes)
 
 

@@ -7,7 +7,7 @@ import pytest
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import Reason
+from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received
 from rig.records import Drop
@@ -69,7 +69,7 @@ class Suite:
         expected = seconds * identity.tick_hz
         assert abs(ticks - expected) <= bench.tick_tolerance + 0.005 * expected
 
-    def refused(self, reason: Reason, call, *args, **kwargs) -> DeviceRefusedError:
+    def refused(self, reason: RefusalReason, call, *args, **kwargs) -> DeviceRefusedError:
         with pytest.raises(DeviceRefusedError) as caught:
             call(*args, **kwargs)
         assert caught.value.reason is reason

@@ -8,7 +8,7 @@ import pytest
 
 from rig.clock.rate import tick_rate
 from rig.link import messages as wire
-from rig.link.messages import Phase, Reason, pack_label
+from rig.link.messages import Phase, RefusalReason, pack_label
 from tests.link.bench import GATES, LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm, order
@@ -32,7 +32,7 @@ class DropSuite(Suite):
     @pytest.mark.parametrize("version", [0, wire.PROTOCOL_VERSION + 1])
     def test_a_client_of_another_version_is_refused(self, bench, version):
         answer = Wire(bench).ask(wire.Identify(version), 1)
-        assert answer == wire.Refused(Reason.VERSION, wire.PROTOCOL_VERSION)
+        assert answer == wire.Refused(RefusalReason.VERSION, wire.PROTOCOL_VERSION)
 
     def test_idle_state(self, bench, device):
         bench.touch(0x0201)

@@ -7,7 +7,7 @@ import pytest
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import Phase, Reason, pack_label
+from rig.link.messages import Phase, RefusalReason, pack_label
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
@@ -37,29 +37,33 @@ class HoldSuite(Suite):
         assert list(many.events) == events[: len(many.events)]
         assert line.ask(wire.Read(LABEL, 0, 0), 10) == certificate
         answer = line.ask(wire.Read(LABEL, len(events), 1), 11)
-        assert answer == wire.Refused(Reason.BAD_PARAMETER, 0)
-        assert line.ask(wire.Read(LABEL + 1, 0, 1), 12) == wire.Refused(Reason.NO_SUCH_DROP, 0)
+        assert answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0)
+        assert line.ask(wire.Read(LABEL + 1, 0, 1), 12) == wire.Refused(
+            RefusalReason.NO_SUCH_DROP, 0
+        )
 
     def test_only_the_right_crc_releases_a_drop(self, device):
-        self.refused(Reason.NO_SUCH_DROP, device.fetch, LABEL)
+        self.refused(RefusalReason.NO_SUCH_DROP, device.fetch, LABEL)
         drop = self.drop(device)
-        self.refused(Reason.WRONG_CRC, device.acknowledge, LABEL, drop.certificate.crc32 ^ 1)
-        self.refused(Reason.NO_SUCH_DROP, device.acknowledge, LABEL ^ 1, drop.certificate.crc32)
+        self.refused(RefusalReason.WRONG_CRC, device.acknowledge, LABEL, drop.certificate.crc32 ^ 1)
+        self.refused(
+            RefusalReason.NO_SUCH_DROP, device.acknowledge, LABEL ^ 1, drop.certificate.crc32
+        )
         assert device.status().phase is Phase.HOLDING
         self.release(device, drop)
-        self.refused(Reason.NO_SUCH_DROP, self.release, device, drop)
+        self.refused(RefusalReason.NO_SUCH_DROP, self.release, device, drop)
 
     def test_a_held_drop_forbids_arming(self, device):
         self.drop(device)
-        error = self.refused(Reason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
+        error = self.refused(RefusalReason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
         assert "run 7" in error.message
-        self.refused(Reason.HOLDING_A_DROP, arm, device, LABEL)
+        self.refused(RefusalReason.HOLDING_A_DROP, arm, device, LABEL)
 
     def test_after_abort_the_same_label_may_be_armed_again(self, device):
         self.drop(device)
         device.abort()
         assert device.status().phase is Phase.HOLDING
-        self.refused(Reason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
+        self.refused(RefusalReason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
         drop = self.drop(device)
         assert drop.faults == ()
 
@@ -82,7 +86,7 @@ class HoldSuite(Suite):
         token = arm(device)
         self.restart(bench, device)
         assert device.status().phase is Phase.IDLE
-        self.refused(Reason.NOT_ARMED, device.fire, token)
+        self.refused(RefusalReason.NOT_ARMED, device.fire, token)
 
     def test_a_held_drop_outlives_resets(self, bench, device):
         drop = self.drop(device)
@@ -94,7 +98,7 @@ class HoldSuite(Suite):
         state = again.status()
         assert (state.phase, state.label) == (Phase.HOLDING, LABEL)
         assert state.events == drop.certificate.events
-        self.refused(Reason.HOLDING_A_DROP, arm, again)  # that ABORT came is forgotten
+        self.refused(RefusalReason.HOLDING_A_DROP, arm, again)  # that ABORT came is forgotten
         assert again.fetch(LABEL) == drop
         self.release(again, drop)
         self.restart(bench, device)
@@ -112,5 +116,5 @@ class HoldSuite(Suite):
         assert drop == device.transcript.pending(LABEL)
         assert any("restarted" in fault for fault in drop.faults)
         device.connect(boot_wait_s=0)
-        self.refused(Reason.NO_SUCH_DROP, device.fetch, LABEL)
+        self.refused(RefusalReason.NO_SUCH_DROP, device.fetch, LABEL)
         assert device.status().phase is Phase.IDLE

@@ -8,7 +8,7 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import Reason
+from rig.link.messages import RefusalReason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import LossyPort, Wire, arm
@@ -55,7 +55,9 @@ class MemorySuite(Suite):
         events, certificate = line.drop(record_ms=record_ms(count))
         assert len(events) == certificate.events == count
         for seq, first in enumerate([0, 59], start=1):
-            assert line.ask(wire.Read(LABEL, first, 1), seq) == wire.Refused(Reason.NOT_KEPT, 60)
+            assert line.ask(wire.Read(LABEL, first, 1), seq) == wire.Refused(
+                RefusalReason.NOT_KEPT, 60
+            )
         for seq, first in enumerate([60, count - 1], start=3):
             assert line.ask(wire.Read(LABEL, first, 1), seq).events == (events[first],)
         assert line.ask(wire.Read(LABEL, 0, 0), 5) == certificate

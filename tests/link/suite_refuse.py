@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rig.link import messages as wire
-from rig.link.messages import Phase, Reason, pack_label
+from rig.link.messages import Phase, RefusalReason, pack_label
 from rig.selftest.requests import BAD_ORDERS, UNKNOWN_CODES, wrong_lengths
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
@@ -16,22 +16,22 @@ BAD = {"gates": 0}
 
 class RefusalSuite(Suite):
     def test_fire_needs_arm(self, device):
-        self.refused(Reason.NOT_ARMED, device.fire, 1)
+        self.refused(RefusalReason.NOT_ARMED, device.fire, 1)
 
     def test_fire_needs_the_right_token(self, bench, device):
         token = arm(device)
-        self.refused(Reason.WRONG_TOKEN, device.fire, token ^ 1)
+        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
         assert bench.lab.drops == []
         device.fire(token)
 
     def test_arming_again_makes_the_older_token_worthless(self, device):
         old, new = arm(device), arm(device)
-        self.refused(Reason.WRONG_TOKEN, device.fire, old)
+        self.refused(RefusalReason.WRONG_TOKEN, device.fire, old)
         device.fire(new)
 
     def test_a_blocked_gate_forbids_arming(self, bench, device):
         bench.lab.hanging = 0x0201
-        error = self.refused(Reason.GATE_BLOCKED, arm, device)
+        error = self.refused(RefusalReason.GATE_BLOCKED, arm, device)
         assert error.detail == 0x0201
         assert "gates 0, 9 are blocked" in error.message
 
@@ -39,52 +39,52 @@ class RefusalSuite(Suite):
         token = arm(device)
         bench.touch(0x0102)
         bench.touch(0x0100)  # gate 1 has moved, which matters less
-        self.refused(Reason.WRONG_TOKEN, device.fire, token ^ 1)
-        assert self.refused(Reason.GATE_BLOCKED, device.fire, token).detail == 0x0100
+        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
+        assert self.refused(RefusalReason.GATE_BLOCKED, device.fire, token).detail == 0x0100
 
     def test_a_gate_that_moved_after_arming_forbids_fire(self, bench, device):
         token = arm(device)
         bench.touch(0x0802)
         bench.touch(0)
-        assert self.refused(Reason.GATE_UNSTEADY, device.fire, token).detail == 0x0002
+        assert self.refused(RefusalReason.GATE_UNSTEADY, device.fire, token).detail == 0x0002
         device.abort()
         device.fire(arm(device))
 
     @pytest.mark.parametrize("bad", BAD_ORDERS)
     def test_bad_parameters(self, device, bad):
-        self.refused(Reason.BAD_PARAMETER, arm, device, **bad)
+        self.refused(RefusalReason.BAD_PARAMETER, arm, device, **bad)
         assert device.status().phase is Phase.IDLE
 
     def test_the_longest_pulse_is_the_one_it_names(self, device, identity):
         longest = identity.max_pulse_us
-        self.refused(Reason.BAD_PARAMETER, arm, device, pulse_us=longest + 1)
+        self.refused(RefusalReason.BAD_PARAMETER, arm, device, pulse_us=longest + 1)
         arm(device, pulse_us=longest)
 
     def test_gates_and_releases_that_are_not_there(self, device, identity):
         if identity.gates < 16:
-            self.refused(Reason.BAD_PARAMETER, arm, device, gates=1 << identity.gates)
+            self.refused(RefusalReason.BAD_PARAMETER, arm, device, gates=1 << identity.gates)
         if identity.releases < 8:
-            self.refused(Reason.BAD_PARAMETER, arm, device, release=1 << identity.releases)
+            self.refused(RefusalReason.BAD_PARAMETER, arm, device, release=1 << identity.releases)
         arm(device, gates=1 << identity.gates - 1, release=1 << identity.releases - 1)
 
     def test_a_refused_request_changes_nothing(self, device):
         token = arm(device)
-        self.refused(Reason.BAD_PARAMETER, arm, device, **BAD)
-        self.refused(Reason.WRONG_TOKEN, device.fire, token ^ 1)
+        self.refused(RefusalReason.BAD_PARAMETER, arm, device, **BAD)
+        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
         device.fire(token)
         assert device.collect(LABEL).faults == ()
 
     def test_arming_and_reading_while_recording(self, device):
         device.fire(arm(device))
-        self.refused(Reason.BUSY, arm, device, pack_label(8, 1), **BAD)
-        self.refused(Reason.BUSY, device.acknowledge, LABEL, 0)
-        self.refused(Reason.BUSY, device.fetch, LABEL)
-        self.refused(Reason.NOT_ARMED, device.fire, 5)
+        self.refused(RefusalReason.BUSY, arm, device, pack_label(8, 1), **BAD)
+        self.refused(RefusalReason.BUSY, device.acknowledge, LABEL, 0)
+        self.refused(RefusalReason.BUSY, device.fetch, LABEL)
+        self.refused(RefusalReason.NOT_ARMED, device.fire, 5)
         assert device.collect(LABEL).faults == ()
 
     def test_a_held_drop_comes_before_what_is_wrong_with_a_request(self, device):
         self.drop(device)
-        self.refused(Reason.HOLDING_A_DROP, arm, device, **BAD)
+        self.refused(RefusalReason.HOLDING_A_DROP, arm, device, **BAD)
 
     # -- what is no request
 
@@ -92,14 +92,16 @@ class RefusalSuite(Suite):
         line = Wire(bench)
         for seq, code in enumerate(UNKNOWN_CODES, start=1):
             line.send(code, b"", seq)
-            assert line.hear() == [(seq, wire.Refused(Reason.UNKNOWN_MESSAGE, code))]
+            assert line.hear() == [(seq, wire.Refused(RefusalReason.UNKNOWN_MESSAGE, code))]
 
     def test_requests_of_another_length(self, bench):
         line = Wire(bench)
         for seq, (code, wrong) in enumerate(wrong_lengths(order()), start=1):
             line.send(code, wrong, seq)
             answers = line.hear(until=lambda ack, _, seq=seq: ack == seq)
-            assert answers == [(seq, wire.Refused(Reason.BAD_PARAMETER, 0))], wire.TABLE[code]
+            assert answers == [(seq, wire.Refused(RefusalReason.BAD_PARAMETER, 0))], wire.TABLE[
+                code
+            ]
         assert line.ask(wire.Status(), 99).phase is Phase.IDLE
 
     def test_requests_far_too_long(self, bench):
@@ -107,5 +109,5 @@ class RefusalSuite(Suite):
         line = Wire(bench)
         for seq, size in enumerate([16, 60, 248], start=1):
             line.send(0x04, bytes(size), seq)
-            assert line.hear() in ([], [(seq, wire.Refused(Reason.BAD_PARAMETER, 0))])
+            assert line.hear() in ([], [(seq, wire.Refused(RefusalReason.BAD_PARAMETER, 0))])
         assert line.ask(wire.Status(), 9).phase is Phase.IDLE

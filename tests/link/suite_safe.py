@@ -8,7 +8,7 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
-from rig.link.messages import DisarmReason, Phase, Reason
+from rig.link.messages import DisarmReason, Phase, RefusalReason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
@@ -21,7 +21,7 @@ class OutputSuite(Suite):
         seen = [watched.outputs()]
         token = arm(device, **LONG)
         seen.append(watched.outputs())
-        self.refused(Reason.WRONG_TOKEN, device.fire, token ^ 1)
+        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
         seen.append(watched.outputs())
         device.fire(token)
         seen.append(watched.outputs())
@@ -101,7 +101,7 @@ class SilenceSuite(Suite):
             bench.clock().sleep(0.1)
             assert device.status().phase is Phase.ARMED
         assert self.heard(bench, device, 0.2) == [wire.Disarmed(LABEL, DisarmReason.TIMEOUT)]
-        error = self.refused(Reason.NOT_ARMED, device.fire, token)
+        error = self.refused(RefusalReason.NOT_ARMED, device.fire, token)
         assert "waited too long" in error.message
 
     def test_a_silent_host_disarms(self, bench, device):
@@ -111,7 +111,7 @@ class SilenceSuite(Suite):
         assert self.heard(bench, device, 0.18) == []
         assert self.heard(bench, device, 0.15) == [wire.Disarmed(LABEL, DisarmReason.HOST_SILENT)]
         assert device.status().phase is Phase.IDLE
-        error = self.refused(Reason.NOT_ARMED, device.fire, token)
+        error = self.refused(RefusalReason.NOT_ARMED, device.fire, token)
         assert "silent" in error.message
         device.fire(arm(device))
 
@@ -149,18 +149,18 @@ class SilenceSuite(Suite):
         token = arm(device)
         device.abort()
         assert device.status().phase is Phase.IDLE
-        self.refused(Reason.NOT_ARMED, device.fire, token)
+        self.refused(RefusalReason.NOT_ARMED, device.fire, token)
 
 
 class StopSuite(Suite):
     def test_an_open_stop_forbids_arming(self, stoppable, device):
         stoppable.stop(True)
         stoppable.clock().sleep(1e-3)  # it acts within that
-        assert "emergency stop" in self.refused(Reason.STOPPED, arm, device).message
-        self.refused(Reason.STOPPED, arm, device, release=0, pulse_us=0)
-        self.refused(Reason.BAD_PARAMETER, arm, device, gates=0)
+        assert "emergency stop" in self.refused(RefusalReason.STOPPED, arm, device).message
+        self.refused(RefusalReason.STOPPED, arm, device, release=0, pulse_us=0)
+        self.refused(RefusalReason.BAD_PARAMETER, arm, device, gates=0)
         stoppable.lab.hanging = 1
-        self.refused(Reason.STOPPED, arm, device)
+        self.refused(RefusalReason.STOPPED, arm, device)
         stoppable.lab.hanging = 0
         stoppable.stop(False)
         stoppable.clock().sleep(1e-3)
@@ -171,10 +171,10 @@ class StopSuite(Suite):
         stoppable.stop(True)
         heard = self.heard(stoppable, device, 0.05)
         assert heard == [wire.Disarmed(LABEL, DisarmReason.STOPPED)]
-        error = self.refused(Reason.NOT_ARMED, device.fire, token)
+        error = self.refused(RefusalReason.NOT_ARMED, device.fire, token)
         assert "emergency stop was opened" in error.message
         stoppable.stop(False)
-        self.refused(Reason.NOT_ARMED, device.fire, token)
+        self.refused(RefusalReason.NOT_ARMED, device.fire, token)
         assert stoppable.lab.drops == []
 
     def test_opening_it_in_a_drop_switches_off_and_records_on(
@@ -224,18 +224,18 @@ class StopSuite(Suite):
     def test_a_reset_does_not_close_it(self, stoppable, device):
         stoppable.stop(True)
         self.restart(stoppable, device)
-        self.refused(Reason.STOPPED, arm, device)
+        self.refused(RefusalReason.STOPPED, arm, device)
 
 
 class CoolingSuite(Suite):
     def test_a_release_rests_for_three_pulses(self, bench, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
         bench.lab.hanging = 1
-        error = self.refused(Reason.COOLING, arm, device)
+        error = self.refused(RefusalReason.COOLING, arm, device)
         assert 80 < error.detail <= 141
         assert f"{error.detail} ms" in error.message
         bench.clock().sleep(0.03)
-        assert self.refused(Reason.COOLING, arm, device).detail <= error.detail - 29
+        assert self.refused(RefusalReason.COOLING, arm, device).detail <= error.detail - 29
         bench.lab.hanging = 0
         arm(device, release=0, pulse_us=0)  # what needs no release need not wait
         device.abort()
@@ -247,16 +247,16 @@ class CoolingSuite(Suite):
         bench.clock().sleep(0.04)
         device.abort()
         self.release(device, device.collect(LABEL))
-        assert 10 < self.refused(Reason.COOLING, arm, device).detail < 180
+        assert 10 < self.refused(RefusalReason.COOLING, arm, device).detail < 180
 
     def test_an_open_stop_comes_before_cooling(self, stoppable, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
         stoppable.stop(True)
         stoppable.clock().sleep(1e-3)  # it acts within that
-        self.refused(Reason.STOPPED, arm, device)
+        self.refused(RefusalReason.STOPPED, arm, device)
         stoppable.stop(False)
         stoppable.clock().sleep(1e-3)
-        self.refused(Reason.COOLING, arm, device)
+        self.refused(RefusalReason.COOLING, arm, device)
 
 
 class SafetySuite(OutputSuite, SilenceSuite, StopSuite, CoolingSuite):

@@ -42,8 +42,12 @@ def test_every_name_is_there_with_its_value():
         "HOST_SILENCE_MS": wire.HOST_SILENCE_MS,
     }
     enums = {
-        f"{in_c(kind.__name__)}_{value.name}": value
-        for kind in (wire.Phase, wire.Reason, wire.DisarmReason)
+        f"{prefix}_{value.name}": value
+        for prefix, kind in (
+            ("PHASE", wire.Phase),
+            ("REASON", wire.RefusalReason),
+            ("DISARM_REASON", wire.DisarmReason),
+        )
         for value in kind
     }
     codes = {f"MSG_{in_c(kind.__name__)}": code for code, kind in wire.TABLE.items()}

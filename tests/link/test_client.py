@@ -272,7 +272,7 @@ class Forgetful(FakePort):
         return super().write(data)
 
     def refusal(self):
-        return wire.Refused(wire.Reason.NOT_KEPT, self.kept)
+        return wire.Refused(wire.RefusalReason.NOT_KEPT, self.kept)
 
 
 def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
@@ -299,11 +299,11 @@ def test_the_replay_knows_what_was_no_longer_kept(clock):
 def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
     class Liar(Forgetful):
         def refusal(self):
-            return wire.Refused(wire.Reason.NOT_KEPT, 0)
+            return wire.Refused(wire.RefusalReason.NOT_KEPT, 0)
 
     with pytest.raises(DeviceRefusedError) as caught:
         device_at(Liar(clock, {})).fetch(1)
-    assert caught.value.reason is wire.Reason.NOT_KEPT
+    assert caught.value.reason is wire.RefusalReason.NOT_KEPT
 
 
 def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(clock):
@@ -327,7 +327,7 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
         clock,
         {
             wire.Arm: [wire.Armed(9), wire.Disarmed(1, reason)],
-            wire.Fire: [wire.Refused(wire.Reason.NOT_ARMED, 0)],
+            wire.Fire: [wire.Refused(wire.RefusalReason.NOT_ARMED, 0)],
         },
     )
     one = device_at(port)

@@ -93,17 +93,20 @@ def test_impossible_labels(pair):
 
 
 def test_a_flicker_of_some_gate_is_told_without_a_number():
-    assert DeviceRefusedError(wire.Reason.GATE_UNSTEADY, 0).message == "a gate changed after arming"
+    assert (
+        DeviceRefusedError(wire.RefusalReason.GATE_UNSTEADY, 0).message
+        == "a gate changed after arming"
+    )
 
 
 @pytest.mark.parametrize("reason", wire.DisarmReason)
 def test_every_reason_to_disarm_has_advice(reason):
-    error = DeviceRefusedError(wire.Reason.NOT_ARMED, 0, reason)
+    error = DeviceRefusedError(wire.RefusalReason.NOT_ARMED, 0, reason)
     assert error.hint
     assert "disarmed itself" in error.message
 
 
-@pytest.mark.parametrize("reason", wire.Reason)
+@pytest.mark.parametrize("reason", wire.RefusalReason)
 def test_every_refusal_has_advice(reason):
     assert reason in ADVICE
     error = DeviceRefusedError(reason, 0x0005)

@@ -79,7 +79,9 @@ def test_phases_and_reasons_have_their_numbers():
     phases = rows(section("## Phases"))
     assert [(int(row[0]), row[1]) for row in phases] == [(p, p.name) for p in wire.Phase]
     reasons = re.findall(r"^\| (\d+) \| ([A-Z_]+) \|", section("## Refusals"), re.MULTILINE)
-    assert [(int(number), name) for number, name in reasons] == [(r, r.name) for r in wire.Reason]
+    assert [(int(number), name) for number, name in reasons] == [
+        (r, r.name) for r in wire.RefusalReason
+    ]
     disarmed = rows(section(f"### DISARMED 0x{wire.CODES[wire.Disarmed]:02X}"))[1][3]
     assert disarmed == ", ".join(f"{int(r)} {r.name}" for r in wire.DisarmReason)
 
@@ -102,7 +104,7 @@ def test_limits_are_those_of_the_code():
 def test_every_reason_is_in_the_order_of_some_request():
     orders = rows(section("## Refusals"))
     named = {reason for _, order in orders for reason in order.split(", ")}
-    assert named == {r.name for r in wire.Reason} - {"UNKNOWN_MESSAGE"}
+    assert named == {r.name for r in wire.RefusalReason} - {"UNKNOWN_MESSAGE"}
 
 
 # -- the conversation

@@ -14,8 +14,8 @@ from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
 from rig.reasons import (
     OPERATOR,
-    ROWS,
     SENTENCE,
+    WORDINGS,
     Severity,
     make_reason,
     plain_reason,
@@ -49,10 +49,10 @@ def test_every_void_drop_is_told_with_its_reasons_and_what_to_do():
 
 
 def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_known():
-    known = {code: row.remedy for code, row in ROWS.items() if row.severity is Severity.VOID}
+    known = {code: row.remedy for code, row in WORDINGS.items() if row.severity is Severity.VOID}
     without = [code for code, remedy in known.items() if not remedy]
     assert without == [OPERATOR]
-    assert [code for code, remedy in known.items() if remedy == ROWS["scatter"].remedy] == [
+    assert [code for code, remedy in known.items() if remedy == WORDINGS["scatter"].remedy] == [
         SENTENCE
     ]
     (general,) = remedies([MOTHS, plain_reason("a lorry")])

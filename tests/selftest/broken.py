@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rig.link import messages as wire
-from rig.link.messages import DisarmReason, Phase, Reason
+from rig.link.messages import DisarmReason, Phase, RefusalReason
 from sim.controller import Microcontroller
 from sim.recording import Recording
 from tests.selftest.benches import GATE, LoopedBoard, Wire
@@ -188,7 +188,7 @@ class ForgetsItsLabel(Microcontroller):
 class ARefusalDisarms(Microcontroller):
     def _arm(self, order):
         answer = super()._arm(order)
-        if answer == wire.Refused(Reason.BAD_PARAMETER, 0):
+        if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0):
             self.order = None
         return answer
 
@@ -196,7 +196,7 @@ class ARefusalDisarms(Microcontroller):
 @caught_by("NO_SUCH_DROP")
 class AlwaysReads(Microcontroller):
     def _not_held(self, label):
-        return None if self.drop else wire.Refused(Reason.NOT_KEPT, 0)
+        return None if self.drop else wire.Refused(RefusalReason.NOT_KEPT, 0)
 
 
 # -- gates
@@ -284,7 +284,10 @@ class WrongSum(Microcontroller):
 
 @caught_by("BUSY")
 class NeverBusy(
-    also(wire.Refused(Reason.HOLDING_A_DROP, 0), lambda _, a: a == wire.Refused(Reason.BUSY, 0))
+    also(
+        wire.Refused(RefusalReason.HOLDING_A_DROP, 0),
+        lambda _, a: a == wire.Refused(RefusalReason.BUSY, 0),
+    )
 ):
     pass
 
@@ -338,7 +341,7 @@ class KeepsTheDrop(Microcontroller):
     def _acknowledge(self, request):
         drop = self.drop
         answer = super()._acknowledge(request)
-        if answer == wire.Refused(Reason.WRONG_CRC, 0):
+        if answer == wire.Refused(RefusalReason.WRONG_CRC, 0):
             self.offended = True
         elif self.offended:
             self.drop = drop

@@ -7,7 +7,7 @@ import pytest
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
-from rig.link.messages import Reason
+from rig.link.messages import RefusalReason
 from rig.selftest.board import SelftestOptions
 from rig.selftest.requests import BAD_ORDERS
 from rig.selftest.run import CHECKS, selftest
@@ -48,7 +48,7 @@ def test_each_bad_order_that_is_accepted_is_found_out(bad, monkeypatch):
             like = all(getattr(order, name) == value for name, value in bad.items())
             # Only the very variant: another bad order may share its one value.
             usual = order.pulse_us in {0, 50_000} or "pulse_us" in bad
-            if answer == wire.Refused(Reason.BAD_PARAMETER, 0) and like and usual:
+            if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0) and like and usual:
                 return wire.Armed(1)
             return answer
 
