@@ -69,13 +69,6 @@ class Film:
             for a, b in zip(self.left[moment], self.right[moment], strict=True)
         ]
 
-    def tilts_deg(self, moment: int) -> list[float]:
-        """Tilt of each rod against the horizontal, positive where its right end is higher."""
-        return [
-            math.degrees(math.asin((b[2] - a[2]) / math.dist(a, b)))
-            for a, b in zip(self.left[moment], self.right[moment], strict=True)
-        ]
-
     def slack(self, moment: int) -> tuple[list[bool], list[bool]]:
         """Whether each string is shorter than at rest: the left ones, and the right ones."""
         left, right = (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.bench.accuracy import accuracy
 from rig.bench.fast_accuracy import BLOCK, DOUBLED, STACK, doubled, fast_accuracy
-from rig.commands.output import print_json, say, write_page
+from rig.commands.output import print_found, say, write_page
 from rig.files import make_folder
 from rig.measurands import MEASURANDS
 from rig.text_table import text_table
@@ -41,10 +41,7 @@ def main(arguments: Namespace) -> int:
         lines += ["", *acceptance_table(found)]
     if arguments.output is not None:
         write_page(make_folder(arguments.output), "accuracy", _HEAD, lines)
-    if arguments.json:
-        print_json(found)
-    else:
-        print("\n".join(lines))
+    print_found(found, lambda: "\n".join(lines), as_json=arguments.json)
     return 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.bulk import bulk
-from rig.commands.output import print_json, say
+from rig.commands.output import print_found, say
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Print how long falls take, as ratios."""
     found = bulk(arguments.falls, arguments.rounds, say)
-    if arguments.json:
-        print_json(found)
-    else:
-        print("\n".join(_table(found)))
+    print_found(found, lambda: "\n".join(_table(found)), as_json=arguments.json)
     return 0
 
 

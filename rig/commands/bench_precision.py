@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rig.bench.figures import precision_figure
 from rig.bench.precision import as_json, precision
-from rig.commands.output import print_json, say, write_page
+from rig.commands.output import print_found, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
 
@@ -33,10 +33,7 @@ def main(arguments: Namespace) -> int:
     """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
     folder = make_folder(arguments.output)
     found = precision(quick=arguments.quick, progress=say, keep=lambda one: _write(folder, one))
-    if arguments.json:
-        print_json(as_json(found))
-    else:
-        print(summary(found))
+    print_found(as_json(found), lambda: summary(found), as_json=arguments.json)
     return 0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.bench.figures import resolved_figure, work_figure
 from rig.bench.resolved import CASES, DROPS, as_json, film, published, study, work
 from rig.bench.resolved_before import beside, read_before
-from rig.commands.output import leave_study, named, print_json, say, write_page
+from rig.commands.output import leave_study, named, print_found, print_json, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.measurands import told
 from rig.report.film import film_figure
@@ -83,10 +83,7 @@ def _work(arguments: Namespace) -> int:
     ]  # fmt: skip
     table = text_table(rows, left={0}, rule=True)
     write_page(folder, "resolved-work", _WORK_HEAD, table)
-    if arguments.json:
-        print_json({"settings": lines})
-    else:
-        print("\n".join(table))
+    print_found({"settings": lines}, lambda: "\n".join(table), as_json=arguments.json)
     return 0
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.bench.scenes import as_json, scenes
-from rig.commands.output import print_json, say, write_page
-from rig.files import make_folder, write_atomic
+from rig.commands.output import print_found, say, write_study
+from rig.files import make_folder
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
@@ -36,11 +35,14 @@ def main(arguments: Namespace) -> int:
     costs = scenes(ready, arguments.rounds, say)
     whole = as_json(costs)
     if folder is not None:
-        _write(folder, costs, json.dumps(whole, indent=2, ensure_ascii=False))
-    if arguments.json:
-        print_json(whole)
-    else:
-        print(table(costs))
+        from rig.bench.figures import scenes_figure  # noqa: PLC0415 - it needs matplotlib
+
+        rows = [_flat(cost) for cost in costs]
+        write_study(
+            folder, "scenes", _HEAD, table(costs).splitlines(), whole,
+            csv_text(rows[0], rows), scenes_figure(costs),
+        )  # fmt: skip
+    print_found(whole, lambda: table(costs), as_json=arguments.json)
     return 0
 
 
@@ -83,17 +85,6 @@ def table(costs: Sequence[Cost]) -> str:
 def _quartiles(spread: Quartiles, scale: float) -> str:
     median, low, high = (value * scale for value in (spread.median, spread.low, spread.high))
     return f"{median:.4g} ({low:.4g}–{high:.4g})"
-
-
-def _write(folder: Path, costs: Sequence[Cost], text: str) -> None:
-    """Write ``scenes.csv``, ``scenes.json`` and the picture."""
-    from rig.bench.figures import scenes_figure  # noqa: PLC0415 - it needs matplotlib
-
-    lines = [_flat(cost) for cost in costs]
-    write_atomic(folder / "scenes.csv", csv_text(lines[0], lines))
-    write_atomic(folder / "scenes.json", text + "\n")
-    write_atomic(folder / "scenes.svg", scenes_figure(costs))
-    write_page(folder, "scenes", _HEAD, table(costs).splitlines())
 
 
 def _flat(cost: Cost) -> dict[str, object]:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.bench.stability import StabilityRow, sonic_lengths, stability
-from rig.commands.output import print_json, write_page
-from rig.files import make_folder, write_atomic
+from rig.commands.output import print_found, write_study
+from rig.files import make_folder
 from rig.text_table import csv_text
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Sequence
-    from pathlib import Path
 
 FAILED = 1
 _HEAD = """\
@@ -30,7 +27,11 @@ def main(arguments: Namespace) -> int:
     rows = stability(progress=None if arguments.json else lambda row: print(_line(row), flush=True))
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in _VERDICTS}
     sonic = [asdict(one) for one in sonic_lengths()]
-    found = {"rows": [asdict(row) for row in rows], "counts": counts, "sonic": sonic}
+    found: dict[str, Any] = {
+        "rows": [asdict(row) for row in rows],
+        "counts": counts,
+        "sonic": sonic,
+    }
     totals = [
         ", ".join(f"{n} {verdict}" for verdict, n in counts.items()),
         *(
@@ -39,14 +40,11 @@ def main(arguments: Namespace) -> int:
             for one in sonic
         ),
     ]
-    if arguments.json:
-        print_json(found)
-    else:
-        print("\n".join(totals))
+    print_found(found, lambda: "\n".join(totals), as_json=arguments.json)
     if arguments.output is not None:
-        folder = make_folder(arguments.output)
-        _write(folder, rows, json.dumps(found, indent=2, ensure_ascii=False))
-        write_page(folder, "stability", _HEAD, [*map(_line, rows), "", *totals])
+        numbers = csv_text([field.name for field in fields(StabilityRow)], found["rows"])
+        said = [*map(_line, rows), "", *totals]
+        write_study(make_folder(arguments.output), "stability", _HEAD, said, found, numbers)
     return FAILED if counts["FAILED"] else 0
 
 
@@ -63,11 +61,3 @@ def _line(row: StabilityRow) -> str:
         f"{f'{row.group} {row.value}':<40} {errors[0]:>8} {errors[1]:>8}  {row.verdict:<8} "
         f"{row.naive}{said}"
     )
-
-
-def _write(folder: Path, rows: Sequence[StabilityRow], text: str) -> None:
-    """Write ``stability.csv`` and ``stability.json``."""
-    columns = [field.name for field in fields(StabilityRow)]
-    table = csv_text(columns, (asdict(row) for row in rows))
-    write_atomic(folder / "stability.csv", table)
-    write_atomic(folder / "stability.json", text + "\n")

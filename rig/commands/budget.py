@@ -17,7 +17,7 @@ from rig.analysis.monte_carlo import (
 )
 from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
-from rig.commands.output import print_json, tell_damage
+from rig.commands.output import print_found, tell_damage
 from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs
@@ -47,10 +47,7 @@ def main(arguments: Namespace) -> int:
     """Print a run's budget in the session's light, and by itself beside Monte Carlo trials."""
     with Session.open(arguments.session, readonly=True) as session:
         found, analysis = budget(session, arguments.budget, arguments.trials, SEED)
-    if arguments.json:
-        print_json(found)
-    else:
-        print("\n".join(_table(found)))
+    print_found(found, lambda: "\n".join(_table(found)), as_json=arguments.json)
     return tell_damage(analysis)
 
 

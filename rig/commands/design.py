@@ -7,7 +7,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.components import stated
-from rig.commands.output import print_json, say
+from rig.commands.output import print_found, say
 from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import forecast
 from rig.design.rewriting import with_heights
@@ -65,10 +65,7 @@ def main(arguments: Namespace) -> int:
         if arguments.output:
             write_atomic(arguments.output, with_heights(protocol, proposed))
             say(f"protocol: {arguments.output}")
-    if arguments.json:
-        print_json(found)
-    else:
-        print(design_text(found))
+    print_found(found, lambda: design_text(found), as_json=arguments.json)
     return 0
 
 

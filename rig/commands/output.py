@@ -120,33 +120,44 @@ def leave_study(
     folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
     table: str, picture: str | None = None, *, as_json: bool,
 ) -> None:  # fmt: skip
-    """Keep a study of simulated drops, and print it.
+    """Write the files of a study of simulated drops, see `write_study`, and print it."""
+    write_study(folder, name, head, lines, whole, table, picture)
+    print_found(whole, lambda: "\n".join(["SIMULATED DATA", *lines]), as_json=as_json)
+
+
+def write_study(
+    folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
+    table: str, picture: str | None = None,
+) -> None:  # fmt: skip
+    """Write the files of a study.
 
     Parameters
     ----------
     folder, name
-        Where its files go, and how they begin: .json, .csv, .svg and .md.
+        Where they go, and how they begin: .json, .csv, .svg and .md.
     head, lines
-        Of its page: what stands above, in Markdown, and its tables as text.
+        Of the page: what stands above, in Markdown, and its tables as text.
     whole, table, picture
         All that was found; every line of it as CSV; as SVG, where there is a picture.
-    as_json
-        Print the first and not the lines.
     """
     json_text = json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
     for kind, text in {"json": json_text, "csv": table, "svg": picture}.items():
         if text is not None:
             write_atomic(folder / f"{name}.{kind}", text)
     write_page(folder, name, head, lines)
-    if as_json:
-        print_json(whole)
-    else:
-        print("\n".join(["SIMULATED DATA", *lines]))
 
 
 def write_page(folder: Path, name: str, head: str, lines: Iterable[str]) -> None:
     """Write a study's page: what stands above, in Markdown, and its tables as text."""
     write_atomic(folder / f"{name}.md", "\n".join([head, "", "```text", *lines, "```", ""]))
+
+
+def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bool) -> None:
+    """Print what was found, as JSON or as text."""
+    if as_json:
+        print_json(data)
+    else:
+        print(text())
 
 
 def print_json(data: Mapping[str, Any]) -> None:

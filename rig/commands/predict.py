@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.analysis.distributions import COVERAGE_95
-from rig.commands.output import print_json, say
+from rig.commands.output import print_found, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED
@@ -38,10 +38,8 @@ def main(arguments: Namespace) -> int:
         raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
     protocol = reader.read(arguments.protocol)
     found = predictions(protocol)
-    if arguments.json:
-        print_json({"predictions": [one.json() for one in found]})
-    else:
-        print(table(protocol, found))
+    whole = {"predictions": [line.json() for line in found]}
+    print_found(whole, lambda: table(protocol, found), as_json=arguments.json)
     return 0
 
 

@@ -34,7 +34,7 @@ _ANSWER_S = 100.0  # everything but waiting is over by then, a recording too, or
 
 
 class Client:
-    """One connection to a daemon; a `rig.daemon.connecting.Rig`. For one thread.
+    """One connection to a daemon, for one thread, with the methods of a `Controller`.
 
     Parameters
     ----------

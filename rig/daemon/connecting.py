@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, Protocol
+from typing import TYPE_CHECKING, NoReturn, TypeAlias
 
 from rig.daemon.socket_path import default_socket, token_file
 from rig.errors import DeviceError, RigError
@@ -13,40 +13,11 @@ from rig.recorder.controller import Controller
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.reasons import Reason
+    from rig.daemon.client import Client
     from rig.recorder.interrupts import Interrupts
-    from rig.records import Drop
-    from rig.session.reading import Reader
-    from rig.session.schema import RunState
 
-
-class Rig(Protocol):
-    """What a client can do; `rig.recorder.controller.Controller` says what each is and raises."""
-
-    @property
-    def session(self) -> Reader: ...  # noqa: D102
-
-    def open_session(  # noqa: D102
-        self, protocol: str, session: str, seed: int | None = None
-    ) -> tuple[int, int] | None: ...
-
-    def close_session(self) -> None: ...  # noqa: D102
-
-    def wait(self, seconds: float) -> None: ...  # noqa: D102
-
-    def arm(self, run: int, attempt: int) -> int: ...  # noqa: D102
-
-    def fire(self, token: int) -> None: ...  # noqa: D102
-
-    def collect(self, run: int, attempt: int) -> Drop: ...  # noqa: D102
-
-    def log_state(  # noqa: D102
-        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
-    ) -> None: ...
-
-    def stop(self, reason: str) -> None: ...  # noqa: D102
-
-    def close(self) -> None: ...  # noqa: D102
+    Rig: TypeAlias = Controller | Client
+    """What can be asked of a rig; `Controller` says what each method does and raises."""
 
 
 def connect(

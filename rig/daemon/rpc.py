@@ -92,20 +92,6 @@ def read_line(line: bytes) -> Request | RpcError | list[Request | RpcError]:
     return [_read_one(one) for one in message]
 
 
-def read_request(line: bytes) -> Request:
-    """Read one request.
-
-    Raises
-    ------
-    RpcError
-        It is none.
-    """
-    found = read_line(line)
-    if isinstance(found, Request):
-        return found
-    raise found if isinstance(found, RpcError) else RpcError(INVALID, "not a request")
-
-
 def _read_one(message: Any) -> Request | RpcError:
     if not isinstance(message, dict):
         return RpcError(INVALID, "not a request")

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.reasons import Reason
     from rig.recorder.feed import StateFeed
-    from rig.recorder.sink import SessionSink
+    from rig.recorder.sink import NullSink
     from rig.records import Drop
+    from rig.session.store import Session
 
 log = logging.getLogger(__name__)
 ARM_TIMEOUT_MS = 10_000
@@ -71,7 +72,7 @@ class Recorder:
 
     def __init__(
         self,
-        session: SessionSink,
+        session: Session | NullSink,
         url: str,
         interrupts: Interrupts | None = None,
         *,

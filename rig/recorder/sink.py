@@ -1,8 +1,8 @@
-"""Where a recorder writes: a session, or nowhere for a device without one."""
+"""Where a recorder of a device without a session writes: nowhere."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -13,32 +13,8 @@ if TYPE_CHECKING:
     from rig.session.schema import RunState
 
 
-class SessionSink(Protocol):
-    """Where a recorder puts what happens; `rig.session.store.Session` is the one that keeps it."""
-
-    def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None: ...  # noqa: D102
-
-    def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None: ...  # noqa: D102
-
-    def add_ping(self, ping: ClockSample) -> None: ...  # noqa: D102
-
-    def add_pulse(self, pulse: Pulse) -> None: ...  # noqa: D102
-
-    def add_host_break(self, found: HostBreak) -> None: ...  # noqa: D102
-
-    def add_drop(self, drop: Drop, *, host_ns: int | None, provenance: str) -> None: ...  # noqa: D102
-
-    def add_state(  # noqa: D102
-        self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
-    ) -> None: ...
-
-    def drop(self, run: int, attempt: int) -> Drop | None: ...  # noqa: D102
-
-    def commit(self) -> None: ...  # noqa: D102
-
-
 class NullSink:
-    """Nothing is kept. A recorder with this one watches, and never arms."""
+    """What a recorder uses of a session. Nothing is kept: it watches, and never arms."""
 
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
         """Forget bytes."""

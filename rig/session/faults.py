@@ -7,12 +7,17 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rig.errors import SessionError
+from rig.session.foreign import RECOVER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
 _NOT_A_SESSION = "name a file made by rig run, rig import or rig daemon"
+_LOCKED = (
+    "{path} is locked by another program",
+    "close the program that has the session open and try again",
+)
 _ADVICE = {
     sqlite3.SQLITE_FULL: (
         "the disk is full while writing {path}",
@@ -32,18 +37,9 @@ _ADVICE = {
         "{path} cannot be opened",
         "check the permissions of the file and its folder",
     ),
-    sqlite3.SQLITE_BUSY: (
-        "{path} is locked by another program",
-        "close the program that has the session open and try again",
-    ),
-    sqlite3.SQLITE_LOCKED: (
-        "{path} is locked by another program",
-        "close the program that has the session open and try again",
-    ),
-    sqlite3.SQLITE_CORRUPT: (
-        "{path} is damaged",
-        "rig recover says what is whole, and with -o NEW saves all that can be read",
-    ),
+    sqlite3.SQLITE_BUSY: _LOCKED,
+    sqlite3.SQLITE_LOCKED: _LOCKED,
+    sqlite3.SQLITE_CORRUPT: ("{path} is damaged", RECOVER),
     sqlite3.SQLITE_INTERRUPT: (
         "{path} takes far longer to read than any session",
         "it was altered or is damaged: rig recover says what is whole",
@@ -65,13 +61,7 @@ def as_session_error(path: Path, error: sqlite3.Error) -> SessionError:
     """Translate one SQLite error; the original words are kept in brackets."""
     code = getattr(error, "sqlite_errorcode", None)  # absent on errors of the Python wrapper
     primary = code & 0xFF if isinstance(code, int) else sqlite3.SQLITE_ERROR
-    message, hint = _ADVICE.get(
-        primary,
-        (
-            "{path} cannot be read",
-            "rig recover says what is whole, and with -o NEW saves all that can be read",
-        ),
-    )
+    message, hint = _ADVICE.get(primary, ("{path} cannot be read", RECOVER))
     return SessionError(f"{message.format(path=path)} ({error})", hint)
 
 
@@ -83,4 +73,4 @@ def translated(path: Path) -> Iterator[None]:
     except sqlite3.Error as error:
         raise as_session_error(path, error) from error
     except UnicodeDecodeError as error:  # SQLite names what is damaged by bytes that are no text
-        raise SessionError(f"{path} is damaged", _ADVICE[sqlite3.SQLITE_CORRUPT][1]) from error
+        raise SessionError(f"{path} is damaged", RECOVER) from error

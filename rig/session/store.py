@@ -8,7 +8,7 @@ import logging
 import os
 import platform
 import sqlite3
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -36,6 +36,11 @@ if TYPE_CHECKING:
 
 
 log = logging.getLogger(__name__)
+_CERTIFIED = ("events", "crc32", "overflows", "glitches", "late")
+_OBSERVED = (
+    "release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"
+)  # fmt: skip
+"""Columns of a drop's certificate, before and after what the host adds."""
 
 
 class Session(Reader):
@@ -121,18 +126,15 @@ class Session(Reader):
         """
         place = Path(os.path.realpath(path))
         check_place(place)
-        lock = None if readonly else WriterLock(place)
-        try:
-            connection = connect(place, readonly=readonly)
-            try:
-                return cls(place, connection, lock)
-            except BaseException:
-                connection.close()
-                raise
-        except BaseException:
+        with ExitStack() as undo:
+            lock = None if readonly else WriterLock(place)
             if lock is not None:
-                lock.release()
-            raise
+                undo.callback(lock.release)
+            connection = connect(place, readonly=readonly)
+            undo.callback(connection.close)
+            session = cls(place, connection, lock)
+            undo.pop_all()
+        return session
 
     # ------------------------------------------------------------------ life
 
@@ -310,32 +312,13 @@ class Session(Reader):
         journal = self._writable()
         self._last_drop += 1
         number = self._last_drop
-        certificate = drop.certificate
-        fields = (
-            (None,) * 5
-            if certificate is None
-            else (
-                certificate.events,
-                certificate.crc32,
-                certificate.overflows,
-                certificate.glitches,
-                certificate.late,
-            )
-        )
         head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
-        faults = write_reasons(drop.faults)
-        tail = (
-            (None,) * 6
-            if certificate is None
-            else (
-                certificate.release_sense,
-                certificate.pulse_ticks,
-                certificate.pulse_end,
-                certificate.restarts,
-                certificate.supply_mv,
-                certificate.lowest_mv,
-            )
+        # Of a drop without a certificate all of them are NULL.
+        fields, tail = (
+            tuple(getattr(drop.certificate, name, None) for name in names)
+            for names in (_CERTIFIED, _OBSERVED)
         )
+        faults = write_reasons(drop.faults)
         journal.add(
             Statement(
                 'INSERT INTO "drop" VALUES '

@@ -46,4 +46,4 @@ def test_requests_are_numbered():
     dialogue = ClientProtocol()
     asked = [dialogue.ask("wait", {"seconds": n}) for n in (1, 2)]
     assert [number for number, _ in asked] == [1, 2]
-    assert [rpc.read_request(line).id for _, line in asked] == [1, 2]
+    assert [rpc.read_line(line).id for _, line in asked] == [1, 2]
