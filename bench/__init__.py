@@ -1,1 +1,1 @@
-"""What proves the software itself: real processes killed and flooded. ``./run bench`` runs it."""
+"""What proves the software itself: its results against the truth, its processes against kills."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 INTERRUPTED = 130
+_SCENE = "protocols/inclined-uniform.yaml"
 BOARDS = ["sim", "emu", "bought"]
 
 
@@ -45,9 +46,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="at each incline",
     )
-    agreement.add_argument(
-        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
-    )
+    agreement.add_argument("--protocol", default=_SCENE, metavar="FILE", help="the scene")
     agreement.add_argument("-o", "--output", metavar="DIR", help="folder for a page of the same")
 
     clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
@@ -107,13 +106,114 @@ def _parser() -> argparse.ArgumentParser:
     stop.add_argument("--stops", type=_count, default=50, metavar="N", help="in each condition")
 
     tui = benches.add_parser("tui", help="what the screen costs, and how late it is")
-    tui.add_argument(
-        "--protocol", default="protocols/inclined-uniform.yaml", metavar="FILE", help="the scene"
-    )
+    tui.add_argument("--protocol", default=_SCENE, metavar="FILE", help="the scene")
     tui.add_argument("-o", dest="output", metavar="DIR", help="write a table there")
-    for one in (agreement, clock, faults, hostile, link, mutation, soak, states, stop, tui):
-        one.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    _studies(benches)
+    for bench in benches.choices.values():
+        bench.add_argument("--json", action="store_true", help="print JSON instead of a table")
     return parser
+
+
+def _studies(benches: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Benches of simulated falls and what is made of them."""
+
+    def study(name: str, text: str, folder: str, *, needed: bool = True) -> argparse.ArgumentParser:
+        bench = benches.add_parser(name, help=text)
+        bench.add_argument("-o", "--output", required=needed, metavar="DIR", help=folder)
+        return bench
+
+    def scene(bench: argparse.ArgumentParser) -> None:
+        bench.add_argument(
+            "--protocol",
+            default="protocols/inclined-uniform.yaml",
+            metavar="FILE",
+            help="the scene",
+        )
+        bench.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
+
+    accuracy = study(
+        "accuracy", "errors of Δz, V and skew, coverage, matches", "folder for a page of the same",
+        needed=False,
+    )  # fmt: skip
+    scene(accuracy)
+    accuracy.add_argument("--seeds", type=_count, metavar="N", help="sessions to simulate")
+    accuracy.add_argument(
+        "--repeats", type=_count, metavar="N", help="drops at each incline, not the protocol's"
+    )
+    accuracy.add_argument(
+        "--doubled", action="store_true",
+        help="many short sessions, also with each dial of the simulation doubled",
+    )  # fmt: skip
+    accuracy.add_argument("--jobs", type=_count, metavar="N", help="cases at a time")
+    every = study(
+        "estimators", "error against run time from edges to Δz and V",
+        "folder for page, CSV, JSON and picture",
+    )  # fmt: skip
+    scene(every)
+    every.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
+    every.add_argument(
+        "--repeats", type=_count, default=4, metavar="N", help="drops at each incline (default 4)"
+    )
+    every.add_argument(
+        "--budget", type=_count, default=120, metavar="S",
+        help="seconds that one Monte Carlo setting may take (default 120)",
+    )  # fmt: skip
+    coverage = study(
+        "coverage", "how often intervals hold, in both worlds", "folder for page, CSV and JSON"
+    )
+    coverage.add_argument("--rigs", type=_count, metavar="N", help="of each case")
+    coverage.add_argument("--jobs", type=_count, metavar="N", help="processes at a time")
+    resolved = study(
+        "resolved",
+        "sessions whose chains fall by no model",
+        "folder for page, CSV, JSON and picture",
+    )
+    resolved.add_argument("--drops", type=_count, metavar="N", help="at each incline (default 4)")
+    resolved.add_argument(
+        "--film", type=float, metavar="DEG", help="draw one fall at this incline instead"
+    )
+    resolved.add_argument(
+        "--work", action="store_true", help="error against run time of that world itself instead"
+    )
+    resolved.add_argument(
+        "--published", action="store_true", help="chains of other experiments in that world instead"
+    )
+    for bench in (coverage, resolved):
+        bench.add_argument(
+            "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
+        )
+        bench.add_argument("--only", metavar="TEXT", help="cases with this in their names")
+    layouts = study(
+        "layouts", "which layouts of gates let drops be read", "folder for CSV, JSON, page and map"
+    )
+    layouts.add_argument(
+        "--drops", type=_count, metavar="N", help="on each layout with each disturbance"
+    )
+    layouts.add_argument(
+        "--more", action="store_true", help="add to what is in that folder, each drop on a new rig"
+    )
+    diagnoses = study(
+        "diagnoses", "which faults of a rig are named rightly", "folder for table, page and JSON"
+    )
+    diagnoses.add_argument(
+        "--drops", type=_count, metavar="N", help="with each fault of each size on each layout"
+    )
+    diagnoses.add_argument("--clean", type=int, metavar="N", help="on each layout without a fault")
+    for bench in (layouts, diagnoses):
+        bench.add_argument("--only", metavar="TEXT", help='layouts such as "10 rods: 2 + 2"')
+        bench.add_argument("--jobs", type=_count, metavar="N", help="layouts at a time")
+    foretold = study(
+        "foretold", "what rig design foretells, and what comes of it",
+        "folder for page, CSV and JSON",
+    )  # fmt: skip
+    foretold.add_argument(
+        "--repeats", type=_count, default=4, metavar="N", help="drops at each incline (default 4)"
+    )
+    foretold.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
+    foretold.add_argument("--only", metavar="TEXT", help="protocols with this in their names")
+    bulk = benches.add_parser("bulk", help="one fall, batches, a C loop and a solver, in ratios")
+    bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="in a batch")
+    bulk.add_argument("--rounds", type=_count, default=15, metavar="N", help="of measurement")
 
 
 def _count(text: str) -> int:
@@ -121,6 +221,12 @@ def _count(text: str) -> int:
     if number < 1:
         raise ValueError(text)
     return number
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**63:
+        raise ValueError(text)
+    return int(text)
 
 
 if __name__ == "__main__":

@@ -385,112 +385,36 @@ def _parser() -> Parser:
     completion = command("completion", "print what a shell reads to complete what is typed")
     completion.add_argument("shell", choices=("bash", "zsh", "fish"), help="which shell")
 
-    bench = command("bench", "measure accuracy against hidden truth, and speed as ratios")
-    _benches(bench)
+    bench = command("bench", "error against run time, extremes, and what scenes cost")
+    benches = bench.add_subparsers(required=True, metavar="BENCH")
+    stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
+    stability.set_defaults(module="bench_stability")
+    stability.add_argument("-o", "--output", metavar="DIR", help="folder for page, CSV and JSON")
+    _json(stability)
+    precision = benches.add_parser("precision", help="error against run time of every method")
+    precision.set_defaults(module="bench_precision")
+    precision.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="DIR",
+        help="folder for page, CSV, JSON and pictures",
+    )
+    precision.add_argument("--quick", action="store_true", help="a small subset, in seconds")
+    _json(precision)
+    scenes = benches.add_parser("scenes", help="what each scene loads, takes and evaluates")
+    scenes.set_defaults(module="bench_scenes")
+    scenes.add_argument(
+        "--protocols", default="protocols", metavar="DIR", help="ready protocols to be measured too"
+    )
+    scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
+    scenes.add_argument(
+        "-o", "--output", metavar="DIR", help="folder for page, CSV, JSON and picture"
+    )
+    _json(scenes)
     codes = "0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted"
     parser.epilog = f"{overview(texts)}\n\nExit codes: {codes}."
     return parser
-
-
-def _benches(bench: argparse.ArgumentParser) -> None:
-    """Add the studies: each has a module, a folder for its files if it writes any, and JSON."""
-    benches = bench.add_subparsers(required=True, metavar="BENCH")
-
-    def study(
-        name: str, text: str, files: str = "", *, must: bool = True, only: str = "", **counts: str
-    ) -> argparse.ArgumentParser:
-        added = benches.add_parser(name, help=text)
-        added.set_defaults(module=f"bench_{name}")
-        if files:
-            words = f"folder for {files}"
-            added.add_argument("-o", "--output", required=must, metavar="DIR", help=words)
-        for option, meaning in counts.items():
-            added.add_argument(f"--{option}", type=_count, metavar="N", help=meaning)
-        if only:
-            added.add_argument("--only", metavar="TEXT", help=only)
-        _json(added)
-        return added
-
-    def simulated(added: argparse.ArgumentParser) -> None:
-        scene = "protocols/inclined-uniform.yaml"
-        added.add_argument("--protocol", default=scene, metavar="FILE", help="the scene")
-        added.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
-
-    def over_protocols(added: argparse.ArgumentParser) -> None:
-        folder = "where the ready protocols are"
-        added.add_argument("--protocols", default="protocols", metavar="DIR", help=folder)
-
-    def drawn(added: argparse.ArgumentParser) -> None:
-        each = "drops at each incline (default 4)"
-        added.add_argument("--repeats", type=_count, default=4, metavar="N", help=each)
-        added.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
-
-    accuracy = study(
-        "accuracy", "errors of Δz, V and skew, coverage, matches", "a page of the same", must=False,
-        seeds="sessions to simulate", repeats="drops at each incline, not the protocol's",
-        jobs="cases at a time",
-    )  # fmt: skip
-    simulated(accuracy)
-    wide = "many short sessions, also with each dial of the simulation doubled"
-    accuracy.add_argument("--doubled", action="store_true", help=wide)
-    study(
-        "stability", "the model at the ends of what can be asked", "page, CSV and JSON", must=False
-    )
-    precision = study(
-        "precision", "error against run time of every method", "page, CSV, JSON and pictures"
-    )
-    precision.add_argument("--quick", action="store_true", help="a small subset, in seconds")
-    costs = "what each scene loads, takes and evaluates"
-    scenes = study("scenes", costs, "page, CSV, JSON and picture", must=False)
-    over_protocols(scenes)
-    scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
-    against_time = "error against run time from edges to Δz and V"
-    estimators = study("estimators", against_time, "page, CSV, JSON and picture")
-    simulated(estimators)
-    drawn(estimators)
-    longest = "seconds that one Monte Carlo setting may take (default 120)"
-    estimators.add_argument("--budget", type=_count, default=120, metavar="S", help=longest)
-    coverage = study(
-        "coverage", "how often intervals hold, in both worlds", "page, CSV and JSON",
-        rigs="of each case", jobs="processes at a time", only="cases with this in their names",
-    )  # fmt: skip
-    over_protocols(coverage)
-    resolved = study(
-        "resolved", "sessions whose chains fall by no model", "page, CSV, JSON and picture",
-        drops="at each incline (default 4)", only="cases with this in their names",
-    )  # fmt: skip
-    over_protocols(resolved)
-    before = "set what an earlier one left in this folder beside it"
-    resolved.add_argument("--before", metavar="DIR", help=before)
-    film = "draw one fall at this incline instead"
-    resolved.add_argument("--film", type=float, metavar="DEG", help=film)
-    for name, instead in {
-        "work": "error against run time of that world itself instead",
-        "published": "chains of other experiments in that world instead",
-    }.items():
-        resolved.add_argument(f"--{name}", action="store_true", help=instead)
-    layouts = study(
-        "layouts", "which layouts of gates let drops be read", "CSV, JSON, page and map",
-        drops="on each layout with each disturbance", jobs="layouts at a time",
-        only="layouts with this in their names, such as '25 rods: 2 + 2'",
-    )  # fmt: skip
-    more = "add to what is in that folder, each drop on a new rig"
-    layouts.add_argument("--more", action="store_true", help=more)
-    diagnoses = study(
-        "diagnoses", "which faults of a rig are named rightly", "table, page and JSON",
-        drops="with each fault of each size on each layout", jobs="layouts at a time",
-        only='layouts such as "10 rods: 2 + 2"',
-    )  # fmt: skip
-    diagnoses.add_argument("--clean", type=int, metavar="N", help="on each layout without a fault")
-    drawn(
-        study(
-            "foretold", "what rig design foretells, and what comes of it", "page, CSV and JSON",
-            only="protocols with this in their names",
-        )
-    )  # fmt: skip
-    bulk = study("bulk", "one fall, batches, a C loop and a solver, in ratios")
-    bulk.add_argument("--falls", type=_count, default=100_000, metavar="N", help="falls in a batch")
-    bulk.add_argument("--rounds", type=_count, default=15, metavar="N", help="of measurement")
 
 
 def _tui(tui: argparse.ArgumentParser) -> None:

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 _GUESSED = frozenset({"side", "contact"})
 """Lines of the budget of a guessed size that no number of drops tells."""
-_WIDER = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
-"""What is guessed counts for as much as its expanded uncertainty says."""
 
 
 class Supposed(NamedTuple):
@@ -111,8 +109,10 @@ def deviation_among(joint: JointFit, drop: JointDrop, gradient: Array, degrees: 
     """
     known, absent = supposed(drop.model)
     groups = drop.model.unknowns.groups
+    # What is guessed counts for as much as its expanded uncertainty says.
+    wider = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
     for block in (block for name in _GUESSED & groups.keys() for block in groups[name]):
-        absent[block] = 1.0 - _WIDER
+        absent[block] = 1.0 - wider
     true = np.where(known, 0.0, gradient)
     mine, here, size = drop.own, drop.here, len(joint.shared)
     told = gradient[mine] - true[mine]

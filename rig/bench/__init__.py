@@ -1,1 +1,1 @@
-"""Benchmarks: accuracy against hidden truth, and speed as ratios."""
+"""Studies: error against run time, extremes, and what scenes cost."""

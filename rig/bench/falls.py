@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass
 from subprocess import PIPE, Popen
 from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import quote
 
 import numpy as np
 
@@ -86,3 +87,8 @@ def time_scale(seed: int) -> TimeScale:
     """Calibrate a rig's clock: it is off by chance, as far as it says."""
     known = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
     return TimeScale(float(known), CLOCK_U)
+
+
+def with_setting(url: str, name: str, value: str) -> str:
+    """Add a setting to a port's URL."""
+    return f"{url}{'&' if '?' in url else '?'}{name}={quote(value)}"

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.bench.falls import Asked, falls
-from rig.bench.fast_accuracy import with_setting
+from rig.bench.falls import Asked, falls, with_setting
 from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
 

@@ -150,7 +150,7 @@ def _fall(
     arrival = speed
     gains = kicks(chain, [alpha] * chain.rods, gamma)
     twice_g = 2.0 * gravity
-    # `_leg` written out: calling it takes longer than its arithmetic (see ``rig bench bulk``).
+    # `_leg` written out: calling it takes longer than its arithmetic (see ``./run bench bulk``).
     try:
         for height, gain in zip(chain.heights, gains, strict=True):
             distance = height - before

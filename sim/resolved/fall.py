@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from sim.resolved.scene import Chain, Numbers
 
 STEP = 1e-5
-"""s; ``rig bench resolved --work`` shows the error that this leaves and what smaller ones cost."""
+"""s; ``./run bench resolved --work`` shows the error that this leaves and what smaller steps
+cost."""
 AFTER = 15e-3
 """How long a fall goes on after the top rod struck, s."""
 _ROOM = 100  # frames on a set of pages

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from rig.bench.layout_catalogue import FENCE, KINDS, SINGLE, STANDARD, GateLayout, under
+from bench.studies.layout_catalogue import FENCE, KINDS, SINGLE, STANDARD, GateLayout, under
 from rig.protocol.reader import parse
 
 _MOST = 8

@@ -8,14 +8,14 @@ from itertools import combinations
 
 import pytest
 
+from bench.studies.diagnoses import judged
+from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
+from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis import explanations
 from rig.analysis.diagnoses import diagnose
 from rig.analysis.drop import fit_drop
 from rig.analysis.faults import faults, upside_down
 from rig.analysis.result import GOOD
-from rig.bench.diagnoses import judged
-from rig.bench.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
-from rig.bench.wrong_rigs import WRONG_RIGS
 from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Drag, Protocol

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from bench.studies.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.equations import STRAY, linearize
 from rig.analysis.evidence import STATED_WEIGHT
@@ -15,7 +16,6 @@ from rig.analysis.joint_fit import FEWEST
 from rig.analysis.quantities import measurands
 from rig.analysis.refine import Budgets
 from rig.analysis.session import analyze
-from rig.bench.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.model.chain import Chain
 from rig.model.impact import impact_on
 from rig.protocol.plan import runs as planned_runs

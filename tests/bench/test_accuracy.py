@@ -7,10 +7,10 @@ from dataclasses import asdict
 
 import pytest
 
-from rig.bench.accuracy import Errors
-from rig.bench.baselines import plain_fit, two_gate_timer
-from rig.bench.falls import Asked, falls
-from rig.bench.fast_accuracy import (
+from bench.accuracy import acceptance_table, failures
+from bench.studies.accuracy import Errors
+from bench.studies.baselines import plain_fit, two_gate_timer
+from bench.studies.fast_accuracy import (
     DOUBLED,
     STACK,
     blocks,
@@ -18,7 +18,7 @@ from rig.bench.fast_accuracy import (
     fast_accuracy,
     with_setting,
 )
-from rig.commands.bench_accuracy import acceptance_table, failures
+from rig.bench.falls import Asked, falls
 from rig.errors import RigError
 from rig.ports import read_settings
 from rig.protocol.plan import runs

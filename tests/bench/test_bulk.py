@@ -13,8 +13,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from rig.bench import bulk as bench
-from rig.cli import main
+from bench.__main__ import main
+from bench.studies import bulk as bench
 from rig.errors import RigError
 from rig.model.fall import fall
 
@@ -130,7 +130,7 @@ def test_without_a_compiler_the_loop_is_left_out_and_that_is_said(monkeypatch):
 def test_in_ci_a_missing_compiler_is_an_error(monkeypatch, capsys):
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.setenv("CI", "true")
-    assert main(["bench", "bulk", "--falls", "5", "--rounds", "1"]) == 1
+    assert main(["bulk", "--falls", "5", "--rounds", "1"]) == 1
     out, err = capsys.readouterr()
     assert not out
     assert "no C compiler" in err
@@ -145,9 +145,9 @@ def test_a_compiler_that_fails_is_an_error(monkeypatch, tmp_path):
 def test_the_command_prints_json_or_a_table(monkeypatch, capsys):
     no_mpmath(monkeypatch)
     monkeypatch.delenv("CI", raising=False)
-    assert main(["bench", "bulk", "--falls", "5", "--rounds", "1", "--json"]) == 0
+    assert main(["bulk", "--falls", "5", "--rounds", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["falls"] == 5
-    assert main(["bench", "bulk", "--falls", "5", "--rounds", "1"]) == 0
+    assert main(["bulk", "--falls", "5", "--rounds", "1"]) == 0
     table = capsys.readouterr().out
     assert table.startswith("25 rods, batches of 5 falls")
     assert "one fall over 25 square roots" in table

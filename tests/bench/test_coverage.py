@@ -7,11 +7,11 @@ import json
 
 import pytest
 
+from bench import coverage as bench_coverage
+from bench.__main__ import main
+from bench.studies.coverage import CASES, FULL, GRADED, MISFITS, STEEP, Held, held, merged, sessions
 from rig.analysis.result import Measured
-from rig.bench.coverage import CASES, FULL, GRADED, MISFITS, STEEP, Held, held, merged, sessions
-from rig.bench.fast_accuracy import with_setting
-from rig.cli import main
-from rig.commands import bench_coverage
+from rig.bench.falls import with_setting
 from rig.ports import read_settings
 from rig.protocol import reader
 from rig.protocol.plan import runs
@@ -91,7 +91,7 @@ def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, graded
     monkeypatch.setattr(bench_coverage, "ProcessPoolExecutor", Here)
     monkeypatch.setattr(bench_coverage, "held", lambda *_: graded)
     monkeypatch.setattr(bench_coverage, "misfits", lambda *_: iter([("clock -0.3 %", graded)]))
-    assert main(["bench", "coverage", "-o", str(tmp_path), "--rigs", "9"]) == 0
+    assert main(["coverage", "-o", str(tmp_path), "--rigs", "9"]) == 0
     said = capsys.readouterr().out
     assert "SIMULATED DATA" in said
     assert "clock -0.3 %" in said
@@ -105,5 +105,5 @@ def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, graded
 
 
 def test_a_case_that_is_none_is_named(tmp_path, capsys):
-    assert main(["bench", "coverage", "-o", str(tmp_path), "--only", "steel"]) == 2
+    assert main(["coverage", "-o", str(tmp_path), "--only", "steel"]) == 2
     assert "there are model; resolved, damped strings; " in capsys.readouterr().err

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from rig.bench.diagnoses import LAYOUTS, NONE, OUTCOMES, judged
-from rig.bench.wrong_rigs import WRONG_RIGS
-from rig.cli import main
+from bench.__main__ import main
+from bench.studies.diagnoses import LAYOUTS, NONE, OUTCOMES, judged
+from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.protocol.reader import parse
 from rig.reasons import make_reason
 from sim.dials import Dials
@@ -53,7 +53,7 @@ def test_where_nothing_is_wrong_any_name_is_wrong():
 
 
 def test_the_bench_keeps_table_and_page(tmp_path, capsys):
-    arguments = ["bench", "diagnoses", "-o", str(tmp_path), "--only", "fence", "--drops", "1"]
+    arguments = ["diagnoses", "-o", str(tmp_path), "--only", "fence", "--drops", "1"]
     assert main([*arguments, "--clean", "5", "--jobs", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["diagnoses"]
     assert all(sum(one[name] for name in OUTCOMES) in (1, 5) for one in found)

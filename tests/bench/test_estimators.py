@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.__main__ import main
+from bench.studies.baselines import TimerReading, line_fit
+from bench.studies.estimators import mean_of_draws
 from rig.analysis.drop import fit_drop
 from rig.analysis.quantities import quantities
-from rig.bench.baselines import TimerReading, line_fit
-from rig.bench.estimators import mean_of_draws
-from rig.cli import main
 from rig.protocol.protocol import Priors
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
@@ -55,10 +55,10 @@ def test_draws_have_the_mean_of_the_adjustment():
 
 
 def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("rig.bench.estimators.TRIALS", (10, 10**6))  # the ends only
+    monkeypatch.setattr("bench.studies.estimators.TRIALS", (10, 10**6))  # the ends only
     protocol = tmp_path / "p.yaml"
     protocol.write_text(short("40 deg", 4), "utf-8")
-    arguments = ["bench", "estimators", "-o", str(tmp_path / "o"), "--protocol", str(protocol)]
+    arguments = ["estimators", "-o", str(tmp_path / "o"), "--protocol", str(protocol)]
     assert main([*arguments, "--repeats", "4", "--budget", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     names = [one["name"] for one in found["estimators"]]
@@ -75,6 +75,6 @@ def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
 
 
 def test_only_a_simulation_has_a_truth(tmp_path, capsys):
-    arguments = ["bench", "estimators", "-o", str(tmp_path / "o"), "--port", "/dev/ttyACM0"]
+    arguments = ["estimators", "-o", str(tmp_path / "o"), "--port", "/dev/ttyACM0"]
     assert main(arguments) == 2
     assert "no simulation" in capsys.readouterr().err

@@ -6,11 +6,11 @@ import json
 
 import pytest
 
-from rig.cli import main
+from bench.__main__ import main
 
 
 def test_a_session_states_what_was_foretold_of_its_layout(tmp_path, capsys):
-    words = ["bench", "foretold", "--only", "single", "-o", str(tmp_path), "--json"]
+    words = ["foretold", "--only", "single", "-o", str(tmp_path), "--json"]
     assert main(words) == 0
     found = json.loads(capsys.readouterr().out)["foretold"]
     assert {one["quantity"] for one in found} >= {"speed_m_s", "restitution"}

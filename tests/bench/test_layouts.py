@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.__main__ import main
+from bench.studies.layout_catalogue import LAYOUTS, STANDARD
+from bench.studies.layouts import DISTURBANCES, Cell, as_json
 from rig.bench.falls import SimulatedDrop
-from rig.bench.layout_catalogue import LAYOUTS, STANDARD
-from rig.bench.layouts import DISTURBANCES, Cell, as_json
-from rig.cli import main
 from rig.protocol.measurable import unmeasurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
@@ -99,7 +99,7 @@ def test_a_drop_that_truly_is_beyond_the_limits_does_not_count():
 
 
 def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
-    arguments = ["bench", "layouts", "-o", str(tmp_path), "--only", "3 rods: 2 + 2"]
+    arguments = ["layouts", "-o", str(tmp_path), "--only", "3 rods: 2 + 2"]
     assert main([*arguments, "--drops", "1", "--jobs", "1", "--json"]) == 0
     one = json.loads(capsys.readouterr().out)
     assert main([*arguments, "--drops", "1", "--more", "--jobs", "1", "--json"]) == 0
@@ -128,11 +128,11 @@ def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
 def test_what_is_no_result_of_this_bench_cannot_be_added_to(tmp_path, capsys, text):
     if text is not None:
         (tmp_path / "layouts.json").write_text(text)
-    assert main(["bench", "layouts", "-o", str(tmp_path), "--more"]) == 2
+    assert main(["layouts", "-o", str(tmp_path), "--more"]) == 2
     why = "No such file or directory" if text is None else "it is not what this bench leaves"
     assert f"cannot add to {tmp_path / 'layouts.json'}: {why}\n" in capsys.readouterr().err
 
 
 def test_an_unknown_layout_is_told_with_those_there_are(tmp_path, capsys):
-    assert main(["bench", "layouts", "-o", str(tmp_path), "--only", "17 gates"]) == 2
+    assert main(["layouts", "-o", str(tmp_path), "--only", "17 gates"]) == 2
     assert "25 rods: 1 + 1" in capsys.readouterr().err

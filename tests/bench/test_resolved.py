@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import pytest
 
+from bench import resolved as bench_resolved
+from bench.__main__ import main
+from bench.studies.resolved import CASES, JudgedDrop, as_json, summary
+from rig import cli
 from rig.bench import resolved_paper
-from rig.bench.resolved import CASES, JudgedDrop, as_json, summary
-from rig.bench.resolved_before import beside, read_before
 from rig.bench.resolved_paper import Ensemble
-from rig.cli import main
-from rig.commands import bench_resolved
 from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 
@@ -67,7 +67,7 @@ def test_the_command_leaves_page_table_and_picture(tmp_path, monkeypatch, capsys
     still = replace(CASES[0], settings={"swing_sd": "0 m/s"})
     monkeypatch.setattr(bench_resolved, "CASES", (still,))
     out = tmp_path / "out"
-    words = ["bench", "resolved", "-o", out, "--protocols", tmp_path, "--only", "damped"]
+    words = ["resolved", "-o", out, "--protocols", tmp_path, "--only", "damped"]
     assert main([str(word) for word in words]) == 0
     assert "SIMULATED DATA" in capsys.readouterr().out
     whole = json.loads((out / "resolved.json").read_text())
@@ -78,35 +78,10 @@ def test_the_command_leaves_page_table_and_picture(tmp_path, monkeypatch, capsys
     assert all(float(row["true separation_strike_m"]) > 0 for row in rows)
     ET.fromstring((out / "resolved.svg").read_text())
     assert "resolved.svg" in (out / "resolved.md").read_text()
-    kept = read_before(out / "resolved.csv")
-    wanted = whole["cases"][0]
-    for name, one in summary(kept)["quantities"].items():
-        for figure in ("n", "rms", "bias", "coverage"):
-            assert one[figure] == pytest.approx(wanted["quantities"][name][figure], rel=1e-12)
-    assert "2 of 2 drops are the same falls" in beside(kept, kept)[0]
-
-
-def test_before_and_now_stand_side_by_side():
-    before = [VOID, replace(GOOD, run=1), replace(GOOD, run=3, case="air")]
-    now = [replace(GOOD, run=2), replace(GOOD, run=1, truth=GOOD.truth | {"separation_m": 0.1})]
-    said, _, _, row = beside(before, now)
-    assert said.endswith("1 of 2 drops are the same falls:")
-    assert row.split()[:8] == ["damped", "strings", "2", "→", "2", "50%", "→", "0%"]
-    assert "– → 1.00" in beside([VOID], now)[3]
-
-
-@pytest.mark.parametrize("text", [None, "case,run\ndamped strings,1\n"])
-def test_what_is_no_table_of_sessions_is_named(text, tmp_path, capsys):
-    if text is not None:
-        (tmp_path / "resolved.csv").write_text(text)
-    words = ["bench", "resolved", "-o", str(tmp_path / "out"), "--before", str(tmp_path)]
-    assert main(words) == 2
-    assert "resolved.csv" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_case_that_is_none_is_named(tmp_path, capsys):
-    assert main(["bench", "resolved", "-o", str(tmp_path), "--only", "steel"]) == 2
+    assert main(["resolved", "-o", str(tmp_path), "--only", "steel"]) == 2
     assert "lively strings" in capsys.readouterr().err
     assert len({one.name for one in CASES}) == len(CASES)
 
@@ -140,19 +115,19 @@ def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
     monkeypatch.setattr(resolved_paper, "uniform", lambda: some)
     monkeypatch.setattr(resolved_paper, "graded", lambda variants: some[4:5])
     target = tmp_path / "figure.svg"
-    assert main(["predict", "--figure", str(number), "--resolved", "-o", str(target)]) == 0
+    assert cli.main(["predict", "--figure", str(number), "--resolved", "-o", str(target)]) == 0
     assert "resolved" not in target.with_suffix(".csv").read_text()
     with (tmp_path / "figure-resolved.csv").open(newline="") as table:
         rows = list(csv.DictReader(table))
     assert len(rows) == (9 if number == 3 else 18)
     plain = tmp_path / "plain.svg"
-    assert main(["predict", "--figure", str(number), "-o", str(plain)]) == 0
+    assert cli.main(["predict", "--figure", str(number), "-o", str(plain)]) == 0
     assert target.read_text() != plain.read_text()
 
 
 def test_a_figure_without_falls_says_so(tmp_path, capsys):
     target = str(tmp_path / "figure.svg")
-    assert main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
+    assert cli.main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
     assert "figures 3 and 4" in capsys.readouterr().err
 
 
@@ -171,7 +146,7 @@ WORK = [
 
 def test_error_against_run_time_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(bench_resolved, "work", lambda: WORK)
-    assert main(["bench", "resolved", "--work", "-o", str(tmp_path)]) == 0
+    assert main(["resolved", "--work", "-o", str(tmp_path)]) == 0
     assert "0.0200" in capsys.readouterr().out
     with (tmp_path / "resolved-work.csv").open(newline="") as table:
         errors = [row["rms_m"] for row in csv.DictReader(table)]
@@ -185,7 +160,7 @@ def test_what_others_published_is_kept_and_printed(tmp_path, monkeypatch, capsys
         {"what": "T/T_ff", "of": "20 rods", "mean": 0.926, "sd": None, "n": 1},
     ]
     monkeypatch.setattr(bench_resolved, "published", lambda: lines)
-    assert main(["bench", "resolved", "--published", "-o", str(tmp_path)]) == 0
+    assert main(["resolved", "--published", "-o", str(tmp_path)]) == 0
     assert "0.9260" in capsys.readouterr().out
     with (tmp_path / "resolved-published.csv").open(newline="") as table:
         assert [row["sd"] for row in csv.DictReader(table)] == ["0.005", ""]
@@ -193,5 +168,5 @@ def test_what_others_published_is_kept_and_printed(tmp_path, monkeypatch, capsys
 
 def test_a_fall_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: FILM)
-    assert main(["bench", "resolved", "--film", "40", "-o", str(tmp_path)]) == 0
+    assert main(["resolved", "--film", "40", "-o", str(tmp_path)]) == 0
     assert (tmp_path / "resolved-fall.svg").read_text() == film_figure(FILM)

@@ -139,11 +139,6 @@ def test_a_port_that_cannot_be_opened_is_device_trouble(
         ("replay", "s", "--json"),
         ("bench",),
         ("bench", "no-such-benchmark"),
-        ("bench", "accuracy", "--seeds", "0"),
-        ("bench", "accuracy", "--seeds", "few"),
-        ("bench", "accuracy", "--seeds", "1", "--port", "/dev/null"),
-        ("bench", "accuracy", "--seeds", "1", "--protocol", "no/such/file"),
-        ("bench", "accuracy", "--seeds", "1", "--protocol", str(PROTOCOLS / "bead-chain.yaml")),
     ],
 )
 def test_bad_arguments_are_refused(call, arguments):
@@ -262,7 +257,6 @@ def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port
         ("daemon", "--port", port, "--socket", socket),
         ("selftest", "--port", port),
         ("doctor", "--port", port),
-        ("bench", "accuracy", "--port", port),
     ):
         done = call(*arguments)
         assert_told(done)

@@ -1,12 +1,12 @@
-"""``rig bench estimators``."""
+"""``./run bench estimators``."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.estimators import as_json, estimators
-from rig.bench.figures import estimators_figure
+from bench.studies.estimators import as_json, estimators
+from bench.studies.figures import estimators_figure
 from rig.commands.output import leave_study, say
 from rig.files import make_folder
 from rig.report.columns import Column, aligned

@@ -1,4 +1,4 @@
-"""``rig bench layouts``."""
+"""``./run bench layouts``."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import layouts_figure
-from rig.bench.layout_catalogue import LAYOUTS, chosen
-from rig.bench.layouts import DISTURBANCES, DROPS, Cell, as_json, study
+from bench.studies.figures import layouts_figure
+from bench.studies.layout_catalogue import LAYOUTS, chosen
+from bench.studies.layouts import DISTURBANCES, DROPS, Cell, as_json, study
 from rig.commands.output import leave_study, say
 from rig.errors import InputError
 from rig.files import make_folder
@@ -57,7 +57,7 @@ def _found_before(file: Path) -> list[Cell]:
         why = error.strerror if isinstance(error, OSError) else "it is not what this bench leaves"
         raise InputError(
             f"cannot add to {file}: {why}",
-            "leave --more out to begin anew; rig bench layouts writes this file there",
+            "leave --more out to begin anew; ./run bench layouts writes this file there",
         ) from error
 
 

@@ -11,11 +11,10 @@ from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
+from bench.studies.accuracy import AccuracyTally
 from rig.analysis.session import analyze
-from rig.bench.accuracy import AccuracyTally
-from rig.bench.falls import Asked, falls, time_scale
+from rig.bench.falls import Asked, falls, time_scale, with_setting
 from rig.protocol import reader
 from rig.protocol.plan import runs
 
@@ -66,7 +65,7 @@ def fast_accuracy(protocol: str, url: str, rigs: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        As `rig.bench.accuracy.AccuracyTally.json` gives it.
+        As `bench.studies.accuracy.AccuracyTally.json` gives it.
 
     Raises
     ------
@@ -116,8 +115,3 @@ def _session(
 def doubled(url: str, dial: str) -> str:
     """Set one dial in a port's URL."""
     return with_setting(url, dial, DOUBLED[dial])
-
-
-def with_setting(url: str, name: str, value: str) -> str:
-    """Add a setting to a port's URL."""
-    return f"{url}{'&' if '?' in url else '?'}{name}={quote(value)}"

@@ -1,4 +1,4 @@
-"""``rig bench accuracy``."""
+"""``./run bench accuracy``."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.accuracy import accuracy
-from rig.bench.fast_accuracy import BLOCK, DOUBLED, STACK, doubled, fast_accuracy
+from bench.studies.accuracy import accuracy
+from bench.studies.fast_accuracy import BLOCK, DOUBLED, STACK, doubled, fast_accuracy
 from rig.commands.output import print_found, say, write_page
 from rig.files import make_folder
 from rig.measurands import MEASURANDS
@@ -136,7 +136,7 @@ def failures(found: Mapping[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     found
-        As `rig.bench.accuracy.AccuracyTally.json` gives it.
+        As `bench.studies.accuracy.AccuracyTally.json` gives it.
     """
     if found["edges_given_to_a_wrong_rod"]:
         yield f"{found['edges_given_to_a_wrong_rod']} edges given to a wrong rod"

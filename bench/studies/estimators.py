@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.studies.accuracy import repeated
+from bench.studies.baselines import TimerReading, line_fit, plain_fit, two_gate_timer
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import joint_fit
 from rig.analysis.monte_carlo import monte_carlo
 from rig.analysis.quantities import COMPUTED, Adjusted, measurands
 from rig.analysis.result import GOOD
-from rig.bench.accuracy import repeated
-from rig.bench.baselines import TimerReading, line_fit, plain_fit, two_gate_timer
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
 from rig.results import detailed, protocol_of
@@ -218,7 +218,7 @@ def mean_of_draws(fit: Fit, draws: int, seed: int, spread: float = 1.0) -> Timer
 def as_json(
     found: list[Estimator], left_out: list[str], times_lstsq: dict[str, float]
 ) -> dict[str, Any]:
-    """As ``rig bench estimators --json`` prints it."""
+    """As ``./run bench estimators --json`` prints it."""
     return {
         "simulated": True,
         "estimators": [asdict(one) for one in found],

@@ -1,4 +1,4 @@
-"""``rig bench diagnoses``."""
+"""``./run bench diagnoses``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import os
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.diagnoses import CLEAN, DROPS, LAYOUTS, OUTCOMES, study
-from rig.bench.layout_catalogue import chosen
+from bench.studies.diagnoses import CLEAN, DROPS, LAYOUTS, OUTCOMES, study
+from bench.studies.layout_catalogue import chosen
 from rig.commands.output import leave_study, say
 from rig.files import make_folder
 from rig.text_table import csv_text, text_table

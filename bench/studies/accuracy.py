@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.studies.baselines import plain_fit, two_gate_timer
 from rig.analysis.result import GOOD
-from rig.bench.baselines import plain_fit, two_gate_timer
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
 from rig.results import detailed, protocol_of

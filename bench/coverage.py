@@ -1,4 +1,4 @@
-"""``rig bench coverage``."""
+"""``./run bench coverage``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from multiprocessing import get_context
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.coverage import CASES, held, merged, misfits
+from bench.studies.coverage import CASES, held, merged, misfits
 from rig.commands.output import leave_study, named, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Mapping
 
-    from rig.bench.coverage import CoverageCase, Held
+    from bench.studies.coverage import CoverageCase, Held
 
     Record = Mapping[str, Any]
 

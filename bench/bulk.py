@@ -1,10 +1,10 @@
-"""``rig bench bulk``."""
+"""``./run bench bulk``."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.bulk import bulk
+from bench.studies.bulk import bulk
 from rig.commands.output import print_found, say
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.accuracy import repeated
 from rig.analysis.components import stated
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
-from rig.bench.accuracy import repeated
 from rig.design.cases import beams_of, cases
 from rig.design.forecast import forecast
 from rig.errors import InputError

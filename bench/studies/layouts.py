@@ -14,11 +14,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.baselines import plain_fit
+from bench.studies.fast_accuracy import DOUBLED, STACK
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import GOOD
-from rig.bench.baselines import plain_fit
-from rig.bench.falls import HZ, STRAY, Asked, falls, time_scale
-from rig.bench.fast_accuracy import DOUBLED, STACK, with_setting
+from rig.bench.falls import HZ, STRAY, Asked, falls, time_scale, with_setting
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -26,9 +26,9 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from bench.studies.layout_catalogue import GateLayout
     from rig.analysis.result import DropResult
     from rig.bench.falls import SimulatedDrop
-    from rig.bench.layout_catalogue import GateLayout
     from rig.protocol.protocol import Protocol, Run
 
 DROPS = 12

@@ -16,14 +16,14 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.accuracy import Errors
+from bench.studies.fast_accuracy import blocks
+from bench.studies.layout_catalogue import STANDARD, GateLayout
+from bench.studies.wrong_rigs import NAMELESS, WRONG_RIGS, WrongRig
 from rig.analysis.gravity import check_gravity
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.session import analyze
-from rig.bench.accuracy import Errors
-from rig.bench.falls import Asked, falls, time_scale
-from rig.bench.fast_accuracy import blocks, with_setting
-from rig.bench.layout_catalogue import STANDARD, GateLayout
-from rig.bench.wrong_rigs import NAMELESS, WRONG_RIGS, WrongRig
+from rig.bench.falls import Asked, falls, time_scale, with_setting
 from rig.clock.calibration import TimeScale
 from rig.estimate.session import estimate
 from rig.protocol import reader

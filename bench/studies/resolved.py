@@ -12,11 +12,10 @@ from pathlib import Path
 from subprocess import PIPE, run
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.accuracy import Errors
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
-from rig.bench.accuracy import Errors
-from rig.bench.falls import Asked, falls, time_scale
-from rig.bench.fast_accuracy import with_setting
+from rig.bench.falls import Asked, falls, time_scale, with_setting
 from rig.errors import RigError
 from rig.films import Film
 from rig.protocol import reader
@@ -162,7 +161,7 @@ def summary(drops: Sequence[JudgedDrop]) -> dict[str, Any]:
     -------
     dict
         ``drops``, ``beyond``, ``void_share`` of those that are not, ``wrong`` drops, ``quantities``
-        (as `rig.bench.accuracy.Errors.json` gives them), and the ``reasons`` of false voids.
+        (as `bench.studies.accuracy.Errors.json` gives them), and the ``reasons`` of false voids.
     """
     fair = [one for one in drops if not one.beyond]
     void = [one for one in fair if one.verdict not in GOOD]

@@ -11,11 +11,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.layout_catalogue import FENCE, KINDS, SINGLE, STANDARD, GateLayout, Kind, under
+from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis.drop import fit_drop
-from rig.bench.falls import Asked, falls, time_scale
-from rig.bench.fast_accuracy import with_setting
-from rig.bench.layout_catalogue import FENCE, KINDS, SINGLE, STANDARD, GateLayout, Kind, under
-from rig.bench.wrong_rigs import WRONG_RIGS
+from rig.bench.falls import Asked, falls, time_scale, with_setting
 from rig.clock.calibration import TimeScale
 from rig.protocol import reader
 from rig.protocol.plan import runs

@@ -1,10 +1,10 @@
-"""``rig bench foretold``."""
+"""``./run bench foretold``."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.bench.foretold import PROTOCOLS, Foretold, foretold
+from bench.studies.foretold import PROTOCOLS, Foretold, foretold
 from rig.commands.output import leave_study, say
 from rig.files import make_folder
 from rig.measurands import MEASURANDS

@@ -1,13 +1,11 @@
-"""``rig bench resolved``."""
+"""``./run bench resolved``."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import resolved_figure, work_figure
-from rig.bench.resolved import CASES, DROPS, as_json, film, published, study, work
-from rig.bench.resolved_before import beside, read_before
+from bench.studies.figures import resolved_figure, work_figure
+from bench.studies.resolved import CASES, DROPS, as_json, film, published, study, work
 from rig.commands.output import leave_study, named, print_found, print_json, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.measurands import told
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Mapping, Sequence
 
-    from rig.bench.resolved import JudgedDrop
+    from bench.studies.resolved import JudgedDrop
 
     Record = Mapping[str, Any]
 
@@ -55,14 +53,12 @@ def main(arguments: Namespace) -> int:
         say(f"{folder / 'resolved-fall.svg'}")
         return 0
     chosen = named(CASES, arguments.only or "")
-    before = arguments.before and read_before(Path(arguments.before) / "resolved.csv")
     folder = make_folder(arguments.output)
     found = study(arguments.protocols, arguments.drops or DROPS, chosen, say)
     whole = as_json(found)
-    lines = ["by case:", *_table(whole["cases"])]
-    lines = [*beside(before, found), "", *lines] if before else lines
+    table = ["by case:", *_table(whole["cases"])]
     leave_study(
-        folder, "resolved", _HEAD, lines, whole, _csv(found), resolved_figure(found),
+        folder, "resolved", _HEAD, table, whole, _csv(found), resolved_figure(found),
         as_json=arguments.json,
     )  # fmt: skip
     return 0

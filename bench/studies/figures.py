@@ -1,0 +1,195 @@
+"""Pictures of what the studies of falls and their analysis found."""
+
+from __future__ import annotations
+
+from itertools import cycle, groupby
+from operator import itemgetter
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.result import GOOD
+from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED
+from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from bench.studies.resolved import JudgedDrop
+
+_ESTIMATOR_PANELS = (("separation_rms_m", 1e3, "rms error of Δz (mm)"),
+           ("speed_rms_m_s", 1e3, "rms error of V (mm/s)"))  # fmt: skip
+_ROW_IN = 0.17
+_LONGEST_LABEL = 24
+"""Characters; more gates than that are only counted."""
+_VOID_DARKEST = 0.2
+"""Share of void drops from which on a layout is drawn as dark as can be."""
+_SHADES = "Oranges"
+_WORLD_ERROR_MM = 0.1
+"""Of Δz, that the resolved world may make before its falls are chaotic."""
+_STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), ("v", INK))
+
+
+def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
+    """Draw them; what takes no processor time is a line across.
+
+    Parameters
+    ----------
+    found
+        ``estimators`` of ``rig bench estimators --json``.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    with canvas((3.2, 3.0), simulated=True) as drawing:
+        for axes, (field, scale, label) in zip(drawing.axes, _ESTIMATOR_PANELS, strict=True):
+            styles = iter(_STYLES)
+            for name, group in groupby(found, key=itemgetter("name")):
+                points = list(group)
+                values = [one[field] * scale for one in points]
+                if points[0]["seconds"] is None:
+                    axes.axhline(values[0], color=MUTED, linestyle=(0, (1, 2)), label=name)
+                    continue
+                marker, color = next(styles)
+                times = [one["seconds"] or 0.0 for one in points]
+                words = f"{name} (M = 10² …)" if points[0]["trials"] else name
+                axes.plot(times, values, marker=marker, color=color, linewidth=0.9, label=words)
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_ylabel(label)
+        drawing.axes[-1].set_xlabel("processor time per run (s)")
+        drawing.axes[0].legend(ncols=2)
+    return drawing.svg
+
+
+def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
+    """Draw the map of layouts: a row each, a column a disturbance, void and wrong side by side.
+
+    Parameters
+    ----------
+    found
+        ``layouts`` of ``rig bench layouts --json``.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    columns = list(dict.fromkeys(one["disturbance"] for one in found))
+    rows = list(dict.fromkeys((one["chain"], one["gates"], one["heights_mm"]) for one in found))
+    # Whether wrong rods were accepted is a matter of some or none.
+    panels = (
+        ("void drops", "void_share", _VOID_DARKEST),
+        ("good drops with a wrong rod", "wrong", 1.0),
+    )
+    with canvas(
+        (_ROW_IN * len(rows) + 0.6,), 8.0, simulated=True, columns=2, sharex=False
+    ) as drawing:
+        for axes, (title, field, darkest) in zip(drawing.axes, panels, strict=True):
+            values = [one[field] for one in found]
+            table = [values[n : n + len(columns)] for n in range(0, len(values), len(columns))]
+            axes.imshow(table, cmap=_SHADES, vmin=0.0, vmax=darkest, aspect="auto")
+            for row, line in enumerate(table):
+                for column, value in enumerate(line):
+                    text = f"{value:.0%}" if field == "void_share" else f"{value:d}"
+                    color = PAPER if value > 0.6 * darkest else INK if value else MUTED
+                    axes.text(
+                        column, row, text, ha="center", va="center", fontsize=6.5, color=color
+                    )
+            axes.set_xticks(range(len(columns)), columns)
+            axes.set_yticks([])
+            axes.set_title(title, fontsize=9.0)
+            axes.grid(visible=False)
+        labels = [
+            f"{chain}: {heights if len(heights) <= _LONGEST_LABEL else gates}"
+            for chain, gates, heights in rows
+        ]
+        drawing.axes[0].set_yticks(range(len(rows)), labels, fontsize=6.5)
+    return drawing.svg
+
+
+def resolved_figure(drops: Sequence[JudgedDrop]) -> str:
+    """Draw the errors of resolved sessions against inclination: Δz, V and skew below each other.
+
+    Parameters
+    ----------
+    drops
+        Of the study; those that were void have no errors, and are counted at the foot.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    rows = [SEPARATION, SPEED, RELEASE_SKEW]
+    cases = list(dict.fromkeys(one.case for one in drops))
+    with canvas((2.7, 2.3, 2.3, 1.6), 8.0, simulated=True) as drawing:
+        *panels, foot = drawing.axes
+        for number, (case, (marker, color)) in enumerate(
+            zip(cases, cycle((*_STYLES, ("x", SECOND), ("+", INK), ("P", MODEL))), strict=False)
+        ):
+            mine = [one for one in drops if one.case == case]
+            aside = 0.55 * (number - (len(cases) - 1) / 2)
+            for panel, row in zip(panels, rows, strict=True):
+                read = [one for one in mine if row.name in one.errors]
+                panel.errorbar(
+                    [one.incline_deg + aside for one in read],
+                    [row.fine_scale * one.errors[row.name][0] for one in read],
+                    [row.fine_scale * one.errors[row.name][1] for one in read],
+                    color=color, marker=marker, linestyle="none", markersize=3.0, elinewidth=0.5,
+                    capsize=0, label=case,
+                )  # fmt: skip
+            inclines = sorted({one.incline_deg for one in mine})
+            shares = [
+                fmean(one.verdict not in GOOD for one in mine if one.incline_deg == incline)
+                for incline in inclines
+            ]
+            foot.plot(
+                [incline + aside for incline in inclines], [100 * share for share in shares],
+                color=color, marker=marker, linestyle="none", markersize=4.0,
+            )  # fmt: skip
+        for panel, row in zip(panels, rows, strict=True):
+            panel.axhline(0.0, color=MUTED, linewidth=0.9)
+            panel.set_ylabel(f"error of {row.symbol} ({row.fine})")
+        foot.set_ylabel("void drops (%)")
+        foot.set_xlabel("inclination of the surface (°); bars are U95, cases side by side")
+        handles, labels = panels[0].get_legend_handles_labels()
+        drawing.figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=7.0)
+    return drawing.svg
+
+
+def work_figure(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Draw error against run time of the resolved world.
+
+    Parameters
+    ----------
+    lines
+        As `bench.studies.resolved.work` gives them.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    kinds = (
+        ("step", "leapfrog, by its step (µs)", "o", MODEL, "step_s", 1e6),
+        ("Euler", "semi-implicit Euler", "v", MUTED, "step_s", 1e6),
+        ("Runge and Kutta", "Runge and Kutta", "^", INK, "step_s", 1e6),
+        ("touch", "length of touches (ms); step in proportion", "s", SECOND, "touch_s", 1e3),
+    )
+    with canvas((3.6,), simulated=False) as drawing:
+        (panel,) = drawing.axes
+        for kind, label, marker, color, field, scale in kinds:
+            some = [one for one in lines if one["changed"] == kind and one["rms_m"]]
+            times, errors = [one["cpu_s"] for one in some], [1e3 * one["rms_m"] for one in some]
+            panel.plot(times, errors, color=color, marker=marker, markersize=4.5, label=label)
+            for time, error, one in zip(times, errors, some, strict=True):
+                panel.annotate(f" {scale * one[field]:g}", (time, error), fontsize=8, color=color)
+        panel.axhline(_WORLD_ERROR_MM, color=MUTED, linestyle=":", linewidth=1.2)
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_xlabel("processor time of a fall of three rods (s)")
+        panel.set_ylabel("rms error of Δz at the strike (mm)")
+        panel.legend(loc="best")
+    return drawing.svg
