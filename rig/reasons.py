@@ -48,7 +48,7 @@ class Reason:
     """
 
     code: str
-    values: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict, hash=False)
     text: str = ""
     scene: str = ""
 

@@ -35,7 +35,7 @@ def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     found
-        ``estimators`` of ``rig bench estimators --json``.
+        ``estimators`` of ``./run bench estimators --json``.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     found
-        ``layouts`` of ``rig bench layouts --json``.
+        ``layouts`` of ``./run bench layouts --json``.
 
     Returns
     -------
