@@ -33,17 +33,21 @@ class RigError(Exception):
 
 @dataclass(frozen=True, slots=True, order=True)
 class Problem:
-    """One fault of an input file, at its place (lines and columns count from 1)."""
+    """One fault of an input file, at its place (lines and columns count from 1).
+
+    `excerpt` is what a message shows below: the line itself and a caret, or nothing.
+    """
 
     file: str
     line: int
     column: int
     key: str
     message: str
+    excerpt: str = ""
 
     def __str__(self) -> str:
         key = f" {self.key}:" if self.key else ""
-        return f"{self.file}:{self.line}:{self.column}:{key} {self.message}"
+        return f"{self.file}:{self.line}:{self.column}:{key} {self.message}{self.excerpt}"
 
 
 class InputError(RigError):

@@ -69,8 +69,11 @@ class Section:
         self.strange = not self.keys.keys() <= set(accepted)
         for key, place in self.keys.items():
             if key not in accepted:
-                close = did_you_mean(key, accepted)
-                message = f"unknown key; {close}accepted here: {', '.join(accepted)}"
+                word, colon, _ = key.partition(":")
+                message = f"unknown key; {did_you_mean(key, accepted)}"
+                message += f"accepted here: {', '.join(accepted)}"
+                if colon and word in accepted:  # {channel:0} is one key without a value
+                    message = f"a blank is missing after the colon of {word}"
                 faults.add(place, self.key(key), message)
 
     def __contains__(self, key: str) -> bool:

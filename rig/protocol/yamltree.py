@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from rig.errors import InputError, Problem
+from rig.printable import one_line
 from rig.units import quoted
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 MAX_DEPTH = 32
 MAX_NODES = 10_000
+_BREAK = re.compile(r"\r\n|[\n\r\x85\u2028\u2029]")
+"""Ends of lines in YAML 1.1, section 5.4: PyYAML counts lines by them."""
+_EXCERPT = 72  # columns of a terminal of 80, less an indent
 
 # Scalars of the YAML 1.2 core schema (section 10.3.2); what matches nothing here is text, so
 # `on`, `yes`, `12:30:00` and `2024-01-01` are text and `1e-3` is a number.
@@ -128,26 +132,34 @@ def load(text: str, source: str) -> Node:
         If the text is no YAML, holds tabs, tags, several documents or none, or is nested or
         aliased beyond `MAX_DEPTH` and `MAX_NODES`; located.
     """
-    body = text.removeprefix("\ufeff")
-    _refuse_tabs(body, source)
+    body = "\n".join(_BREAK.split(text.removeprefix("\ufeff")))
     try:
-        return _Builder(source).build(yaml.parse(body, Loader=yaml.SafeLoader))
+        _refuse_tabs(body)
+        return _Builder().build(yaml.parse(body, Loader=yaml.SafeLoader))
+    except _RefusalError as refusal:
+        place, message = refusal.place, refusal.message
     except yaml.reader.ReaderError as error:
-        at = _place_of(body, error.position)
         character = f"U+{ord(body[error.position]):04X}"
-        _fail(source, at, f"found the control character {character}; plain text is wanted")
+        place = _place_of(body, error.position)
+        message = f"control character {character}; write plain text only"
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        at = Place(mark.line + 1, mark.column + 1) if mark else Place(1, 1)
-        said = ", ".join(part for part in (error.context, error.problem) if part)
-        _fail(source, at, f"not YAML: {' '.join(said.split())}")
-    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError) as error:
+        from rig.protocol.yamlmend import explain  # noqa: PLC0415 - only a mistake needs it
+
+        index, message = explain(body, error)
+        place = _place_of(body, index)
+    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
         # The parser lets a few int() and chr() errors of broken escapes and directives through.
-        _fail(source, Place(1, 1), f"not YAML: {' '.join(str(error).split())[:80]}")
+        place, message = Place(1, 1), "this file cannot be read; see its quotes and % lines"
+    below = _excerpt(body, place)
+    raise InputError(problems=[Problem(source, place.line, place.column, "", message, below)])
 
 
-def _fail(source: str, at: Place, message: str) -> NoReturn:
-    raise InputError(problems=[Problem(source, at.line, at.column, "", message)])
+class _RefusalError(Exception):
+    """What a protocol may not have although YAML does."""
+
+    def __init__(self, place: Place, message: str) -> None:
+        super().__init__(message)
+        self.place, self.message = place, message
 
 
 def _place_of(text: str, index: int) -> Place:
@@ -156,19 +168,27 @@ def _place_of(text: str, index: int) -> Place:
     return Place(before.count("\n") + 1, index - before.rfind("\n"))
 
 
-def _refuse_tabs(text: str, source: str) -> None:
+def _excerpt(text: str, place: Place) -> str:
+    """Show a line, or of a long one the part around a place, with a caret below."""
+    begin = max(place.column - _EXCERPT // 2, 0)
+    line = text.split("\n")[place.line - 1][begin:].replace("\t", " ")
+    if not line.strip():
+        return ""
+    return f"\n    {one_line(line, _EXCERPT).rstrip()}\n    {'^':>{place.column - begin}}"
+
+
+def _refuse_tabs(text: str) -> None:
     """Refuse tabs outside comments: YAML takes them in some places and not in others."""
     for number, line in enumerate(text.split("\n"), start=1):
         column = line.partition("#")[0].find("\t")
         if column >= 0:
-            _fail(source, Place(number, column + 1), "found a tab; use spaces")
+            raise _RefusalError(Place(number, column + 1), "a tab; use blanks")
 
 
 class _Builder:
     """Builds the tree from parser events with a stack of its own, so nothing recurses."""
 
-    def __init__(self, source: str) -> None:
-        self.source = source
+    def __init__(self) -> None:
         self.root: Node | None = None
         self.stack: list[tuple[Sequence | Mapping, str | None]] = []
         self.keys: list[Node | None] = []  # per open node: a key that still waits for its value
@@ -182,35 +202,35 @@ class _Builder:
             if isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents > 1:
-                    _fail(self.source, place, "found a second document; one file is one protocol")
+                    raise _RefusalError(place, "a second document; a file has one protocol")
             elif isinstance(event, yaml.NodeEvent):
                 self._node(event, place)
             elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
                 self._close()
         if self.root is None:
-            _fail(self.source, Place(1, 1), "the file is empty; a protocol is wanted")
+            raise _RefusalError(Place(1, 1), "the file is empty; begin with protocol: 1")
         return self.root
 
     def _node(self, event: Any, place: Place) -> None:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
                 name = quoted(str(event.anchor))
-                _fail(self.source, place, f"found the alias {name}, which names no finished anchor")
+                raise _RefusalError(place, f"no anchor stands before the alias {name}")
             self._add(self.anchors[event.anchor], place)
             return
         if event.tag is not None:
-            _fail(self.source, place, f"found the tag {quoted(event.tag)}; tags are not accepted")
+            raise _RefusalError(place, f"the tag {quoted(event.tag)} is not accepted; leave it out")
         if isinstance(event, yaml.ScalarEvent):
             # "\uD800" in double quotes makes half a character, which no file or database takes.
             if any("\ud800" <= character <= "\udfff" for character in event.value):
-                _fail(self.source, place, "found half of a surrogate pair")
+                raise _RefusalError(place, "half of a surrogate pair; write the character itself")
             scalar = ScalarNode(event.value, event.style is None, place)
             if event.anchor:
                 self.anchors[event.anchor] = scalar
             self._add(scalar, place)
             return
         if len(self.stack) >= MAX_DEPTH:
-            _fail(self.source, place, f"nested more than {MAX_DEPTH} deep")
+            raise _RefusalError(place, f"more than {MAX_DEPTH} levels of brackets or indents")
         is_list = isinstance(event, yaml.SequenceStartEvent)
         self.stack.append((Sequence(place) if is_list else Mapping(place), event.anchor))
         self.keys.append(None)
@@ -226,7 +246,7 @@ class _Builder:
     def _add(self, node: Node, place: Place, counted: int = 0) -> None:
         self.nodes += node.size - counted
         if self.nodes > MAX_NODES:
-            _fail(self.source, place, f"more than {MAX_NODES} values, aliases expanded")
+            raise _RefusalError(place, f"more than {MAX_NODES} values, aliases expanded")
         if not self.stack:
             self.root = node
             return

@@ -2,12 +2,13 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.protocol.describe import describe
 from rig.protocol.reader import parse, read
+from rig.protocol.yamltree import load
 from tests.examples import examples
 
 READY = sorted((Path(__file__).parents[2] / "protocols").glob("*.yaml"))
@@ -105,7 +106,7 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
         ("0.50 ± 0.05", "2", "f:6:24: surface.restitution: found 2; accepted: -1 to 1"),
         ("restitution: 0.50 ± 0.05", "", "f:6:10: surface.restitution: missing"),
         ("drop: 180 mm ± 2 mm\n", "", "f:1:1: drop: missing"),
-        ("drop: 180", "drop:\t180", "f:7:6: found a tab; use spaces"),
+        ("drop: 180", "drop:\t180", "f:7:6: a tab; use blanks"),
         ("gravity: 9.81 m/s^2\n", "", "f:1:1: gravity: missing; write gravity:"),
         ("gravity:", "site: {latitude: 45 deg, height: 0 m}\ngravity:",
          "f:9:1: gravity: site is given too, on line 8"),
@@ -119,14 +120,14 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
         ("40 deg", "0 deg", "f:12:25: plan.incline[1]: found '0 deg' again"),
         ("repeats: 4", "order: abab", "f:12:41: plan.order: found 'abab'; did you mean ABBA?"),
         ("repeats: 4", "repeats: 4.0", "f:12:43: plan.repeats: found 4.0; a whole number"),
-        ("repeats: 4", "repeats: 4]", "f:12:44: not YAML: while parsing a flow mapping"),
-        ("title: on", "title: !!python/name:os.system x", "f:2:8: found the tag"),
-        ("title: on", "title: *x", "f:2:8: found the alias 'x'"),
-        ("title: on", 'title: "\\ud800"', "f:2:8: found half of a surrogate pair"),
+        ("repeats: 4", "repeats: 4]", "f:12:43: [ is missing before '4'"),
+        ("title: on", "title: !!python/name:os.system x", "f:2:8: the tag 'tag:yaml"),
+        ("title: on", "title: *x", "f:2:8: no anchor stands before the alias 'x'"),
+        ("title: on", 'title: "\\ud800"', "f:2:8: half of a surrogate pair"),
         ("title: on", 'title: "\\e[2J"', "f:2:8: title: found '\\x1b[2J' with control"),
-        ("title: on", "title: \x07", "f:2:8: found the control character U+0007"),
-        ("title: on", "notes: " + "[" * 40, "f:2:39: nested more than 32 deep"),
-        ("plan:", "---\nplan:", "f:12:1: found a second document"),
+        ("title: on", "title: \x07", "f:2:8: control character U+0007"),
+        ("title: on", "notes: " + "[" * 40, "f:2:39: more than 32 levels"),
+        ("plan:", "---\nplan:", "f:12:1: a second document"),
     ],
 )  # fmt: skip
 def test_each_fault_is_found_at_its_place(old, new, start):
@@ -134,7 +135,7 @@ def test_each_fault_is_found_at_its_place(old, new, start):
     found = problems(GOOD.replace(old, new, 1))
     assert len(found) == 1, found
     assert found[0].startswith(start)
-    assert "\n" not in found[0]
+    assert_one_block(found[0])
 
 
 def test_all_faults_come_at_once_and_an_inherited_one_comes_once():
@@ -224,12 +225,45 @@ PIECES = [
 
 
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=8))
-@examples(400)
+@examples(250)
 def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
     text = GOOD[:start] + "".join(pieces) + GOOD[start + cut :]
-    found = ()
     try:
         describe(parse(text))
     except InputError as error:
-        found = error.problems or ("none named\n",)
-    assert all("\n" not in str(problem) for problem in found)
+        for line in error.message.split("\nprotocol:"):
+            assert_one_block(line)
+
+
+@given(st.sampled_from(READY), st.data())
+@examples(100)
+def test_what_is_no_yaml_is_said_in_words_and_shown_with_a_caret(path, data):
+    text = path.read_text("utf-8")
+    at = data.draw(st.integers(0, len(text) - 1))
+    mark = data.draw(st.sampled_from(":{}[],\"'-\t "))
+    places = [at, *(n for n, character in enumerate(text) if character == mark)]
+    cut = data.draw(st.sampled_from(places)) if data.draw(st.booleans()) else None
+    damaged = text[:at] + mark + text[at:] if cut is None else text[:cut] + text[cut + 1 :]
+    where = at if cut is None else cut
+    assume("#" not in text[: where + 1].rpartition("\n")[2])
+    try:
+        load(damaged, "f")
+    except InputError as error:
+        (problem,) = error.problems
+        assert_one_block(str(problem))
+        assert problem.excerpt.split("\n")[1][4:] in damaged.replace("\t", " ")
+        for phrase in ("<", "block end", "token", "expected ", "but found", "scanning", "parsing"):
+            assert phrase not in problem.message.replace("unexpected ", "")
+        line = text.count("\n", 0, where) + 1
+        assert abs(problem.line - line) <= 1 or mark == " "
+
+
+def assert_one_block(problem):
+    """See that a problem is one line, and of what is no YAML that line of it and a caret."""
+    head, *below = problem.split("\n")
+    if below:
+        shown, caret = below
+        assert shown.startswith("    ")
+        assert caret.strip() == "^"
+        assert len(caret) <= len(shown) + 1 <= 80
+    assert head.isprintable()

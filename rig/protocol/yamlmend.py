@@ -1,0 +1,268 @@
+"""What a text that is no YAML lacks: a quote, a bracket, a colon, a comma, an indent.
+
+The parser says where it stopped, in the words of its grammar. What people need is the smallest
+change that lets it go on; so changes are tried around the place, and the parser itself judges them.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import yaml
+
+from rig.units import quoted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOST_PARSED = 150_000
+"""Characters parsed in search of a change: about a second, and fifty changes of a page."""
+_PAIRS = {"[": "]", "{": "}"}
+_MARKS = "[]{},:-\"'"
+_KEY = re.compile(r"\s*(?:- )?[\w.]+")
+_VALUE = re.compile(r"(?<=: )(?=\S)[^\n]*?(?=\s*(?:[#\n]|$))")
+NOT_READABLE = "this line cannot be read from here on: see its quotes, brackets, colons and indent"
+
+
+class Mend(NamedTuple):
+    """One change of a text: what is at `begin` to `end` becomes `new`; `place` is its index."""
+
+    place: int
+    message: str
+    begin: int
+    end: int
+    new: str
+
+    def apply(self, text: str) -> str:
+        """Return the changed text."""
+        return text[: self.begin] + self.new + text[self.end :]
+
+
+def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
+    """Return where a text stops being YAML, and what is missing or too much there.
+
+    Parameters
+    ----------
+    text
+        As it was parsed.
+    error
+        What the parser raised.
+
+    Returns
+    -------
+    tuple of int and str
+        An index in `text`, and a sentence.
+    """
+    mark = error.problem_mark or error.context_mark
+    stop = min(mark.index if mark else 0, len(text))
+    begin = error.context_mark.index if error.context_mark else stop
+    farther: Mend | None = None
+    for mend in islice(_mends(text, stop, begin), MOST_PARSED // (len(text) + 1)):
+        reach = _reach(mend.apply(text))
+        if reach is None:
+            return mend.place, mend.message
+        if farther is None and reach > _line_end(text, stop):
+            farther = mend
+    return (farther.place, farther.message) if farther else (_visible(text, stop), NOT_READABLE)
+
+
+def _reach(text: str) -> int | None:
+    """Return how far the parser gets; `None` if it meets no error."""
+    try:
+        for _ in yaml.parse(text, Loader=yaml.SafeLoader):
+            pass
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        return mark.index if mark else 0
+    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
+        return 0
+    return None
+
+
+def _mends(text: str, stop: int, begin: int) -> Iterator[Mend]:
+    """List changes that could let the parser go on, the likeliest first.
+
+    `stop` is where it stopped, `begin` where that began which it could not finish.
+    """
+    at = _visible(text, stop)
+    here = text[at : at + 1]
+    if here == "\t":
+        yield Mend(at, "a tab; use blanks", at, at + 1, " ")
+    yield from _open_quotes(text, stop)
+    for start in dict.fromkeys((_line_start(text, begin), _line_start(text, at))):
+        yield from _colons(text, start)
+    yield from _brackets(text, at, begin)
+    yield from _quotable(text, at)
+    yield from _indents(text, at)
+    yield from _stray(text, at, begin)
+
+
+def _stray(text: str, at: int, begin: int) -> Iterator[Mend]:
+    """Leave out a character, or a word behind a value."""
+    before = _line_start(text, max(_line_start(text, begin) - 1, 0))
+    marks = [n for n in range(before, _line_end(text, at)) if text[n] in _MARKS]
+    for n in sorted({*marks, at}, key=lambda n: (text[n : n + 1] not in _MARKS, abs(n - at))):
+        if text[n : n + 1].strip():
+            yield Mend(n, f"unexpected {quoted(text[n])}: leave it out", n, n + 1, "")
+    word = re.compile(r"[^\s,\]}]+").match(text, at)
+    if word is not None:
+        message = f"unexpected {quoted(word.group())} after a value: leave it out"
+        yield Mend(at, message, at, word.end(), "")
+
+
+def _open_quotes(text: str, stop: int) -> Iterator[Mend]:
+    """Close a quote at the end of its line, before a comma, bracket or comment if there is one."""
+    tokens: list[Any] = []
+    try:
+        tokens.extend(yaml.scan(text[:stop], Loader=yaml.SafeLoader))
+    except yaml.MarkedYAMLError as error:
+        starts = [error.context_mark.index] if error.context_mark else []
+    else:
+        starts = []
+    starts += [
+        token.start_mark.index
+        for token in tokens
+        if getattr(token, "style", None) and token.start_mark.line < token.end_mark.line
+    ]
+    for start in starts:
+        quote = text[start : start + 1]
+        if quote not in {'"', "'"}:
+            continue
+        end = _line_end(text, start)
+        for found in re.finditer(r"\s*(?:#|[,}\]]|$)", text[start + 1 : end]):
+            to = start + 1 + found.start()
+            message = f"a quote is open from here: close it with {quote}"
+            yield Mend(start, message, to, to, quote)
+        message = f"a quote is open from here: close it with {quote}, or leave it out"
+        yield Mend(start, message, start, start + 1, "")
+
+
+def _colons(text: str, start: int) -> Iterator[Mend]:
+    """Give the first word of a line a colon, and a blank behind it; likewise the line before."""
+    before = _line_start(text, max(start - 1, 0))
+    for line in dict.fromkeys((start, before)):
+        hyphen = line + _indent(text, line)
+        if text[hyphen : hyphen + 1] == "-":
+            message = "a blank is missing after the hyphen"
+            yield Mend(hyphen + 1, message, hyphen + 1, hyphen + 1, " ")
+        key = _KEY.match(text, line)
+        if key is None:
+            continue
+        end, word = key.end(), quoted(key.group().strip().removeprefix("- "))
+        rest = text[end : _line_end(text, end)].partition("#")[0]
+        if rest.startswith(":") and rest[1:].strip() and not rest.startswith(": "):
+            yield Mend(end + 1, f"a blank is missing after the colon of {word}", end + 1, end + 1,
+                       " ")  # fmt: skip
+        elif not rest.lstrip().startswith(":"):
+            yield Mend(end, f"a colon is missing after {word}", end, end, ":" + " " * bool(rest))
+
+
+def _brackets(text: str, at: int, begin: int) -> Iterator[Mend]:
+    """Close or open a bracket, or put a comma between two values."""
+    opened: list[int] = []
+    for n in _bare(text, _line_start(text, begin), at):
+        if text[n] in "[{":
+            opened.append(n)
+        elif text[n] in "]}" and opened:
+            opened.pop()
+    here = text[at : at + 1]
+    if text[begin : begin + 1] in _PAIRS and begin not in opened:
+        opened.insert(0, begin)
+    if opened:
+        last = opened[-1]
+        bracket, end = _PAIRS[text[last]], _line_end(text, last)
+        gaps = re.compile(r"(?<=[^\s,:{\[])\s+(?=[\w{\[\"'])").finditer(text, last, at + 1)
+        for gap in reversed([*gaps]):
+            message = f"a comma is missing before {quoted(_word(text, gap.end()))}"
+            yield Mend(gap.end(), message, gap.start(), gap.start(), ",")
+        message = f"{text[last]} is open from here: close it with {bracket}"
+        comment = re.compile(r"\s+#").search(text, last, end)
+        places = [at] if here in {"]", "}"} else []
+        for to in (*places, comment.start() if comment else len(text[:end].rstrip())):
+            yield Mend(last, message, to, to, bracket)
+        if here in {"]", "}"}:
+            message = f"{quoted(here)} does not close {text[last]}: write {bracket}"
+            yield Mend(at, message, at, at + 1, bracket)
+    start = _line_start(text, at)
+    for bracket, closing in _PAIRS.items():
+        starts = re.compile(r"(?:- |: +)(?=[^\s{\[])").finditer(text, start, _line_end(text, at))
+        for value in sorted((found.end() for found in starts), key=lambda n: abs(n - at)):
+            message = f"{bracket} is missing before {quoted(_word(text, value))}"
+            if closing in text[value : _line_end(text, at)]:
+                yield Mend(value, message, value, value, bracket)
+
+
+def _word(text: str, index: int) -> str:
+    return re.split(r"[\s:,\]}]", text[index : index + 40])[0] or text[index : index + 1]
+
+
+def _quotable(text: str, at: int) -> Iterator[Mend]:
+    """Put the value of a line in quotes; double a backslash."""
+    start, end = _line_start(text, at), _line_end(text, at)
+    if (slash := text.rfind("\\", start, at + 1)) >= 0:
+        message = r"\ with this letter behind it means nothing: write \\, or use ' for quotes"
+        yield Mend(slash, message, slash, slash, "\\")
+    value = _VALUE.search(text, start, end)
+    if value is not None and value.group()[0] not in "[{\"'":
+        whole = '"' + value.group().replace("\\", "\\\\").replace('"', '\\"') + '"'
+        message = f"{quoted(text[at])} is not accepted here: put this value in quotes"
+        yield Mend(at, message, *value.span(), whole)
+
+
+def _indents(text: str, at: int) -> Iterator[Mend]:
+    """Give a line, or the one before it, the blanks and the hyphen of a line above or below."""
+    here = _line_start(text, at)
+    before = _line_start(text, max(here - 1, 0))
+    starts = [n + 1 for n in range(here) if text[n] == "\n"]
+    for start in dict.fromkeys((before, here)):
+        indent = _indent(text, start)
+        others = {_lead(text, line): line for line in (0, *starts) if line != start}
+        for lead, line in reversed(others.items()):
+            if lead == _lead(text, start) or text[line + len(lead) : line + len(lead) + 1] == "#":
+                continue
+            number = text.count("\n", 0, line) + 1
+            if lead.endswith("- "):
+                message = f"a hyphen is missing: begin with {quoted(lead)}, as line {number} does"
+            else:
+                blanks = "1 blank" if indent == 1 else f"{indent} blanks"
+                message = f"begins with {blanks}: {len(lead)} are needed, as on line {number}"
+            yield Mend(start + indent, message, start, start + indent, lead)
+
+
+def _lead(text: str, start: int) -> str:
+    """Return the blanks that a line begins with, and the hyphen of an item of a list."""
+    lead = re.compile(r" *(?:- )?").match(text, start)
+    return lead.group() if lead else ""
+
+
+def _bare(text: str, begin: int, end: int) -> Iterator[int]:
+    """Indices outside quotes."""
+    quote = ""
+    for n in range(begin, end):
+        if quote:
+            quote = "" if text[n] == quote else quote
+        elif text[n] in "\"'":
+            quote = text[n]
+        else:
+            yield n
+
+
+def _indent(text: str, start: int) -> int:
+    line = text[start : _line_end(text, start)]
+    return len(line) - len(line.lstrip(" "))
+
+
+def _line_start(text: str, index: int) -> int:
+    return text.rfind("\n", 0, index) + 1
+
+
+def _line_end(text: str, index: int) -> int:
+    end = text.find("\n", index)
+    return len(text) if end < 0 else end
+
+
+def _visible(text: str, index: int) -> int:
+    """Return an index, or at the end of a text that of its last character."""
+    return index if text[index:].strip() else max(len(text.rstrip()) - 1, 0)
