@@ -1,12 +1,14 @@
 """Draws how each board is wired: `python firmware/pictures.py` writes an SVG beside each `board.h`.
 
 Pins come from `board.h`; what is around them is one design for all boards, but that a Pico's pins
-stand 3.3 V: the comparators' open outputs are pulled up to that, and MOSFETs open with it.
+stand 3.3 V: the comparators' open outputs are pulled up to that, and MOSFETs open with it. A part
+that not every scene needs has its name as an SVG class, so that `rig new` can leave it out.
 """
 
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -14,19 +16,46 @@ from typing import TYPE_CHECKING, Literal
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run as a script, it does not see its parent
 
 import schemdraw
+from schemdraw import drawing_stack, logic
 from schemdraw import elements as elm
-from schemdraw import logic
 
 from firmware.pins import Pins, read_pins
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 BOARDS = ("rp2040", "atmega2560", "atmega328p")
 _INK, _QUIET, _PIN, _LIGHT = "#1b1f24", "#5b6670", "#0b5cad", "#c0392b"
 _PAPER, _BOARD = "#ffffff", "#f2f6fa"
 _FONT = "DejaVu Sans, Verdana, Arial, sans-serif"
 _TEXT, _SMALL = 11, 9.5
+
+
+class _Sheet(schemdraw.Drawing):
+    """A drawing whose elements may bear the name of their part."""
+
+    parts: dict[int, str]
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Name the part of all elements that are drawn meanwhile."""
+        drawing_stack.push_element(None)  # the element before is placed only then
+        begin = len(self.elements)
+        yield
+        drawing_stack.push_element(None)
+        self.parts |= dict.fromkeys(range(begin, len(self.elements)), name)
+
+    def svg(self) -> bytes:
+        """Write the drawing, with parts as classes."""
+        picture = self.draw(show=False)
+        picture.svgelements.clear()
+        for n, element in enumerate(self.elements):
+            begin = len(picture.svgelements)
+            element._draw(picture)
+            for _, node in picture.svgelements[begin:]:
+                if n in self.parts:
+                    node.set("class", self.parts[n])
+        return picture.getimage("svg")
 
 
 def draw(pins: Pins, path: Path) -> None:
@@ -40,23 +69,27 @@ def draw(pins: Pins, path: Path) -> None:
         The SVG file.
     """
     schemdraw.use("svg")
-    with schemdraw.Drawing(show=False) as page:
+    with _Sheet(show=False) as page:
+        page.parts = {}
         page.config(
             unit=2, fontsize=_TEXT, font=_FONT, color=_INK, lw=1.4, bgcolor=_PAPER, margin=0.4
         )
         _title(0, 15.4, f"{pins.board}: what goes to its pins", 17)
-        _board(pins, 0, 14.2)
+        _board(page, pins, 0, 14.2)
         _gate(pins, 8.4, 9.4)
-        _release(pins, 7.6, 1.5)
+        _release(page, pins, 7.6, 1.5)
         _holding_release(pins, 17.0, 1.5)
         _stop(pins, 0.6, -5.5)
-        _reference(pins, 7.6, -5.5)
-        _sync(pins, 14.6, -5.5)
+        with page.part("reference"):
+            _reference(pins, 7.6, -5.5)
+        with page.part("sync"):
+            _sync(pins, 14.6, -5.5)
         if "SENSE" in pins.others:
-            _sense(pins, 21.4, -5.5)
+            with page.part("sense"):
+                _sense(pins, 21.4, -5.5)
         if not pins.led_on_board:
             _status(pins, 0, -0.2)
-    path.write_bytes(page.get_imagedata("svg"))
+    path.write_bytes(page.svg())
 
 
 def _text(
@@ -108,7 +141,7 @@ def _pin(x: float, y: float, name: str, *, left: bool = False) -> None:
     (flag.left() if left else flag.right()).label(name, fontsize=_TEXT, color=_PIN)
 
 
-def _board(pins: Pins, x: float, y: float) -> None:
+def _board(page: _Sheet, pins: Pins, x: float, y: float) -> None:
     """Draw the board as the list of its pins."""
     rows = [(pin, f"gate {n}") for n, pin in enumerate(pins.gates)]
     words = {
@@ -124,18 +157,19 @@ def _board(pins: Pins, x: float, y: float) -> None:
     if pins.volts != "+5 V":
         rows += [("3V3", "out: inverters, pull-ups")]
     rows += [("GND", "all grounds")]
+    parts = {words[key]: key.lower() for key in ("SYNC", "SENSE", "REFERENCE")}
     step = 0.5
     box = elm.Rect(corner1=(0, 0.45), corner2=(5.6, 0.05 - step * len(rows)))
     box.at((x, y)).fill(_BOARD).color(_QUIET)
     for n, (pin, word) in enumerate(rows):
         at = y - step * n
-        _text(x + 1.3, at, pin, _TEXT, align="right", color=_PIN)
-        _text(x + 1.7, at, word, _TEXT)
+        with page.part(parts.get(word, word.replace(" ", "-"))):
+            _text(x + 1.3, at, pin, _TEXT, align="right", color=_PIN)
+            _text(x + 1.7, at, word, _TEXT)
 
 
 def _gate(pins: Pins, x: float, y: float) -> None:
-    many = len(pins.gates)
-    _title(x - 0.8, y + 4.9, f"Photogate, one of {many}: high while a rod is in its beam")
+    _title(x - 0.8, y + 4.9, "Photogate, the same for each gate: high while its beam is blocked")
     _supply(x + 0.6, y + 3.6)
     _down(elm.Resistor(), x + 0.6, y + 3.6, y + 1.8, "150 Ω")
     _down(elm.LED(), x + 0.6, y + 1.8, y, "IR LED\n940 nm", "top")
@@ -192,8 +226,8 @@ def _gate(pins: Pins, x: float, y: float) -> None:
         x + 10.6,
         y - 1.35,
         "100 nF at each chip, between its supply and ground.",
-        f"The next gates go to {_listed(pins.gates[1:])}.",
-        "A pin without a gate needs nothing.",
+        f"{pins.gates[0]} is gate 0; the list has the pins of the other gates.",
+        "Leave a pin without a gate open.",
     )
 
 
@@ -225,7 +259,7 @@ def _first_fet(pins: Pins, at_5_volts: str) -> str:
     )
 
 
-def _release(pins: Pins, x: float, y: float) -> None:
+def _release(page: _Sheet, pins: Pins, x: float, y: float) -> None:
     _title(x, y + 4.9, "Release, magnet that lets go with current")
     drain_x, drain_y, _ = _switch(
         x, y + 0.6, pins.others["RELEASE_0"][0], _first_fet(pins, "IRLZ44N")
@@ -241,7 +275,8 @@ def _release(pins: Pins, x: float, y: float) -> None:
     elm.Diode().at((drain_x + 1.3, top - 1.7)).to((drain_x + 1.3, top - 0.2)).label(
         "1N4007", loc="bottom", fontsize=_SMALL
     )
-    _note(x, y - 2.2, f"Release 1, at {pins.others['RELEASE_1'][0]}, is the same.")
+    with page.part("release-1"):
+        _note(x, y - 2.2, f"Release 1, at {pins.others['RELEASE_1'][0]}, is the same.")
 
 
 def _holding_release(pins: Pins, x: float, y: float) -> None:
@@ -277,7 +312,7 @@ def _holding_release(pins: Pins, x: float, y: float) -> None:
         x,
         y - 2.2,
         "The pulse switches the magnet off; the Zener diode lets its current die fast.",
-        "Without power the chain falls.",
+        "Without power it releases.",
     )
 
 

@@ -1,9 +1,12 @@
-"""What the command line says of itself: commands in groups, two examples each, near misses."""
+"""Help of the command line: commands in groups, two examples each, spelling, the program's name."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import re
 import sys
+from functools import cache
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from rig.streams import say
@@ -67,6 +70,49 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
+_NAMED = re.compile(rf"(?<![\w/.-])rig (?={'|'.join(sum(GROUPS.values(), ()))}|--help)")
+
+
+def runnable(text: str) -> str:
+    """Write each command of a text as this user can run it.
+
+    Before anybody activates the environment of `./run demo`, that is ``.venv/bin/rig check``.
+    """
+    return _NAMED.sub(lambda _: f"{_program()} ", text)
+
+
+@cache
+def _program() -> str:
+    from shlex import quote  # noqa: PLC0415 - only for what names a command
+    from shutil import which  # noqa: PLC0415 - likewise
+
+    installed = os.path.join(os.path.dirname(sys.executable), "rig")  # noqa: PTH118, PTH120
+    if which("rig"):
+        return "rig"
+    if which(installed) is None:
+        return f"{quote(sys.executable)} -m rig"
+    here = os.path.relpath(installed)
+    return quote(installed if here.startswith(os.pardir) else here)
+
+
+def _joined_map(words: Sequence[str]) -> list[str]:
+    """Join what was typed after ``--map``: ``1=0 2=1`` and ``D0 = 2`` are one word each there."""
+    joined: list[str] = []
+    mapping = False
+    for word in words:
+        if word == "--map":
+            joined += [word, ""]
+        elif mapping and (not joined[-1] or "=" in word or joined[-1].endswith("=")):
+            pair = joined[-1].endswith("=") or word.startswith("=")
+            comma = "," if joined[-1] and not pair else ""
+            joined[-1] = f"{joined[-1]}{comma}{word.strip(',')}"
+            continue
+        else:
+            joined.append(word)
+        mapping = word == "--map"
+    return joined
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose mistakes name what was meant, and whose help has groups and examples."""
 
@@ -79,12 +125,12 @@ class Parser(argparse.ArgumentParser):
 
     def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
         """Parse; what is left over is the mistake of the sub-command that was named."""
-        found, rest = self.parse_known_args(args)
+        words = _joined_map(sys.argv[1:] if args is None else args)
+        arguments, rest = self.parse_known_args(words)
         if rest:
-            said = list(sys.argv[1:] if args is None else args)
-            inner = next((one for word in said if (one := self._inner(word))), None)
-            (inner or self).error(f"unrecognized arguments: {' '.join(rest)}")
-        return found
+            inner = next((parser for word in words if (parser := self._inner(word))), None)
+            (inner or self).error(f"unknown arguments: {' '.join(rest)}")
+        return arguments
 
     def _inner(self, word: str) -> argparse.ArgumentParser | None:
         for action in self._actions:
@@ -105,7 +151,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and end."""
-        say(f"{self.prog}: {message}\n{self.format_usage()}  hint: {self.prog} --help")
+        say(runnable(f"{self.prog}: {message}\n{self.format_usage()}  hint: {self.prog} --help"))
         self.exit(2)
 
 

@@ -163,7 +163,7 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
         If the text is no such quantity; the message says what was found and what is accepted.
     """
     text = repr(text) if isinstance(text, float) else str(text)
-    wanted = f"{dimension.noun} is wanted, e.g. {dimension.example}"
+    wanted = f"accepted: {dimension.noun}, such as {dimension.example}"
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:
         raise UnitError(f"found a text of {len(clean)} characters; {wanted}")
@@ -171,7 +171,7 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     if match is None:
         pointed = _DECIMAL_COMMA.sub(r"\1.\2", clean)
         if pointed != clean and (_BRACKETED.fullmatch(pointed) or _PLAIN.fullmatch(pointed)):
-            wanted = f"decimals have a point here and not a comma: {pointed}"
+            wanted = f"write a decimal point, not a comma: {pointed}"
         raise UnitError(f"found {quoted(text)}; {wanted}")
     found = match.groupdict()
     unit, u_unit = found["unit"], found.get("u_unit")
@@ -188,19 +188,19 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
         return Quantity(value)
     u = _scaled(found["u"], _factor(u_unit or unit, dimension, clean), clean)
     if u < 0:
-        raise UnitError(f"found {quoted(text)}; an uncertainty is not negative")
+        raise UnitError(f"found {quoted(text)}; an uncertainty is at least 0")
     return Quantity(value, u)
 
 
 def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:
     """Return the units of a value and of what stands behind its ``±``."""
     if unit is not None and u_unit is None:
-        raise UnitError(f"found {quoted(text)}; the part behind ± needs its unit too")
+        raise UnitError(f"found {quoted(text)}; the part after ± needs a unit too")
     if unit is None and u_unit in _RELATIVE:
         # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
         raise UnitError(
-            f"found {quoted(text)}, which can be read in two ways; "
-            f"write both parts in the same unit, e.g. 0.50 ± 0.05 or 50 % ± 5 %"
+            f"found {quoted(text)}, which has two meanings; "
+            f"write both parts in the same unit: 0.50 ± 0.05 or 50 % ± 5 %"
         )
     return unit or u_unit, u_unit
 
@@ -216,15 +216,15 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
         near = {known.casefold(): known for known in dimension.units}
         close = difflib.get_close_matches(name.casefold(), near, n=1, cutoff=0.5)
         guess = f"did you mean {near[close[0]]}? " if close else ""
-        raise UnitError(f"found the unit {quoted(unit or '')}, not known; {guess}{accepted}")
+        raise UnitError(f"unknown unit {quoted(unit or '')}; {guess}{accepted}")
     found, factor = UNITS[name]
     if found is not dimension:
         if unit is None:
             raise UnitError(
-                f"found {quoted(text)} without a unit; {accepted}, e.g. {dimension.example}"
+                f"found {quoted(text)} without a unit; {accepted}, such as {dimension.example}"
             )
         raise UnitError(
-            f"{text} is {found.noun}; {dimension.noun} is wanted, e.g. {dimension.example}"
+            f"{text} is {found.noun}; accepted: {dimension.noun}, such as {dimension.example}"
         )
     return factor
 
@@ -241,7 +241,7 @@ def _scaled(number: str, factor: Fraction, text: str) -> float:
     except ArithmeticError:
         result = 0.0
     if result == 0:
-        raise UnitError(f"found {quoted(text)}, which is beyond what a number can hold")
+        raise UnitError(f"found {quoted(text)}, too large or too small")
     return result
 
 

@@ -25,7 +25,7 @@ def main(arguments: Namespace) -> int:
         return _reference(as_schema=arguments.schema)
     if arguments.protocol is None:
         hint = "rig check PROTOCOL; rig check --keys lists all keys"
-        raise InputError("no protocol is named", hint)
+        raise InputError("PROTOCOL is missing", hint)
     protocol = reader.read(arguments.protocol)
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
@@ -45,7 +45,7 @@ def _reference(*, as_schema: bool) -> int:
 
 def _draw(protocol: Protocol, path: Path) -> None:
     if protocol.gates is None or not protocol.gates.gates:
-        raise InputError(f"{protocol.source}: there are no gates to be mounted", "leave -o out")
+        raise InputError(f"{protocol.source}: the scene has no gates to draw", "leave -o out")
     from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - matplotlib, only here
     from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
 
@@ -54,9 +54,9 @@ def _draw(protocol: Protocol, path: Path) -> None:
 
 
 def _trials(protocol: Protocol) -> list[str]:
-    """Say how many drops the protocol's gates will let be read, where it can be measured."""
+    """Say how many simulated drops the gates of a protocol identify, if it can be measured."""
     if protocol.gates is None or not protocol.gates.gates or unmeasurable(protocol):
         return []
     from rig.design.trials import trials, trials_text  # noqa: PLC0415 - numpy, only with gates
 
-    return [trials_text(trials(protocol))]
+    return [trials_text(trials(protocol), protocol.vocabulary)]

@@ -1,4 +1,4 @@
-"""``rig demo``: a small session in simulation, and its results beside the truth that it hides."""
+"""``rig demo``: a small simulated session, and its results beside the hidden truth."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def main(arguments: Namespace) -> int:
     again = (
         f"rig demo -o {quote(str(folder))} --repeats {arguments.repeats} --seed {arguments.seed}"
     )
-    with goes_on(f"{again} goes on from here"):
+    with goes_on(f"{again} continues it"):
         return _dropped(protocol, session, arguments)
 
 
@@ -74,7 +74,7 @@ def _dropped(protocol: Path, session: Path, arguments: Namespace) -> int:
         import webbrowser  # noqa: PLC0415 - only where somebody looks
 
         webbrowser.open(page.absolute().as_uri())
-    say(f"go on with it: rig tui --session {session}; or with your own: rig check {protocol}")
+    say(f"show it: rig tui --session {session}\nyour own set-up: rig new my.yaml")
     return code or (VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0)
 
 
@@ -114,12 +114,12 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
         rows.append(cells)
     rows.sort(key=lambda cells: float(cells["incline (°)"]))
     if not rows:
-        return ["no drop was good, so there is nothing to compare"]
+        return ["no good drop to compare with the truth"]
     headings = max(rows, key=len)
     columns = [Column(name, itemgetter(name)) for name in headings]
     return [
         *aligned(columns, [dict.fromkeys(headings, "") | cells for cells in rows]),
-        f"{held} of {of} results hold the hidden truth within ± U, which is meant to hold 95 %",
+        f"{held} of {of} results agree with the hidden truth within ± U (95 % expected)",
     ]
 
 
@@ -135,7 +135,7 @@ def impacts(protocol: Protocol, analysis: Analysis) -> str:
         if one.identified
     ]
     said = ", ".join(parts).replace("-", "−")
-    return f"what the impacts have in common: {said or 'too few drops tell it'}"
+    return f"from all impacts: {said or 'too few drops'}"
 
 
 def _has_screen() -> bool:

@@ -35,9 +35,9 @@ SPACING_M = 0.01
 
 
 def main(arguments: Namespace) -> int:
-    """Predict what a layout will tell, and look for a better one."""
+    """Predict the uncertainties of a layout, and search for a better layout."""
     if arguments.output and arguments.no_search:
-        raise InputError("-o writes what is proposed, and --no-search proposes nothing")
+        raise InputError("-o needs a proposal; leave --no-search out")
     if arguments.output:
         check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
@@ -53,7 +53,9 @@ def main(arguments: Namespace) -> int:
         _length("--spacing", arguments.spacing) or SPACING_M,
     )
     if limits.lowest > limits.highest:
-        raise InputError("--lowest is above --highest", "the highest is where the top rod hangs")
+        raise InputError(
+            "--lowest is above --highest", "the highest beam is below the start of the drop"
+        )
     found: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "stated" if arguments.learned is None else "learned",
@@ -70,14 +72,14 @@ def main(arguments: Namespace) -> int:
 
 
 def _learned(path: str) -> Components:
-    """How much everything scatters, as an earlier session of the same rig found."""
+    """Return the scatter of an earlier session of the same rig."""
     from rig.results import detailed  # noqa: PLC0415 - only with --learned
     from rig.session.store import Session  # noqa: PLC0415
 
     with Session.open(path, readonly=True) as session:
         joint = detailed(session)[0].joint
     if joint is None:
-        raise InputError(f"{path}: too few good drops to learn from", "leave out --learned")
+        raise InputError(f"{path}: too few good drops for a scatter", "leave out --learned")
     return joint.components
 
 
@@ -89,13 +91,14 @@ def _length(option: str, text: str | None) -> float | None:
     except UnitError as error:
         raise InputError(f"{option}: {error}") from None
     if value <= 0.0:
-        raise InputError(f"{option}: {text} is not above zero")
+        raise InputError(f"{option}: found {text}; accepted: a length above 0")
     return value
 
 
 def _tried(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> dict[str, Any]:
-    found = trials(with_beams(protocol, beams))
-    return {"drops": found.drops, "read": found.read, "text": trials_text(found)}
+    outcome = trials(with_beams(protocol, beams))
+    text = trials_text(outcome, protocol.vocabulary)
+    return {"drops": outcome.drops, "read": outcome.read, "text": text}
 
 
 def _said(
@@ -131,11 +134,11 @@ def _said(
 
 
 def design_text(found: Mapping[str, Any]) -> str:
-    """Write layouts and what they tell, for a terminal."""
+    """Write layouts and their uncertainties, for a terminal."""
     layouts = [name for name in ("current", "proposed") if name in found]
     lines = [
-        f"standard uncertainties to be expected of {found['runs']} runs, by the {found['scatter']} "
-        "scatter of the rig",
+        f"expected standard uncertainties of {found['runs']} runs, with the {found['scatter']} "
+        "scatter",
         "",
         *aligned(
             [
@@ -147,18 +150,20 @@ def design_text(found: Mapping[str, Any]) -> str:
     ]
     for name in layouts:
         lines.append("")
-        for side in dict.fromkeys(gate["side"] for gate in found[name]["gates"]):
+        sides = [*dict.fromkeys(gate["side"] for gate in found[name]["gates"])]
+        for side in sides:
             heights = ", ".join(
                 f"{gate['height_m'] * 1e3:g}"
                 for gate in found[name]["gates"]
                 if gate["side"] == side
             )
-            lines.append(f"{name}, {side} side (mm): {heights}")
+            where = f", {side} side" if len(sides) > 1 else ""
+            lines.append(f"{name}{where} (mm): {heights}")
         lines.append(f"{name}: {found[name]['trials']['text']}")
         if not found[name]["readable"]:
             lines.append(
-                f"{name}: edges may be given to wrong rods, and drops be void; beams above the "
-                "drop height see the chain before anything strikes"
+                f"{name}: drops may be void, because edges are ambiguous; "
+                "add a beam above the drop height"
             )
     return "\n".join(lines)
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Flash a board and say what it is now."""
-    with goes_on("if the board has half a firmware now, the same command gives it a whole one"):
+    with goes_on("the firmware may be incomplete; run the same command again"):
         return _flashed(arguments)
 
 
@@ -29,7 +29,7 @@ def _flashed(arguments: Namespace) -> int:
         raise InputError(f"--drive is for a {DRIVE.board.name}", "an Arduino has a --port")
     elif port is None:
         raise InputError(
-            "rig flash: --port is missing", "such as /dev/ttyACM0; rig ports lists them"
+            "rig flash: --port is missing", "such as --port /dev/ttyACM0; rig ports lists the ports"
         )
     else:
         found = flash(board, port, arguments.hex, arguments.avrdude, say)

@@ -12,6 +12,7 @@ from textwrap import wrap
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from rig.command_help import runnable
 from rig.errors import InputError
 from rig.files import write_atomic
 from rig.streams import say as narrate
@@ -24,12 +25,16 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
 
 VOID = 3
-say = narrate
+
+
+def say(line: str) -> None:
+    """Print a line of narration, with its commands as this user can run them."""
+    narrate(runnable(line))
 
 
 @contextmanager
 def goes_on(how: str) -> Iterator[None]:
-    """Have Ctrl-C say how to go on with what was begun; see `rig.cli.main`."""
+    """Add to the message of Ctrl-C how to continue; see `rig.cli.main`."""
     try:
         yield
     except KeyboardInterrupt:
@@ -192,7 +197,7 @@ def print_results(
         if found.simulated:
             print("SIMULATED DATA")
         if found.blind:
-            print("BLIND: what was measured is kept back until rig unblind SESSION")
+            print("BLIND: results stay hidden until rig unblind SESSION")
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
         from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 

@@ -33,11 +33,11 @@ def main(arguments: Namespace) -> int:
         print(_line(port, asked.get(port.path)))
     ids = Counter(who["identity"]["unique_id"] for who in asked.values() if who["identity"])
     for shared in (one for one, count in ids.items() if count > 1):
-        say(f"several boards have the id {shared}: erase the EEPROM of all but one")
+        say(f"several boards have the id {shared}: erase the EEPROM of all but one board")
     for drive in waiting_drives():
         say(f"a Pico waits for firmware at {drive}: rig flash --board pico")
     if not any(port.candidate for port in ports):
-        say("no board found: is its cable plugged in, and one that carries data?")
+        say("no board found: check its plug, and use a USB cable with data wires")
     return 0
 
 
@@ -55,7 +55,7 @@ def _who(path: str) -> dict[str, Any]:
 def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPort]:
     """Add the ports that were named and are no serial ports of this computer."""
     listed = {port.path for port in ports}
-    why = "no serial port of this computer"
+    why = "not a serial port of this computer"
     return [*ports, *(SerialPort(path, skipped=why) for path in asked if path not in listed)]
 
 

@@ -29,13 +29,15 @@ def main(arguments: Namespace) -> int:
     if arguments.figure is not None:
         if arguments.protocol is not None:
             raise InputError(
-                f"figure {arguments.figure} is of the paper's own chains, not of a protocol's",
-                f"leave {arguments.protocol} out; rig sweep and rig report draw a protocol's",
+                f"--figure {arguments.figure} draws the paper's own chains",
+                f"leave {arguments.protocol} out; rig sweep PROTOCOL draws yours",
             )
         _write_figure(arguments.figure, arguments.output, resolved=arguments.resolved)
         return 0
     if arguments.protocol is None:
-        raise InputError("predict what?", "name a protocol file, or a --figure with -o FILE.svg")
+        raise InputError(
+            "PROTOCOL is missing", "rig predict PROTOCOL, or rig predict --figure 3 -o FILE.svg"
+        )
     protocol = reader.read(arguments.protocol)
     found = predictions(protocol)
     whole = {"predictions": [line.json() for line in found]}
@@ -89,9 +91,7 @@ def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
     if output is None:
-        raise InputError(
-            "a figure needs a file to go to", f"rig predict --figure {number} -o FILE.svg"
-        )
+        raise InputError("-o FILE.svg is missing", f"rig predict --figure {number} -o FILE.svg")
     path = Path(output)
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     kind_of(picture)
@@ -117,8 +117,8 @@ def _resolved(number: int) -> dict[str, list[float]]:
     from rig.bench import resolved_paper  # noqa: PLC0415 - only where chains really fall
 
     if number not in {3, 4}:
-        raise InputError(f"figure {number} has no resolved falls", "figures 3 and 4 have")
-    say("letting chains fall in the resolved world; this takes some minutes")
+        raise InputError(f"figure {number} has no resolved falls", "use figure 3 or 4")
+    say("simulating drops rod by rod; this takes some minutes")
     if number == 3:
         return resolved_paper.figure_3(resolved_paper.uniform())
     (found,) = resolved_paper.graded(variants=resolved_paper.AS_MEASURED)

@@ -19,10 +19,10 @@ def main(arguments: Namespace) -> int:
     print("\n".join(describe(found)))
     if arguments.output is None:
         if not found.whole and not found.foreign:
-            say("rig recover with -o NEW saves what is left")
+            say("rig recover SESSION -o NEW saves it")
         return 0 if found.whole else SessionError.exit_code
     missing = save(found, arguments.output, arguments.protocol)
     for what in missing:
         say(f"not saved: {what}")
-    say(f"{arguments.output}: {len(found.drops)} drops; rig analyze computes their results anew")
+    say(f"{arguments.output}: {len(found.drops)} drops; rig analyze computes their results")
     return 0

@@ -22,7 +22,7 @@ def main(arguments: Namespace) -> int:
     attended = not arguments.yes and sys.stdin.isatty()
     operator = narrator(arguments.protocol, _ask if attended else None)
     interrupts = Interrupts()
-    with goes_on("the same command goes on from here"), interrupts.caught():
+    with goes_on("the same command continues the session"), interrupts.caught():
         found = run_protocol(
             arguments.protocol,
             arguments.port,
@@ -39,4 +39,4 @@ def main(arguments: Namespace) -> int:
 
 
 def _ask(request: str) -> None:
-    ask(f"{request}\n  then press Enter (Ctrl-C stops, the same command goes on) ")
+    ask(f"{request}\n  then press Enter (Ctrl-C stops; the same command continues) ")

@@ -20,7 +20,7 @@ def main(arguments: Namespace) -> int:
     """Make all checks, one line each."""
     options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release)
     if options.release:
-        say("release 0 is going to be driven once: keep clear of it")
+        say("release 0 will be driven once: keep clear of it")
     with closing(open_port(arguments.port)) as port:
         failed = 0
         for outcome in selftest(port, port_clock(port), options):

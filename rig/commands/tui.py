@@ -30,13 +30,16 @@ def main(arguments: Namespace) -> int:
         from rig.tui.pictures import draw  # noqa: PLC0415 - not for a session
 
         if options.session is None or not options.session.exists():
-            raise InputError("--pictures needs --session FILE: what they show")
+            raise InputError("--pictures needs --session FILE")
         require_file(options.session)
         for path in draw(options.session, Path(arguments.pictures), keys, options.files):
             print(path)
         return 0
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise InputError("rig tui needs a terminal", "without one: rig run PROTOCOL --port URL")
+        raise InputError(
+            "rig tui needs a terminal",
+            "without a terminal: rig run PROTOCOL --port URL --session FILE",
+        )
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
     asyncio.run(_shown(RigApp(options, keys, loaded=gc.freeze)))
     return 0

@@ -18,8 +18,8 @@ def main(arguments: Namespace) -> int:
         if not kept_back(session, protocol_of(session)):
             when = f"since {session.unblinded}" if session.unblinded else "and never was blind"
             raise SessionError(
-                f"{arguments.session} is open {when}", "its numbers: rig analyze SESSION"
+                f"{arguments.session} is open {when}", "show the results: rig analyze SESSION"
             )
         session.unblind()
-        print(f"unblinded at {session.unblinded}; its numbers: rig analyze {arguments.session}")
+        print(f"unblinded at {session.unblinded}; results: rig analyze {arguments.session}")
     return 0

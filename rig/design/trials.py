@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rig.analysis.identify import Identification
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol, Run
+    from rig.vocabulary import Vocabulary
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -172,15 +173,17 @@ def misread(found: Identification, truth: Mapping[str, Sequence[Index]]) -> list
     ]
 
 
-def trials_text(found: Trials) -> str:
-    """Say in a sentence what became of trial drops, and what would help."""
-    text = f"of {found.drops} trial drops {found.read} are read"
-    if found.failing:
-        sides = " and ".join(f"{side} side ({count})" for side, count in found.failing)
-        text += f"; what fails is the {sides}"
-    if found.wanted is not None:
-        side, height = found.wanted
-        text += f"; a further {side} gate at {height * 1e3:.0f} mm would tell most"
-    elif found.failing:
-        text += "; another gate there, well above the lowest one, would help"
+def trials_text(outcome: Trials, words: Vocabulary) -> str:
+    """Say how many simulated trial drops were identified, and which gate would help."""
+    share = "all" if outcome.read == outcome.drops else f"{outcome.read} of"
+    text = f"{share} {outcome.drops} simulated trial drops were identified"
+    if outcome.failing and words.two_sides:
+        sides = " and ".join(f"{side} side ({count})" for side, count in outcome.failing)
+        text += f"; unclear: {sides}"
+    if outcome.wanted is not None:
+        side, height = outcome.wanted
+        gate = f"{side} gate" if words.two_sides else "gate"
+        text += f"; add a {gate} at {height * 1e3:.0f} mm"
+    elif outcome.failing:
+        text += "; add a gate well above the lowest gate"
     return text

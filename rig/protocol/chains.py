@@ -70,7 +70,7 @@ def read_chains(
     _, entries = fields.unique_entries(outer, "chains", faults)
     described = {name: _named(outer, name, value, faults) for name, value in entries.items()}
     if not 1 <= len(entries) <= 2:
-        faults.add(outer.place, "chains", f"found {len(entries)} chains; one or two are wanted")
+        faults.add(outer.place, "chains", f"found {len(entries)} chains; one or two are accepted")
     built: dict[str, RodChain | None] = {}
     for name in _bases_first(described, faults):
         one = described[name]
@@ -91,7 +91,7 @@ def _named(outer: Mapping, name: str, node: Node, faults: FieldFaults) -> _Descr
     path = fields.join("chains", name)
     place = next(key.place for key, _ in outer.entries if getattr(key, "text", None) == name)
     if not name.isidentifier() or len(name) > _LONGEST_NAME:
-        faults.add(place, path, "a chain's name is one word of letters and digits, e.g. A")
+        faults.add(place, path, "this name needs to be one word of letters and digits, such as A")
     inner = fields.mapping(node, path, faults)
     if inner is None:
         return None
@@ -119,7 +119,7 @@ def _bases_first(described: dict[str, _Described | None], faults: FieldFaults) -
             message = f"found {quoted(one.base)}; {close}accepted: {accepted}"
             faults.add(one.given_name, path, message)
         elif one.base not in order:
-            message = "goes round in a circle; describe one of the chains in full"
+            message = "like refers back to itself; describe one chain in full"
             faults.add(one.given_name, path, message)
         order.append(name)
     return order
@@ -166,11 +166,11 @@ def _chain(name: str, section: Section, *, seen_by_gates: bool, struck: bool) ->
     if rods is not None and len(rods.diameters) == 1:
         length = 0.0
         for key in (key for key in ("length", "spacing") if key in section):
-            section.fault(key, "one rod alone has none; leave it out", at_key=True)
+            section.fault(key, f"one object has no {key}; leave it out", at_key=True)
     elif isinstance(section.values.get("spacing"), Sequence):
         length = math.nan
         if "length" in section:
-            section.fault("length", "the listed spacing says it; leave it out", at_key=True)
+            section.fault("length", "follows from the listed spacing; leave it out", at_key=True)
     else:
         length = section.take("length", fields.exact(LENGTH), required="1165 mm")
     rod_length = section.take("rod_length", fields.exact(ROD_LENGTH), math.nan)
@@ -213,7 +213,7 @@ def _masses(section: Section, rods: Rods, heights: tuple[float, ...]) -> tuple[f
     if "masses" not in section:
         return rods.masses
     if rods.weighed:
-        section.fault("masses", "mass is given too; keep one of them", at_key=True)
+        section.fault("masses", "mass is also given; keep one of them", at_key=True)
         return None
     from rig.protocol.masses import read_masses  # noqa: PLC0415 - few chains list theirs
 

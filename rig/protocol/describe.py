@@ -1,4 +1,4 @@
-"""A scene in words: what it has, what follows from it, and what was left out."""
+"""A scene in words: its parts, gates, assumptions, plan and limits, and what was left out."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     Returns
     -------
     str
-        Title and sections ``Scene``, ``Gates``, ``Known beforehand``, ``What follows`` and
+        Title and sections ``Scene``, ``Gates``, ``Assumed``, ``Plan and limits`` and
         ``Left out``; empty sections do not appear. Ends without a newline.
     """
     sections = {
         "Scene": _scene(protocol),
         "Gates": _gates(protocol),
-        "Known beforehand": _priors(protocol),
-        "What follows": [*_consequences(protocol), *(f"note: {note}" for note in notes)],
+        "Assumed (change it if you know better)": _priors(protocol),
+        "Plan and limits": [*_plan(protocol), *(f"note: {note}" for note in notes)],
         "Left out": _left_out(protocol),
     }
     blocks = [protocol.title]
@@ -67,15 +67,16 @@ def _scene(protocol: Protocol) -> list[str]:
     """Say what is there."""
     names = " and ".join(protocol.chains)
     if protocol.track is not None:
-        lines = [f"{names} goes down a track; nothing is struck"]
+        lines = [f"{names} goes down a track"]
     elif protocol.surface is None:
-        lines = [f"free fall of {names}; nothing is struck"]
+        lines = [f"{names} falls freely"]
     elif protocol.two_chains:
         lines = [f"two chains, {names}: one strikes the surface, the other falls beside it"]
     else:
         lines = [f"one chain, {names}, strikes the surface"]
     struck = protocol.surface is not None
-    lines += [_chain(chain, struck=struck) for chain in protocol.chains.values()]
+    part = protocol.vocabulary.part
+    lines += [_chain(chain, part, struck=struck) for chain in protocol.chains.values()]
     surface = protocol.surface
     if surface is not None and _uses_surface(protocol):
         restitution = format_quantity(surface.restitution, "1")
@@ -92,7 +93,7 @@ def _scene(protocol: Protocol) -> list[str]:
     lines.append(f"{pull}: {format_quantity(protocol.gravity, 'm/s^2')}")
     along = protocol.track.along(STANDARD_GRAVITY) if protocol.track else STANDARD_GRAVITY
     if protocol.gravity == along:
-        lines[-1] += ", by standard gravity: the fit only begins there"
+        lines[-1] += ", standard gravity: only the start value of the fit"
     if surface is not None or protocol.gates is not None:
         lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {protocol.zero}")
     if protocol.initial_speed != AT_REST:
@@ -117,12 +118,12 @@ def _drag(drag: Drag) -> str:
     return f"coefficient {format_quantity(drag.coefficient, '1')} in air of {density}"
 
 
-def _chain(rods: RodChain, *, struck: bool) -> str:
+def _chain(rods: RodChain, part: str, *, struck: bool) -> str:
     """Describe one chain on one line."""
     chain = rods.chain
-    text = f"{rods.name}: {chain.rods} rods, {_number(chain.length, 'mm')} long"
+    text = f"{rods.name}: {chain.rods} {part}s, {_number(chain.length, 'mm')} long"
     if chain.rods == 1:
-        text = f"{rods.name}: one object"
+        text = f"{rods.name}: one {part}"
     thin, thick = min(rods.widths), max(rods.widths)
     if thick > 0:
         word = "wide" if chain.rods > 1 else "long"
@@ -130,12 +131,12 @@ def _chain(rods: RodChain, *, struck: bool) -> str:
         text += f", {span} mm {word} in the beam"
     pitches = [high - low for low, high in pairwise(chain.heights)]
     if pitches and max(pitches) - min(pitches) > _EVEN:
-        text += f", rods {min(pitches) * 1e3:.1f} to {max(pitches) * 1e3:.1f} mm apart"
+        text += f", {part}s {min(pitches) * 1e3:.1f} to {max(pitches) * 1e3:.1f} mm apart"
     if rods.weighed:
         text += f", {_number(math.fsum(chain.masses), 'g')}"
     if min(chain.masses) != max(chain.masses):
         ratio = max(chain.masses) / min(chain.masses)
-        text += f", graded: heaviest rod {ratio:.3g} times the lightest"
+        text += f", graded: heaviest {part} {ratio:.3g} times the lightest"
     if chain.alpha is not None:
         text += f", α given as {format_quantity(chain.alpha, '1')}"
     elif struck:
@@ -145,7 +146,7 @@ def _chain(rods: RodChain, *, struck: bool) -> str:
 
 def _gates(protocol: Protocol) -> list[str]:
     """List the gates with the rods that pass each."""
-    lines = []
+    lines, words = [], protocol.vocabulary
     for gate in protocol.gates.gates if protocol.gates else ():
         rods = []
         for name, number in passing_rods(protocol, gate).items():
@@ -153,13 +154,15 @@ def _gates(protocol: Protocol) -> list[str]:
                 continue
             total = protocol.chains[name].chain.rods
             rods.append(f"{name} {total - number + 1}–{total}")
-        place = f"{gate.side:6}  channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm"
-        lines.append(f"{place}  rods {', '.join(rods)}" if rods else place)
+        side = f"{gate.side:6}  " if words.two_sides else ""
+        place = f"{side}channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm"
+        lines.append(f"{place}  {words.part}s {', '.join(rods)}" if rods else place)
     if protocol.gates is not None and lines:
         height, datum = (
             _number(u, "mm") for u in (protocol.gates.height_u, protocol.gates.datum_u)
         )
-        lines.append(f"heights ± {height} each, and ± {datum} of each post's zero")
+        each = " on each side" if words.two_sides else ""
+        lines.append(f"each height ± {height}; the zero of the heights ± {datum}{each}")
     return lines
 
 
@@ -168,7 +171,7 @@ _STRUCK = {"departure", "last_rods", "impulses", "impulse_floor", "last_impulse"
 
 
 def _priors(protocol: Protocol) -> list[str]:
-    """List what is taken as known of what nobody measured, one standard deviation each."""
+    """List what is assumed where nothing was measured, as standard deviations."""
     if protocol.gates is None:
         return []
     from rig.protocol.priors import PRIORS  # noqa: PLC0415 - only where something is measured
@@ -186,7 +189,7 @@ def _priors(protocol: Protocol) -> list[str]:
             format_quantity(one, "mm") for one in (protocol.contact.level, protocol.contact.strike)
         )
         lines += _touching(protocol, level)
-        lines.append(f"the top rod strikes {strike} above that, on rods that lie there")
+        lines.append(f"the top rod strikes {strike} above it, on the rods below")
     return lines
 
 
@@ -203,9 +206,9 @@ def _unused(protocol: Protocol) -> set[str]:
 
 
 def _touching(protocol: Protocol, level: str) -> list[str]:
-    """Say where rods touch."""
+    """Say at which height rods touch the surface."""
     if not protocol.contact.from_board:
-        return [f"rods touch at {level} above the gates' zero"]
+        return [f"contact level: {level} above the zero of the heights"]
     lines = []
     for incline in dict.fromkeys(protocol.plan.inclines):
         for name in protocol.strikers:
@@ -214,11 +217,11 @@ def _touching(protocol: Protocol, level: str) -> list[str]:
             rod = "a rod" if not protocol.unlike_chains else f"a rod of {name}"
             text = high if low == high else f"{low} to {high}"
             lines.append(f"at {incline:g}° {rod} touches when its middle is {text} above the board")
-    return [*lines, f"what that leaves out: {level}"]
+    return [*lines, f"further offset of the contact level: {level}"]
 
 
-def _consequences(protocol: Protocol) -> list[str]:
-    """Say what follows: runs, edges and time."""
+def _plan(protocol: Protocol) -> list[str]:
+    """List runs, edges, recording, boards and time."""
     planned, plan = runs(protocol), protocol.plan
     lines = ["1 run" if len(planned) == 1 else f"{len(planned)} runs"]
     if protocol.surface is not None:
@@ -236,35 +239,37 @@ def _consequences(protocol: Protocol) -> list[str]:
     if protocol.gates is None:
         return lines
     if protocol.blind:
-        lines.append("blind: what is measured is kept back until rig unblind SESSION")
-    lines += [f"note: only predicted, not run: {reason}" for reason in unmeasurable(protocol)]
+        lines.append("blind: results stay hidden until rig unblind SESSION")
+    lines += [f"note: prediction only: {reason}" for reason in unmeasurable(protocol)]
     if (problem := too_long(protocol)) is not None:
-        lines.append(f"note: not run: {problem}")
-    lines.append(f"at most {most_edges(protocol)} edges a drop")
+        lines.append(f"note: cannot be recorded: {problem}")
+    lines.append(f"at most {most_edges(protocol)} edges in a drop")
     seconds = record_ms(protocol) / 1e3
     lines.append(
-        f"recorded for {seconds:g} s; the longest fall takes {longest_fall(protocol):.2g} s"
+        f"recording: {seconds:g} s; the last edge comes within {longest_fall(protocol):.2g} s"
     )
     lines += _boards(protocol)
     whole = len(planned) * (plan.settle + seconds)
     time = f"{whole:.0f} s" if whole < 60 else f"{whole / 60:.0f} min"
-    lines.append(f"about {time}, settling {plan.settle:g} s before each drop; "
-                 "hanging the chains comes on top")  # fmt: skip
+    lines.append(
+        f"duration: about {time}, with {plan.settle:g} s to settle before each drop; "
+        f"{protocol.vocabulary.reset} adds to this"
+    )
     return lines
 
 
 def _boards(protocol: Protocol) -> list[str]:
-    """Say which boards can do a protocol, and what the others lack."""
+    """Name the boards that can run a protocol, and what the other boards lack."""
     wants = {word: lacking(protocol, board) for word, board in BOARDS.items()}
     able = [word for word, problems in wants.items() if not problems]
-    lines = [f"boards that can do it: {', '.join(able)}"] if able else []
+    lines = [f"suitable boards: {', '.join(able)}"] if able else []
     for word, problems in wants.items():
         gates = [problem for problem in problems if problem.key.startswith("gates.")]
         others = [problem for problem in problems if problem not in gates]
-        lines += [f"note: not with board {word}: {problem}" for problem in others]
+        lines += [f"note: board {word} is not suitable: {problem}" for problem in others]
         if gates:  # of many alike the first will do
             more = f" (and {len(gates) - 1} more)" if len(gates) > 1 else ""
-            lines.append(f"note: not with board {word}: {gates[0]}{more}")
+            lines.append(f"note: board {word} is not suitable: {gates[0]}{more}")
     return lines
 
 
@@ -274,14 +279,14 @@ def _uses_surface(protocol: Protocol) -> bool:
 
 
 def _left_out(protocol: Protocol) -> list[str]:
-    """Say what the scene does not have, and what is therefore not computed."""
+    """List what the scene does not have, and what is therefore not computed."""
     lines = []
     if protocol.surface is None:
-        what = "gravity" if protocol.track is None else "the acceleration, friction and all"
-        lines.append(f"no surface: no impact, no Δz, no V; the drop measures {what}")
+        what = "gravity" if protocol.track is None else "the acceleration with its friction"
+        lines.append(f"no surface: no impact, Δz or V; the drops measure {what}")
     else:
         if len(protocol.chains) == 1:
-            lines.append("no second chain: no free fall beside it, no Δz and no release skew")
+            lines.append("no second chain: no Δz and no release skew")
         if not _uses_surface(protocol):
             lines.append("α is given: restitution, friction and inclination are not used")
         elif max(protocol.plan.inclines) == 0:
@@ -289,9 +294,7 @@ def _left_out(protocol: Protocol) -> list[str]:
         elif protocol.surface.friction == Quantity(0.0):
             lines.append("no friction given: taken as 0 at every incline")
     if protocol.gates is None:
-        lines.append("no gates: nothing is measured, the scene is only predicted")
+        lines.append("no gates: prediction only, nothing is measured")
     if protocol.drag is None:
-        lines.append(
-            "no drag: predictions leave the air out; edges tell it, or its prior allows for it"
-        )
+        lines.append("no drag: predictions ignore air; the fit estimates it")
     return lines

@@ -1,4 +1,4 @@
-"""A protocol file written from a few answers, with comments, and gates where they can be read."""
+"""A protocol file from a few answers, with comments, and gates at suitable heights."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
 SCENES: dict[Scene, str] = {
-    "two-chains": "two like chains, one strikes a board: separation and end speed",
+    "two-chains": "two equal chains, one strikes a board: separation and end speed",
     "one-chain": "one chain strikes a board: end speed",
     "object": "one object falls freely: gravity",
-    "track": "one object goes down a track: acceleration",
+    "track": "one object slides or rolls down a track: acceleration",
     "picket-fence": "bars fall freely: gravity",
 }
 STRUCK: tuple[Scene, ...] = ("two-chains", "one-chain")
@@ -62,8 +62,9 @@ class Draft:
 
     def trial(self) -> Draft:
         """Return the same with four drops, at the incline that stands in the middle."""
-        found = [one.strip() for one in self.inclines.split(",") if one.strip()]
-        return replace(self, inclines=found[len(found) // 2] if found else "", repeats=4)
+        inclines = [incline.strip() for incline in self.inclines.split(",") if incline.strip()]
+        middle = inclines[len(inclines) // 2] if inclines else ""
+        return replace(self, inclines=middle, repeats=4)
 
 
 def draft_text(draft: Draft) -> str:
@@ -78,8 +79,8 @@ def draft_text(draft: Draft) -> str:
     try:
         bare = parse(without.replace("gates: {}\n", ""), draft.title)
     except InputError as error:
-        found = [f"{one.key}: {one.message}" for one in error.problems]
-        raise InputError("; ".join(found) or str(error), "rig new --help") from None
+        messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
+        raise InputError("; ".join(messages) or str(error), "rig new --help") from None
     text = "\n".join(_lines(draft, _gates(bare, draft))) + "\n"
     parse(text, draft.title)
     return text
@@ -88,8 +89,8 @@ def draft_text(draft: Draft) -> str:
 def _lines(draft: Draft, gates: list[str]) -> list[str]:
     struck = draft.scene in STRUCK
     lines = [
-        "# Written by rig new. Put in what you measured; rig check FILE says what follows from it.",
-        "# A quantity may have its standard uncertainty: 180 mm ± 2 mm.",
+        "# Written by rig new. Replace the values by yours; rig check FILE shows plan and limits.",
+        "# A quantity may have its standard uncertainty, such as 900 mm ± 2 mm.",
         "protocol: 1",
         f"title: {json.dumps(draft.title, ensure_ascii=False)}",
         "",
@@ -98,7 +99,7 @@ def _lines(draft: Draft, gates: list[str]) -> list[str]:
     ]
     if struck:
         lines += [
-            "surface:                 # guesses, until rig estimate has found them",
+            "surface:                 # guesses; rig estimate SESSION measures them",
             "  restitution: 0.50 ± 0.10",
             "  friction: 0.20 ± 0.10",
             "",
@@ -106,11 +107,14 @@ def _lines(draft: Draft, gates: list[str]) -> list[str]:
     if draft.scene == "track":
         lines += [
             f"track: {{incline: {draft.inclines}}}   # rolling_inertia: 0.4 if a ball rolls",
-            "# Gates and drop are lengths along the track, above any mark below them.",
+            "# Gates and drop are lengths along the track, from a mark below all gates.",
         ]
     else:
-        where = "above the contact point" if struck else "above any level below the gates"
-        lines.append(f"# Heights are {where}; the drop is that of the lowest rod's middle.")
+        where = "above the contact point" if struck else "above one level below the gates"
+        middle = {"object": "object's", "picket-fence": "lowest bar's"}.get(
+            draft.scene, "lowest rod's"
+        )
+        lines.append(f"# Heights are {where}; drop: that of the {middle} middle before release.")
     lines += [
         f"drop: {draft.drop}",
         "gravity: 9.81 m/s^2      # or  site: {latitude: 50 deg, height: 100 m}",
@@ -121,14 +125,14 @@ def _lines(draft: Draft, gates: list[str]) -> list[str]:
     ]
     if not struck:
         lines += [
-            "# What the air takes is an unknown too, unless you know it: m g = C ρ A v²/2 tells v.",
+            "# The fit estimates the drag of the air. If you know the terminal speed, state it:",
             "# drag: {terminal_speed: 60 m/s ± 6 m/s}   # a steel ball of 20 mm",
         ]
     incline = f"incline: [{draft.inclines}], " if struck else ""
     order = ", order: ABBA" if draft.scene == "two-chains" else ""
     lines += [
         f"plan: {{{incline}repeats: {draft.repeats}{order}, settle: 10 s}}",
-        "# Limits for a valid drop, fixed before any result is seen; of few edges one is much.",
+        "# Limits of a valid drop, stated before any result is known.",
         f"accept: {{missed_edges: {5 if struck else 15} %}}",
     ]
     return lines
@@ -138,7 +142,10 @@ def _chains(draft: Draft) -> list[str]:
     if draft.scene in {"object", "track"}:
         return ["chains:", f"  body: {{rods: 1, diameter: {draft.diameter}}}  # length in a beam"]
     rods = f"rods: {draft.rods}, length: {draft.length}, diameter: {draft.diameter}"
-    lines = ["chains:                  # length: middle of the lowest rod to that of the highest"]
+    part = "bar" if draft.scene == "picket-fence" else "rod"
+    lines = [
+        f"chains:                  # length: middle of the lowest {part} to that of the highest"
+    ]
     if draft.scene == "picket-fence":
         return [*lines, f"  fence: {{{rods}, position_uncertainty: 0.1 mm}}"]  # they are printed
     lines.append(f"  A: {{{rods}}}")
@@ -155,7 +162,7 @@ def _gates(protocol: Protocol, draft: Draft) -> list[str]:
         for height in sorted(heights):
             lines.append(f"    - {{channel: {channel}, height: {height * 1e3:.1f} mm}}")
             channel += 1
-    lines.append("  height_uncertainty: 0.5 mm   # of each beam above its post's zero")
+    lines.append("  height_uncertainty: 0.5 mm   # of each beam")
     return lines
 
 
@@ -166,7 +173,9 @@ def _shared_out(draft: Draft) -> dict[Side, int]:
     if draft.scene != "two-chains":
         return {"free": draft.gates}
     if draft.gates < 2:
-        raise InputError("two chains need two gates, one on each side", "take one-chain for one")
+        raise InputError(
+            "two chains need two gates, one on each side", "for one gate use --scene one-chain"
+        )
     impact = 1 if draft.gates < 5 else draft.gates // 2
     return {"impact": impact, "free": draft.gates - impact}
 
@@ -176,7 +185,7 @@ def _struck(protocol: Protocol, side: Side, number: int) -> list[float]:
     (rods, *_), drop = protocol.chains.values(), protocol.drop
     half = max(rods.widths) / 2.0
     lowest, below = half + _CLEAR, drop.value - half - max(_CLEAR, drop.u)
-    found = [
+    heights = [
         max(lowest, min(meant, lowest + share * (below - lowest))) for meant, share in _LOW[side]
     ][:number]
     gaps = [
@@ -185,18 +194,18 @@ def _struck(protocol: Protocol, side: Side, number: int) -> list[float]:
         if high - low > 2.0 * (half + max(_CLEAR, drop.u))
     ]
     for share in _HIGH:
-        if len(found) == number or not gaps:
+        if len(heights) == number or not gaps:
             break
         wanted = drop.value + share * rods.chain.length
-        gap = min(gaps, key=lambda one, wanted=wanted: abs(one - wanted))  # type: ignore[misc]
+        gap = min(gaps, key=lambda gap, wanted=wanted: abs(gap - wanted))  # type: ignore[misc]
         gaps.remove(gap)
-        found.append(gap)
-    if len(found) < number:
+        heights.append(gap)
+    if len(heights) < number:
         raise InputError(
-            f"there is no place for {number} gates on one side of such a chain",
-            f"take {len(found)} a side, a longer drop or thinner rods",
+            f"there is no space for {number} gates on one side",
+            f"use {len(heights)} a side, a longer drop or thinner rods",
         )
-    return found
+    return heights
 
 
 def _even(protocol: Protocol, number: int) -> list[float]:

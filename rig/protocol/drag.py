@@ -37,20 +37,20 @@ def read_drag(chains: Iterable[RodChain]) -> Converter[Drag]:
         density = section.take("air_density", fields.exact(DENSITY), usual.air_density)
         terminal = section.take("terminal_speed", fields.quantity(TERMINAL_SPEED))
         if ("coefficient" in section) == ("terminal_speed" in section):
-            message = "one of coefficient: 1.1 ± 0.2 and terminal_speed: 25 m/s is wanted"
+            message = "state either coefficient: 1.1 ± 0.2 or terminal_speed: 25 m/s"
             if not section.strange:
                 section.refuse(message)
             return None
         if terminal is not None:
             if "air_density" in section:
-                message = "the terminal speed says it all; leave air_density out"
+                message = "not used with terminal_speed; leave air_density out"
                 section.fault("air_density", message, at_key=True)
             return Drag(terminal_speed=terminal)
         for rods in chains:
             missing = _missing(rods)
             if missing and "coefficient" in section:
-                message = f"chain {rods.name} lacks {missing}, on which its drag depends"
-                section.fault("coefficient", f"{message}; or give a terminal_speed")
+                message = f"needs {missing} of {rods.name}"
+                section.fault("coefficient", f"{message}; state it, or terminal_speed instead")
         return None if coefficient is None or density is None else Drag(coefficient, density)
 
     return convert

@@ -139,7 +139,7 @@ def unique_entries(
     values: dict[str, Node] = {}
     for key, value in node.entries:
         if not isinstance(key, ScalarNode):
-            faults.add(key.place, path, f"found {key} as a key; a word is wanted")
+            faults.add(key.place, path, f"found {key} as a key; a word is accepted")
         elif key.text in keys:
             first = keys[key.text].line
             message = f"repeated key, first given on line {first}; keep one of them"
@@ -154,7 +154,7 @@ def mapping(node: Node, key: str, faults: FieldFaults) -> Mapping | None:
     """Convert to a mapping."""
     if isinstance(node, Mapping):
         return node
-    faults.add(node.place, key, f"found {node}; a mapping {{key: value, …}} is wanted")
+    faults.add(node.place, key, f"found {node}; accepted: a mapping {{key: value, …}}")
     return None
 
 
@@ -176,7 +176,7 @@ def sequence(node: Node, key: str, faults: FieldFaults) -> Sequence | None:
     if isinstance(node, Sequence) and node.items:
         return node
     found = "an empty list" if isinstance(node, Sequence) else str(node)
-    faults.add(node.place, key, f"found {found}; a list [ … , … ] is wanted")
+    faults.add(node.place, key, f"found {found}; accepted: a list [ … , … ]")
     return None
 
 
@@ -186,13 +186,13 @@ def string(node: Node, key: str, faults: FieldFaults) -> str | None:
         # An escape sequence in a title would act on the terminal that shows it.
         if all(character.isprintable() or character == "\n" for character in node.text):
             return node.text
-        faults.add(node.place, key, f"found {node} with control characters; plain text is wanted")
+        faults.add(node.place, key, f"found {node} with control characters; accepted: plain text")
         return None
     if isinstance(node, ScalarNode) and node.kind != "nothing":
-        wanted = f'text is wanted: put it in quotes, "{node}"'
+        wanted = f'accepted: text, in quotes: "{node}"'
         faults.add(node.place, key, f"found {node}, which is {node.kind}; {wanted}")
     else:
-        faults.add(node.place, key, f"found {node}; text is wanted")
+        faults.add(node.place, key, f"found {node}; accepted: text")
     return None
 
 
@@ -230,7 +230,7 @@ def whole(low: int, high: int) -> Converter[int]:
             number = sign * int(digits, base)
             if low <= number <= high:
                 return number
-        faults.add(node.place, key, f"found {node}; a whole number from {low} to {high} is wanted")
+        faults.add(node.place, key, f"found {node}; accepted: a whole number from {low} to {high}")
         return None
 
     return convert
@@ -259,7 +259,7 @@ def quantity(accepted: Range) -> Converter[Quantity]:
 
     def convert(node: Node, key: str, faults: FieldFaults) -> Quantity | None:
         if not isinstance(node, ScalarNode) or node.kind in {"nothing", "a boolean"}:
-            wanted = f"{accepted.dimension.noun} is wanted, e.g. {accepted.dimension.example}"
+            wanted = f"accepted: {accepted.dimension.noun}, such as {accepted.dimension.example}"
             faults.add(node.place, key, f"found {node}; {wanted}")
             return None
         try:
@@ -275,7 +275,7 @@ def quantity(accepted: Range) -> Converter[Quantity]:
     return convert
 
 
-def exact(accepted: Range, hint: str = "no uncertainty is used here") -> Converter[float]:
+def exact(accepted: Range, hint: str = "no uncertainty is accepted here") -> Converter[float]:
     """Return a converter to a bare value; a written uncertainty is refused, not dropped."""
     inner = quantity(accepted)
 

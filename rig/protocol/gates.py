@@ -10,7 +10,7 @@ from rig.boards import GATES
 from rig.protocol import fields
 from rig.protocol.contact import touching_heights
 from rig.protocol.fields import Range, Section
-from rig.protocol.protocol import DATUM_U, SIDES, Gate, Gates, RodChain, Side
+from rig.protocol.protocol import DATUM_U, SIDES, Gate, Gates, RodChain, Side, vocabulary_of
 from rig.units import Dimension
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ HEIGHT = Range(Dimension.LENGTH, 0.0, 100.0, "m", open_low=True)
 HEIGHT_UNCERTAINTY = Range(Dimension.LENGTH, 0.0, 0.1, "mm")
 CLEARANCE_M = 0.001
 """A beam is some millimetres wide and a hanging chain sways: the least margin around a rod, m."""
-_COMMON_U = "write the uncertainty of all gates as height_uncertainty"
+_COMMON_U = "state the uncertainty of all gates as height_uncertainty"
 
 Located = tuple[Gate, "Place", str]
 
@@ -55,10 +55,10 @@ def read_gates(
         return None
     section = Section(outer, "gates", faults, (*SIDES, "height_uncertainty", "datum_uncertainty"))
     if "impact" in section and not surface:
-        message = "the scene has no surface, so nothing strikes; put the gates under free"
+        message = "the scene has no surface; put the gates under free"
         section.fault("impact", message, at_key=True)
     if "free" in section and surface and chains == 1:
-        message = "the scene has one chain, which strikes the surface; put the gates under impact"
+        message = "the only chain strikes the surface; put the gates under impact"
         section.fault("free", message, at_key=True)
     needed = {"impact": surface, "free": not surface or chains > 1}
     used: dict[int, int] = {}
@@ -90,7 +90,7 @@ def _gate(
     if channel is not None:
         line = section.place("channel").line
         if channel in used:
-            message = f"channel {channel} is already in use on line {used[channel]}"
+            message = f"channel {channel} is already used on line {used[channel]}"
             section.fault("channel", message)
         used.setdefault(channel, line)
     if channel is None or height is None:
@@ -107,7 +107,7 @@ def check_clear(
     surface: bool,
     inclines: Sequence[float] = (),
 ) -> None:
-    """Note gates that a hanging chain blocks, that no rod passes, or that sit too low.
+    """Note gates that are blocked before the release, that nothing passes, or that are too low.
 
     The chains swap sides, so every gate is checked against every chain.
 
@@ -132,6 +132,7 @@ def check_clear(
     )
     top = min(drop.value + chain.chain.length for chain in chains)
     spans = [(low, high) for low, high, _, _ in blocked]
+    part = vocabulary_of(chains, struck=surface).part
     alone = chains[0].name if all(chain.chain.rods == 1 for chain in chains) else None
     for gate, place, key in located:
         height = gate.height
@@ -139,18 +140,18 @@ def check_clear(
         if height < lowest:
             message = (
                 f"found {_mm(height)}; a rod at rest on the surface would block the beam: "
-                f"at least {_mm(math.ceil(lowest * 1e4) / 1e4)} is wanted"
+                f"at least {_mm(math.ceil(lowest * 1e4) / 1e4)} is needed"
             )
             faults.add(place, key, message)
         elif hit is not None:
             near = " or ".join(_mm(h) for h in _clear(height, spans, lowest, top))
             free = f"; the nearest clear heights are {near}" if near else ""
-            rod = f"rod {hit[2]} of chain {hit[3]}" if alone is None else alone
+            rod = f"{part} {hit[2]} of {hit[3]}" if alone is None else alone
             message = f"found {_mm(height)}, which {rod} blocks before "
             faults.add(place, key, f"{message}the release{free}")
         elif height > top:
-            what = "no rod passes" if alone is None else f"{alone} does not pass"
-            where = "the top rod hangs" if alone is None else "it begins"
+            what = f"no {part} passes" if alone is None else f"{alone} does not pass"
+            where = f"the top {part} starts" if alone is None else "it starts"
             message = f"found {_mm(height)}; {what} above {_mm(top)}, where {where}"
             faults.add(place, key, message)
 

@@ -48,7 +48,7 @@ def read_masses(heights: tuple[float, ...]) -> Converter[Masses]:
         if len(given) != 1:
             wanted = "exponential: {bottom: 12 g, top: 3 g} or table: [{height: 0 mm, mass: 12 g}]"
             if not section.strange:
-                section.refuse(f"one profile is wanted, {wanted}")
+                section.refuse(f"state one profile, {wanted}")
             return None
         if given == ["exponential"]:
             return section.take("exponential", _exponential(len(heights)))
@@ -60,7 +60,7 @@ def read_masses(heights: tuple[float, ...]) -> Converter[Masses]:
 def _listed(node: Sequence, key: str, faults: FieldFaults, rods: int) -> Masses | None:
     """Convert one mass a rod."""
     if len(node.items) != rods:
-        message = f"found {len(node.items)} masses for {rods} rods; one for each rod is wanted"
+        message = f"found {len(node.items)} masses for {rods} rods; state one for each rod"
         faults.add(node.place, key, message)
         return None
     convert = fields.exact(MASS)
@@ -98,7 +98,7 @@ def _table(heights: tuple[float, ...]) -> Converter[Masses]:
         zs = [height for height, _ in known]
         for i, (low, high) in enumerate(pairwise(zs), start=1):
             if low >= high:
-                message = "heights must rise, each above the one before"
+                message = "heights must increase from point to point"
                 faults.add(listed.items[i].place, f"{key}[{i}]", message)
                 return None
         # A height that sums up from rods is a rounding above what was written.

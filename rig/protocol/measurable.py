@@ -56,10 +56,10 @@ def record_ms(protocol: Protocol) -> int:
 
 
 def unmeasurable(protocol: Protocol) -> list[str]:
-    """Say why the edges of such a drop could not be read, a clause a reason; empty if they can."""
+    """Return the reasons why a drop can only be predicted; none if it can be measured."""
     found = []
     if protocol.initial_speed != AT_REST:
-        found.append("initial_speed: the rig lets its chains go from rest")
+        found.append(f"initial_speed: the rig releases {protocol.vocabulary.body} from rest")
     return found
 
 
@@ -74,8 +74,8 @@ def check_measurable(protocol: Protocol) -> None:
     reasons = unmeasurable(protocol)
     if reasons:
         raise InputError(
-            f"{protocol.source}: only predicted, never measured, because of {'; '.join(reasons)}",
-            "rig predict says what the model expects; to measure, leave these keys out",
+            f"{protocol.source}: prediction only, by {'; '.join(reasons)}",
+            "rig predict shows the prediction; leave these keys out to measure",
         )
 
 
@@ -85,9 +85,9 @@ def too_long(protocol: Protocol) -> Problem | None:
         return None
     place = place_of(load(protocol.text, protocol.source), "drop")
     message = (
-        f"from here a fall takes up to {longest_fall(protocol):.3g} s, to be recorded for "
-        f"{record_ms(protocol) / 1e3:.3g} s; no board records for more than "
-        f"{LONGEST_RECORD_MS / 1e3:g} s: let the chains fall less far, or with more gravity"
+        f"from here a drop takes up to {longest_fall(protocol):.3g} s and needs a recording of "
+        f"{record_ms(protocol) / 1e3:.3g} s; boards record for at most "
+        f"{LONGEST_RECORD_MS / 1e3:g} s: shorten the drop"
     )
     return Problem(protocol.source, place.line, place.column, "drop", message)
 
@@ -123,8 +123,8 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
         for step in path:
             key += f"[{step}]" if isinstance(step, int) else f".{step}" if key else step
         others = [other.one for other in BOARDS.values() if getattr(other, kind) >= least]
-        other = f", or take {' or '.join(others)}" if others else ""
-        message = f"found {what}; the board ({board.name}) has {has}: change it{other}"
+        other = f", or use {' or '.join(others)}" if others else ""
+        message = f"found {what}; the board ({board.name}) has {has}: change this{other}"
         found.append(Problem(protocol.source, place.line, place.column, key, message))
 
     release = protocol.release

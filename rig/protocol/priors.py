@@ -1,4 +1,4 @@
-"""The ``priors`` of a protocol: what is taken to be known where nobody measured it."""
+"""The ``priors`` of a protocol: assumptions about what nobody measured."""
 
 from __future__ import annotations
 

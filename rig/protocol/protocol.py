@@ -14,6 +14,8 @@ from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from rig.model.chain import Chain
     from rig.model.surface import Surface
 
@@ -69,6 +71,16 @@ class RodChain:
     diameters: tuple[float, ...] = ()
     rod_length: float = nan
     weighed: bool = False
+
+
+def vocabulary_of(chains: Collection[RodChain], *, struck: bool) -> Vocabulary:
+    """Return the words of what falls, or strikes a surface."""
+    if all(rods.chain.rods == 1 for rods in chains):
+        return OBJECT
+    if struck:
+        return TWO_CHAINS if len(chains) > 1 else ONE_CHAIN
+    strung = any(rods.tilt_deg for rods in chains)
+    return FREE_CHAIN if strung or len(chains) > 1 else FENCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,14 +336,11 @@ class Protocol:
     @property
     def vocabulary(self) -> Vocabulary:
         """The words of this kind of scene."""
-        if self.track is not None:
-            return TRACK
-        if self.one_object:
-            return OBJECT
-        if self.surface is not None:
-            return TWO_CHAINS if self.two_chains else ONE_CHAIN
-        strung = any(rods.tilt_deg for rods in self.chains.values())
-        return FREE_CHAIN if strung or len(self.chains) > 1 else FENCE
+        return (
+            TRACK
+            if self.track
+            else vocabulary_of(self.chains.values(), struck=self.surface is not None)
+        )
 
     @property
     def zero(self) -> str:

@@ -76,13 +76,13 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     try:
         data = read_input(path, MAX_BYTES + 1)
     except FileNotFoundError:
-        hint = "ready protocols are in protocols/"
+        hint = "rig new FILE.yaml writes a protocol; ready protocols are in protocols/"
         raise InputError(f"{source}: there is no such file", hint) from None
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{source!r}: cannot be read: {reason}") from None
     if len(data) > MAX_BYTES:
-        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a page of text")
+        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -119,7 +119,7 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
         With every problem found.
     """
     if len(text) > MAX_BYTES:
-        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a page of text")
+        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
     faults = FieldFaults(source)
     protocol = _protocol(load(text, source), faults, text, kept=kept)
     if faults.problems or protocol is None:
@@ -145,7 +145,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     )
     count = _count(top.values.get("chains"))
     if not has_surface and count > 1:
-        message = f"found {count} chains; a scene with no surface has one"
+        message = f"found {count} chains; without a surface one is accepted"
         top.fault("chains", message)
     surface = _surface(top, chains) if has_surface else None
     example = "180 mm ± 2 mm" if has_surface or has_gates else ""
@@ -191,7 +191,7 @@ def _version(node: Node, key: str, faults: FieldFaults) -> int | None:
     """Convert the version of the file format: there is one so far."""
     if isinstance(node, ScalarNode) and node.plain and node.text == "1":
         return 1
-    faults.add(node.place, key, f"found {node}; this software reads protocol: 1")
+    faults.add(node.place, key, f"found {node}; accepted: 1")
     return None
 
 
@@ -232,7 +232,7 @@ def _contact(chains: dict[str, RodChain] | None, *, struck: bool) -> Converter[C
     @fields.of_keys("datum", "level", "strike")
     def convert(section: Section) -> Contact | None:
         if not struck:
-            section.refuse("the scene has no surface, so nothing strikes; leave it out")
+            section.refuse("the scene has no surface; leave contact out")
             return None
         usual = Contact()
         datum = section.take("datum", fields.choice(*DATUMS), DATUMS[0])
@@ -254,7 +254,7 @@ def _shaped(section: Section, chains: dict[str, RodChain] | None) -> bool:
     lacking = {name: lacking_geometry(rods) for name, rods in (chains or {}).items()}
     for name, keys in lacking.items():
         if keys:
-            message = f"how high rods touch a board follows from chains.{name}.{keys[0]}: state it"
+            message = f"datum: board needs chains.{name}.{keys[0]}; state it"
             section.fault("datum", message)
     return not any(lacking.values())
 
@@ -285,7 +285,7 @@ def _track(chains: dict[str, RodChain] | None, *, struck: bool) -> Converter[Inc
     @fields.of_keys("incline", "rolling_inertia")
     def convert(section: Section) -> InclinedTrack | None:
         if struck or (chains is not None and any(c.chain.rods > 1 for c in chains.values())):
-            section.refuse("only one object that strikes nothing goes down a track; leave it out")
+            section.refuse("a track is for one object without a surface; leave track out")
             return None
         incline = section.take("incline", fields.quantity(INCLINE), required="5 deg ± 0.1 deg")
         rolling = section.take("rolling_inertia", fields.exact(ROLLING), 0.0)
@@ -314,7 +314,7 @@ def _gravity(top: Section) -> Quantity | None:
     """Read ``gravity`` or ``site``; a scene without a surface measures it, and needs neither."""
     if "gravity" in top and "site" in top:
         first, second = sorted(("gravity", "site"), key=lambda key: top.keys[key])
-        message = f"{first} is given too, on line {top.keys[first].line}; keep one of them"
+        message = f"{first} is also given, on line {top.keys[first].line}; keep one of them"
         top.fault(second, message, at_key=True)
     elif "surface" in top and "gravity" not in top and "site" not in top:
         message = "missing; write gravity: 9.81 m/s^2, or site: {latitude: 61.19 deg, height: 30 m}"

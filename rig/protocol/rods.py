@@ -55,15 +55,15 @@ def read_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods | 
         return None
     total = sum(group.count for group in groups)
     if total > MOST_RODS:
-        section.fault("rods", f"found {total} rods; at most {MOST_RODS} are wanted")
+        section.fault("rods", f"found {total} rods; at most {MOST_RODS} are accepted")
         return None
     if total == 1 and struck:
-        message = "found 1 rod; a chain that strikes a surface has 2 or more"
-        section.fault("rods", f"{message}: leave surface out for one object that falls")
+        message = "found 1 rod; a chain that strikes a surface has at least 2"
+        section.fault("rods", f"{message}; for one object leave surface out")
         return None
     weights = [each if group.mass is None else group.mass for group in groups]
     if len({mass is None for mass in weights}) > 1:
-        section.fault("rods", "mass is given for some groups only; give it for all or none")
+        section.fault("rods", "mass is given for some groups only; state it for all or none")
         return None
     known = [common if group.diameter is None else group.diameter for group in groups]
     if None in known and (seen_by_gates or any(d is not None for d in known)):

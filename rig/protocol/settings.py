@@ -76,16 +76,14 @@ def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:
     @fields.of_keys("incline", "repeats", "order", "randomize", "seed", "settle")
     def convert(section: Section) -> Plan | None:
         if "incline" in section and not surface:
-            message = "the scene has no surface, so nothing is inclined; leave it out"
+            message = "the scene has no surface; leave incline out"
             section.fault("incline", message, at_key=True)
         usual = Plan()
         inclines = section.take("incline", _inclines, usual.inclines)
         repeats = section.take("repeats", fields.whole(1, MOST_REPEATS), usual.repeats)
         order = section.take("order", fields.choice("ABBA", "alternate", "fixed"), usual.order)
         if "order" in section and order in {"ABBA", "alternate"} and not turns:
-            message = (
-                f"found {order}; the scene has one chain, which cannot take turns; leave it out"
-            )
+            message = f"found {order}, which needs two chains; leave order out"
             section.fault("order", message)
         mixed = fields.choice("none", "incline", "all")
         randomize = section.take("randomize", mixed, usual.randomize)
@@ -96,7 +94,7 @@ def _plan(*, surface: bool, turns: bool) -> Converter[Plan]:
         if randomize is None or seed is None or settle is None:
             return None
         if len(inclines) * repeats > MOST_RUNS:
-            message = f"makes {len(inclines) * repeats} runs; at most {MOST_RUNS} are accepted"
+            message = f"found {len(inclines) * repeats} runs; at most {MOST_RUNS} are accepted"
             section.fault("repeats", message)
             return None
         return Plan(
@@ -124,7 +122,7 @@ def _inclines(node: Node, key: str, faults: FieldFaults) -> tuple[float, ...] | 
     for i, item in enumerate(listed.items):
         angle = convert(item, f"{key}[{i}]", faults)
         if angle in lines:
-            message = f"found {item} again (line {lines[angle]}); repeats says how often"
+            message = f"found {item} again (line {lines[angle]}); use repeats for more drops"
             faults.add(item.place, f"{key}[{i}]", message)
         elif angle is not None:
             lines[angle] = item.place.line

@@ -16,11 +16,12 @@ from rig.text_table import text_table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rig.protocol.protocol import Gates, InclinedTrack, Protocol, Side
+    from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol, Side
     from rig.report.canvas import Canvas
 
 _WORDS: dict[Side, str] = {"impact": "strikes", "free": "falls beside it"}
 _COLOURS: dict[Side, str] = {"impact": SECOND, "free": MODEL}
+_LEGEND = "At each beam: channel: height in mm."
 _WIDTH_IN = 9.0
 _WRAP = 100
 _LINE_IN = 0.195
@@ -46,7 +47,9 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
     if protocol.track is not None:
         return _track_figure(protocol, protocol.track, gates)
     inclines = _inclines(protocol)
-    text = "\n".join([protocol.title, "", *_zero(protocol, gates), *_slots(protocol, gates)])
+    text = "\n".join(
+        [protocol.title, _LEGEND, "", *_zero(protocol, gates), *_slots(protocol, gates)]
+    )
     foot = _LINE_IN * (text.count("\n") + 2)
     with canvas(
         (5.6, foot), _WIDTH_IN, simulated=False, columns=2, sharex=False, description=protocol.title
@@ -59,7 +62,7 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
         # What lies below is named in the other view, where there is room.
         _side_view(whole, protocol, gates, 1.04 * max(top, hanging), named_above=near)
         whole.set_ylabel("")
-        whole.set_title("both posts, from the side", loc="left")
+        whole.set_title("posts and beams, from the side", loc="left")
         _side_view(close, protocol, gates, near)
         _name_inclines(close, protocol, 0.45 * near)
         close.set_title(f"close to the {protocol.zero}" if inclines else "lowest gates", loc="left")
@@ -74,9 +77,9 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
     """Draw a track from the side, with beams across it; all lengths are along it, from one mark."""
     slope = math.radians(track.incline_deg.value)
     text = "\n".join([
-        protocol.title, "",
-        *_wrapped("Lengths count along the track from one mark (x), such as its lower end: each "
-                  "beam's, and that of the object's middle before release."),
+        protocol.title, _LEGEND, "",
+        *_wrapped("Measure all lengths along the track from one mark (x), such as its lower end: "
+                  "to each beam, and to the middle of the glider before the release."),
     ])  # fmt: skip
     with canvas(
         (3.0, _LINE_IN * (text.count("\n") + 2)), _WIDTH_IN, simulated=False, sharex=False,
@@ -97,7 +100,7 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
         for gate in gates.gates:
             ends = at(gate.height), at(gate.height, _POST_M)
             side.plot(*zip(*ends, strict=True), color=MODEL, linewidth=0.9)
-            side.annotate(f"{1e3 * gate.height:g}", ends[1], (0, 4), textcoords="offset points",
+            side.annotate(_label(gate), ends[1], (0, 4), textcoords="offset points",
                           ha="center", color=MODEL)  # fmt: skip
         side.set_aspect("equal", adjustable="datalim")
         side.set_xlabel("mm")
@@ -170,7 +173,7 @@ def _side_view(
         if gate.height < named_above:
             continue
         axes.annotate(
-            f"{1e3 * gate.height:g}", (1e3 * side * post, 1e3 * gate.height),
+            _label(gate), (1e3 * side * post, 1e3 * gate.height),
             xytext=(6 * side, 0), textcoords="offset points", va="center",
             ha="right" if side < 0 else "left", color=_COLOURS[gate.side],
         )  # fmt: skip
@@ -182,6 +185,10 @@ def _side_view(
     axes.set_xlabel("mm, uphill to the right" if _inclines(protocol) else "mm")
     axes.set_ylabel(f"mm above the {protocol.zero}" if _inclines(protocol) else "mm")
     axes.grid(visible=False)
+
+
+def _label(gate: Gate) -> str:
+    return f"{gate.channel}: {1e3 * gate.height:g}"
 
 
 def _name_inclines(axes: Axes, protocol: Protocol, radius: float) -> None:
@@ -201,13 +208,13 @@ def _mm(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 def _zero(protocol: Protocol, gates: Gates) -> list[str]:
     """Say where heights are counted from, and how that is carried to both posts."""
     if not _inclines(protocol):
-        return ["Heights count from one level, such as the table: the drop and every beam alike."]
+        return ["Measure all heights from one level, such as the table: beams and drop alike."]
     drawn = ", ".join(f"{word} (chain that {_WORDS[side]})" for side, word in _lines(gates))
     return [
         *_wrapped(
             "Zero: lay one of the chain's rods on the board where the lowest rod will strike. "
             "Where its middle is, is 0, for the drop and for every beam. Carry it to both posts at "
-            "once, with a hose of water or a spirit level on a straight bar, and mark it there; "
+            "once, with a hose of water or a spirit level on a straight edge, and mark it there; "
             f"each beam is measured from its post's mark to ± {1e3 * gates.height_u:g} mm "
             f"(height_uncertainty), the marks are good to ± {1e3 * gates.datum_u:g} mm "
             "(datum_uncertainty). Another incline turns the board about the rod that lies there: 0 "

@@ -31,8 +31,8 @@ def test_where_gravity_is_measured_none_need_be_stated(name):
     text = re.sub(r"(?m)^(gravity|site):.*\n", "", (PROTOCOLS / f"{name}.yaml").read_text("utf-8"))
     there, unsaid = reader.parse(f"{text}gravity: 9.764 m/s^2\n"), reader.parse(text)
     assert unsaid.gravity != there.gravity
-    assert "by standard gravity" in describe(unsaid)
-    assert "by standard gravity" not in describe(there)
+    assert "standard gravity" in describe(unsaid)
+    assert "standard gravity" not in describe(there)
     drop = case(there, QUIET, run=1)
     wanted, found = drop.analyze(), replace(drop, protocol=unsaid).analyze()
     assert found.verdict == wanted.verdict == "accepted"

@@ -40,7 +40,7 @@ def test_a_long_fall_is_recorded_to_its_end(call, tmp_path, old, new, top):
     assert done.code == 0, done.err
     runs = json.loads(done.out)["runs"]
     assert [run["verdict"] for run in runs] == ["accepted", "accepted"]
-    assert "recorded for 2.79" in call("check", path).out
+    assert "recording: 2.79" in call("check", path).out
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     said = call("check", path)
     assert said.code == 0
     for word in ("mega", "uno"):
-        assert f"note: not with board {word}: {path}:" in said.out
+        assert f"note: board {word} is not suitable: {path}:" in said.out
     path.write_text(changed("", ""), "utf-8")
     assert call("run", path, "--port", "sim://", "--session", session, "--yes").code == 0
 
@@ -83,7 +83,7 @@ def test_a_fall_that_nothing_can_record_is_refused_before_a_session_is_made(call
     path.write_text(text, "utf-8")
     done = call("run", path, "--port", "sim://", "--session", session)
     assert done.code == 2
-    assert f"{path}:10:7: drop: from here a fall takes up to 142 s" in done.err
+    assert f"{path}:10:7: drop: from here a drop takes up to 142 s" in done.err
     assert "no board records for more than 65.535 s" in done.err
     assert not session.exists()
     assert f"note: not run: {path}:10:7: drop: from here" in call("check", path).out

@@ -30,7 +30,7 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
 def test_a_mistyped_number_of_trials_is_told_both_ways():
     done = rig("analyze", "any.session", "--budget", 1, "--trials", "adaptve")
     assert done.returncode == 2
-    assert "found 'adaptve', neither a whole number nor adaptive" in done.stderr
+    assert "found 'adaptve'; accepted: a whole number or adaptive" in done.stderr
 
 
 def test_a_run_that_is_not_there_is_bad_input(finished):

@@ -57,11 +57,11 @@ def test_a_protocol_with_drawings_and_four_drops(call, tmp_path, monkeypatch):
     assert "SIMULATED DATA" in done.out
     assert "trial drops" in done.out or "g ± U (m/s²)" in done.out
     assert done.err.count("run ") >= 4
-    assert "How many drops of a kind? 12 (--repeats)" in done.err
+    assert "How many drops? 12 (--repeats)" in done.err
     assert "--gates" not in done.err, "that was no usual answer"
     for here in ("my-ball.yaml", "my-ball-mounting.svg", "my-ball-wiring.svg"):
         again = call("new", "my-ball.yaml", "--yes")
-        assert (again.code, f"{here} is there already" in again.err) == (2, True)
+        assert (again.code, f"{here} already exists" in again.err) == (2, True)
         Path(here).unlink()
     assert not any(tmp_path.iterdir()), "none was drawn anew while another was there"
 
@@ -74,7 +74,7 @@ class Terminal(io.StringIO):
 def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tried = []
-    monkeypatch.setattr("rig.commands.new._tried", lambda draft: tried.append(draft) or 0)
+    monkeypatch.setattr("rig.commands.new._simulate", lambda draft: tried.append(draft) or 0)
     answers = ["fence", "picket-fence", "", "2", "6", "250 mm", "", "350 mm ± 1 mm", "5"]
     monkeypatch.setattr("sys.stdin", Terminal("\n".join(answers) + "\n"))
     done = call("new", "f.yaml")
@@ -93,11 +93,11 @@ def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
             ["--scene", "one-chain", "--gates", "14", "--board", "uno"],
             "found 12; the board (Arduino Uno) has gates",
         ),
-        (["--gates", "many"], "--gates: found many; a whole number"),
-        (["--gates", "99"], "--gates: found 99; a whole number from 1 to 16"),
+        (["--gates", "many"], "--gates: found many; accepted: a whole number"),
+        (["--gates", "99"], "--gates: found 99; accepted: a whole number from 1 to 16"),
         (["--diameter", "20"], "diameter"),
         (["--drop", "900 mm}"], "drop"),
-        (["--scene", "one-chain", "--rods", "3", "--length", "50 mm", "--gates", "9"], "no place"),
+        (["--scene", "one-chain", "--rods", "3", "--length", "50 mm", "--gates", "9"], "no space"),
     ],
 )
 def test_answers_that_make_no_protocol_are_refused(options, said, call, tmp_path, monkeypatch):

@@ -151,7 +151,7 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
     text = protocol.read_text("utf-8")
     assert ("\nGates\n" in done.out) == ("\ngates:" in text)
     if "\ngates:" not in text:
-        assert "  no gates: nothing is measured, the scene is only predicted" in rest
+        assert "  no gates: prediction only, nothing is measured" in rest
     if "\nsurface:" not in text:
         assert any(line.startswith("  no surface:") for line in rest)
 
@@ -217,4 +217,4 @@ def test_turns_mean_nothing_to_one_chain(call, tmp_path):
     path.write_text(text.replace("repeats: 12", "repeats: 12, order: ABBA"), "utf-8")
     done = call("check", path)
     assert (done.code, done.out) == (2, "")
-    assert "plan.order: found ABBA; the scene has one chain" in done.err
+    assert "plan.order: found ABBA, which needs two chains" in done.err

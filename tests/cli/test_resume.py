@@ -85,7 +85,7 @@ def campaign(folder, numbers, longest_s, seed, pace):
         assert code in {-number if number == signal.SIGKILL else 130, 0}, (code, err)
         ends.append(code)
         if code == 130:
-            assert "the same command goes on" in err
+            assert "the same command continues" in err
         with Session.open(session, readonly=True) as opened:
             assert replay(opened).differences == (), f"after {ends}"
         if number != signal.SIGKILL:

@@ -147,4 +147,4 @@ def test_a_span_that_is_none_is_refused(span, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["daemon", "--port", "sim://", "--idle-timeout", span])
     assert stop.value.code == 2
-    assert "is not a time in seconds, more than 0" in capsys.readouterr().err
+    assert "accepted: a time in seconds above 0" in capsys.readouterr().err

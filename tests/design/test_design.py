@@ -20,6 +20,7 @@ from rig.estimate.quadratic_forms import merged
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Gates, Plan, Protocol
 from rig.units import Quantity
+from rig.vocabulary import OBJECT, TWO_CHAINS
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, UNIFORM, Case, case
 from tests.analysis.sessions import analysis as analyzed
@@ -170,10 +171,11 @@ def test_low_beams_alone_are_read_too():
 
 def test_trials_that_fail_name_the_side_and_a_gate():
     found = Trials(20, 13, (("free", 7),), ("free", 0.3))
-    assert trials_text(found) == (
-        "of 20 trial drops 13 are read; what fails is the free side (7); a further free gate at "
-        "300 mm would tell most"
+    assert trials_text(found, TWO_CHAINS) == (
+        "13 of 20 simulated trial drops were identified; unclear: free side (7); "
+        "add a free gate at 300 mm"
     )
+    assert "side" not in trials_text(found, OBJECT)
 
 
 def test_proposals_respect_limits_and_are_never_worse():

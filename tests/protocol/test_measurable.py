@@ -79,7 +79,7 @@ def test_a_fall_that_no_board_can_record_is_refused_beforehand():
     with pytest.raises(InputError, match=r"f:7:7: drop: from here .* more than 65.535 s"):
         check_recordable(protocol)
     check_measurable(protocol)  # what another timer recorded is not refused
-    assert "note: not run: f:7:7: drop: from here a fall takes up to 63.6 s" in describe(protocol)
+    assert "note: not run: f:7:7: drop: from here a drop takes up to 63.6 s" in describe(protocol)
     check_recordable(parse(LONG))
 
 
@@ -103,11 +103,11 @@ def test_what_a_board_lacks_is_said_at_its_place():
         "release.pulse",
     ]
     said = describe(protocol)
-    assert "note: not with board uno: f:11:49: gates.free[1].channel: found 15;" in said
-    assert "note: not with board mega: f:13:20: release.channel: found 2;" in said
+    assert "note: board uno is not suitable: f:11:49: gates.free[1].channel: found 15;" in said
+    assert "note: board mega is not suitable: f:13:20: release.channel: found 2;" in said
     for word, board in (("uno", UNO), ("mega", MEGA)):
         for problem in lacking(protocol, board):
-            assert f"note: not with board {word}: {problem}" in said
+            assert f"note: board {word} is not suitable: {problem}" in said
 
 
 def up_to(limit, board):
@@ -135,9 +135,9 @@ def test_all_judge_alike_what_a_board_can_do(word, limit, tmp_path, capsys):
         path.write_text(text)
         protocol, able = read(path), not more or (limit == "events" and board.streams)
         said = describe(protocol)
-        (listed,) = re.findall("boards that can do it: (.*)", said) or [""]
+        (listed,) = re.findall("suitable boards: (.*)", said) or [""]
         assert (word in listed.split(", ")) == able
-        assert (f"note: not with board {word}: {path}:" in said) != able
+        assert (f"note: board {word} is not suitable: {path}:" in said) != able
         if able:
             check_recordable(protocol, board)
         else:

@@ -90,7 +90,7 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
 @pytest.mark.parametrize(
     ("old", "new", "start"),
     [
-        ("protocol: 1", "protocol: 2", "f:1:11: protocol: found 2; this software reads"),
+        ("protocol: 1", "protocol: 2", "f:1:11: protocol: found 2; accepted: 1"),
         ("title: on", "titel: on", "f:2:1: titel: unknown key; did you mean title?"),
         ("title: on", "title: true", "f:2:8: title: found true, which is a boolean"),
         ("title: on", "title: a\ntitle: b", "f:3:1: title: repeated key, first given on line 2"),
@@ -102,24 +102,24 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
         ("diameter: 12.7 mm, ", "", "f:4:6: chains.A.diameter: missing"),
         ("like: A", "like: C", "f:5:13: chains.B.like: found 'C'; accepted: 'A'"),
         ("like: A", "like: B", "f:5:13: chains.B.like: found 'B'; accepted: 'A'"),
-        ("0.50 ± 0.05", "30 cm", "f:6:24: surface.restitution: 30 cm is a length; a plain"),
+        ("0.50 ± 0.05", "30 cm", "f:6:24: surface.restitution: 30 cm is a length; accepted: a"),
         ("0.50 ± 0.05", "2", "f:6:24: surface.restitution: found 2; accepted: -1 to 1"),
         ("restitution: 0.50 ± 0.05", "", "f:6:10: surface.restitution: missing"),
         ("drop: 180 mm ± 2 mm\n", "", "f:1:1: drop: missing"),
         ("drop: 180", "drop:\t180", "f:7:6: a tab; use blanks"),
         ("gravity: 9.81 m/s^2\n", "", "f:1:1: gravity: missing; write gravity:"),
         ("gravity:", "site: {latitude: 45 deg, height: 0 m}\ngravity:",
-         "f:9:1: gravity: site is given too, on line 8"),
+         "f:9:1: gravity: site is also given, on line 8"),
         ("  free: [{channel: 8, height: 20 mm}]\n", "", "f:10:3: gates.free: missing"),
-        ("channel: 8", "channel: 0", "f:11:20: gates.free[0].channel: channel 0 is already in"),
-        ("channel: 8", "channel: 16", "f:11:20: gates.free[0].channel: found 16; a whole"),
+        ("channel: 8", "channel: 0", "f:11:20: gates.free[0].channel: channel 0 is already used"),
+        ("channel: 8", "channel: 16", "f:11:20: gates.free[0].channel: found 16; accepted: a"),
         ("20 mm", "230 mm", "f:11:31: gates.free[0].height: found 230.0 mm, which rod 2 of"),
         ("20 mm", "2 mm", "f:11:31: gates.free[0].height: found 2.0 mm; a rod at rest"),
         ("20 mm", "1.4 m", "f:11:31: gates.free[0].height: found 1400.0 mm; no rod passes"),
         ("40 deg", "91 deg", "f:12:25: plan.incline[1]: found 91 deg; accepted: 0 deg to 90"),
         ("40 deg", "0 deg", "f:12:25: plan.incline[1]: found '0 deg' again"),
         ("repeats: 4", "order: abab", "f:12:41: plan.order: found 'abab'; did you mean ABBA?"),
-        ("repeats: 4", "repeats: 4.0", "f:12:43: plan.repeats: found 4.0; a whole number"),
+        ("repeats: 4", "repeats: 4.0", "f:12:43: plan.repeats: found 4.0; accepted: a"),
         ("repeats: 4", "repeats: 4]", "f:12:43: [ is missing before '4'"),
         ("title: on", "title: !!python/name:os.system x", "f:2:8: the tag 'tag:yaml"),
         ("title: on", "title: *x", "f:2:8: no anchor stands before the alias 'x'"),
@@ -147,7 +147,7 @@ def test_all_faults_come_at_once_and_an_inherited_one_comes_once():
 def test_circular_like():
     text = GOOD.replace("A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg}",
                         "A: {like: B}")  # fmt: skip
-    assert problems(text)[0].startswith("f:4:13: chains.A.like: goes round in a circle")
+    assert problems(text)[0].startswith("f:4:13: chains.A.like: like refers back to itself")
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "---\n", "[]", "3"])
@@ -171,7 +171,7 @@ def test_scenes_without_a_surface():
 
 def test_one_chain_has_no_free_side():
     (line,) = problems(GOOD.replace("  B: {like: A}\n", ""))
-    assert line.startswith("f:10:3: gates.free: the scene has one chain")
+    assert line.startswith("f:10:3: gates.free: the only chain")
 
 
 @pytest.mark.parametrize("order", ["ABBA", "alternate"])
@@ -180,7 +180,7 @@ def test_one_chain_takes_no_turns(order):
     text = two.replace("  B: {like: A}\n", "")
     text = text.replace("  free: [{channel: 8, height: 20 mm}]\n", "")
     (line,) = problems(text)
-    assert line.startswith(f"f:10:41: plan.order: found {order}; the scene has one chain")
+    assert line.startswith(f"f:10:41: plan.order: found {order}, which needs two chains")
     assert parse(two, "f").plan.order == order
     assert parse(text.replace(order, "fixed"), "f").plan.order == "fixed"
     # A session's own copy was accepted once, and cannot be changed any more.

@@ -24,7 +24,7 @@ def test_each_ready_protocol_has_its_drawing(path):
     ET.fromstring(svg)
     said = re.findall(r"<!-- (.*?) -->", svg)
     for gate in protocol.gates.gates:
-        assert f"{1e3 * gate.height:g}" in said
+        assert f"{gate.channel}: {1e3 * gate.height:g}" in said
     inclines = {incline for incline in protocol.plan.inclines if protocol.surface is not None}
     assert {f"{incline:g}°" for incline in inclines} <= set(said)
 
@@ -71,5 +71,5 @@ def test_check_draws_it(tmp_path):
 def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):
     bead = str(PROTOCOLS / "bead-chain.yaml")
     assert main(["check", bead, "-o", str(tmp_path / "m.svg")]) == 2
-    assert "there are no gates to be mounted" in capsys.readouterr().err
+    assert "the scene has no gates to draw" in capsys.readouterr().err
     assert not (tmp_path / "m.svg").exists()

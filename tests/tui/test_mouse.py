@@ -88,7 +88,7 @@ def test_a_protocol_and_stop_are_clicked(lab, fence):
         async with lab.operator(files=(broken, lab.protocol, other)) as op:
             op.app.protocols.last = lab.folder / "older.session"
             # What can be used, and not the first of the list.
-            await op.sees("A short fence", "What follows", "last session:", "o older")
+            await op.sees("A short fence", "Plan and limits", "last session:", "o older")
             await op.until(lambda: op.app.client and op.app.client.driving)
 
             async def chosen():  # again, should the list have been laid out anew under the pointer

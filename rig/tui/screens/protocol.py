@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
 
 
-_FIRST = "What follows"
+_FIRST = "Plan and limits"
 """The section that is read first here: a screen has no room for all of them."""
 
 
