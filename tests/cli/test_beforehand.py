@@ -84,6 +84,6 @@ def test_a_fall_that_nothing_can_record_is_refused_before_a_session_is_made(call
     done = call("run", path, "--port", "sim://", "--session", session)
     assert done.code == 2
     assert f"{path}:10:7: drop: from here a drop takes up to 142 s" in done.err
-    assert "no board records for more than 65.535 s" in done.err
+    assert "boards record for at most 65.535 s" in done.err
     assert not session.exists()
-    assert f"note: not run: {path}:10:7: drop: from here" in call("check", path).out
+    assert f"note: cannot be recorded: {path}:10:7: drop: from here" in call("check", path).out

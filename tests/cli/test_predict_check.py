@@ -162,8 +162,8 @@ def test_check_for_one_board_is_its_refusal(call):
     assert code == 0
     code, out, err = call("check", graded, "--board", "uno")
     assert (code, out) == (2, "")
-    said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change it"
-    assert f"{said}, or take a Raspberry Pi Pico or an Arduino Mega 2560" in err
+    said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change this"
+    assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in err
 
 
 def test_the_readme_says_which_boards_can_do_a_ready_protocol(call):
@@ -173,7 +173,7 @@ def test_the_readme_says_which_boards_can_do_a_ready_protocol(call):
     assert {path.stem for path in PROTOCOLS.glob("*.yaml")} <= said.keys()
     for path in PROTOCOLS.glob("*.yaml"):
         lines = call("check", path).out.splitlines()
-        able = [line.partition(": ")[2] for line in lines if line.startswith("  boards that can")]
+        able = [line.partition(": ")[2] for line in lines if line.startswith("  suitable boards")]
         assert able == ([said[path.stem]] if said[path.stem] else [])
 
 

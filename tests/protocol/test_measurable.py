@@ -76,10 +76,10 @@ def test_gravity_that_is_hardly_known_leaves_an_end():
 def test_a_fall_that_no_board_can_record_is_refused_beforehand():
     protocol = parse(ENDLESS, "f")
     assert record_ms(protocol) > LONGEST_RECORD_MS
-    with pytest.raises(InputError, match=r"f:7:7: drop: from here .* more than 65.535 s"):
+    with pytest.raises(InputError, match=r"f:7:7: drop: from here .* at most 65.535 s"):
         check_recordable(protocol)
     check_measurable(protocol)  # what another timer recorded is not refused
-    assert "note: not run: f:7:7: drop: from here a drop takes up to 63.6 s" in describe(protocol)
+    assert "note: cannot be recorded: f:7:7: drop: from here a drop takes up to 63.6 s" in describe(protocol)
     check_recordable(parse(LONG))
 
 
