@@ -33,13 +33,13 @@ _PYTHON = re.compile(
 _EXPONENT = re.compile(r"±\s*[\d.]+e[+-]?\d+")
 _STRUNG = (r"\bchains?\b", r"\brods?\b", r"\bhangs?\b", r"\bhanging\b", "free side")
 _OTHERS = {
-    "object": (*_STRUNG, "glider", r"\bbars\b"),
-    "track": (*_STRUNG, r"\bbars\b"),
+    "object": (*_STRUNG, "glider"),
+    "track": _STRUNG,
     "picket-fence": (*_STRUNG, "glider"),
-    "free-chain": ("glider", r"\bbars\b"),
+    "free-chain": ("glider",),
 }
 """Words of other scenes that strike nothing."""
-_LEFT = {"report", "analyze", "analyze --budget"}
+_LEFT = {"run", "report", "analyze", "analyze --budget"}
 """Commands that still say ``hang`` and ``rod`` where they name the terms of a budget."""
 _PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous")
 _IMPACT = ("inclin", "impact", "strike", "restitution", "friction", "α", "surface", " V ")
