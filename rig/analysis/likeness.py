@@ -15,7 +15,7 @@ ENOUGH = 20.0
 """Degrees of freedom from which on a scatter that was found means something."""
 LIKE_IMPULSES = 0.1
 """Scatter of single impulses, relative to α, that is remarked: a tenth of what is explained."""
-_SEEN = 0.005  # mm: less than that would be written as nothing
+_LEAST_MM = 0.01  # below the resolution that a sentence states
 
 
 class Likeness(NamedTuple):
@@ -39,20 +39,16 @@ class Likeness(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """It in words."""
-        size = self.departure * 1e3
-        sizes = "once some rods have struck, the others are " + (
-            f"off the places that the model has them at by {size:.2f} mm (one standard deviation)"
-            if size >= _SEEN
-            else "where the model has them, to a hundredth of a millimetre"
-        )
+        """The comparison in words."""
+        size = f"{max(self.departure * 1e3, _LEAST_MM):.2f} mm"
+        impacts = ""
         if self.impulses is not None:
-            sizes += f", and single impulses scatter by {self.impulses:.0%}"
+            impacts = f"; single impacts vary by {100 * self.impulses:.0f} %"
         if self.like:
-            return f"these falls look like the model: {sizes}"
+            return f"Measured positions match the model to {size}{impacts}."
         return (
-            f"these falls do not look like the model: {sizes}. Results and their ± allow for that; "
-            "what follows from the equations, such as β, μ and γ, rests on what was not seen"
+            f"Measured positions differ from the model by {size} (one standard deviation){impacts}."
+            " Results and their ± allow for this; β, μ and γ do not."
         )
 
     def json(self) -> dict[str, Any]:
@@ -69,8 +65,8 @@ def likeness(joint: JointFit) -> Likeness | None:
         if "impact" in drop.model.guesses
     ]
     alpha = median(alphas) if alphas else 0.0
-    found, told = joint.components, joint.degrees
-    if alpha <= 0.0 or told.get("departure", 0.0) < ENOUGH:
+    scales, degrees = joint.components, joint.degrees
+    if alpha <= 0.0 or degrees.get("departure", 0.0) < ENOUGH:
         return None
-    scatter = math.hypot(found.impulse, found.impulse_floor / alpha)
-    return Likeness(found.departure, scatter if told.get("impulse", 0.0) >= ENOUGH else None)
+    scatter = math.hypot(scales.impulse, scales.impulse_floor / alpha)
+    return Likeness(scales.departure, scatter if degrees.get("impulse", 0.0) >= ENOUGH else None)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 SCALES = frozenset(
     {
-        "hanging height",
+        "start height",
         "side",
         "beam offsets",
         "swing",
@@ -52,7 +52,7 @@ COMMON = frozenset(
         "side",
         "beam offsets",
         "rod places",
-        "rod width",
+        "width",
     }
 )
 """Budget lines that are the same in every run, so that averaging does not reduce them."""

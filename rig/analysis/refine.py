@@ -29,7 +29,7 @@ _DEGREES = {
     "beam heights": "gates",
     "beam offsets": "beam",
     "rod places": "rods",
-    "hanging height": "hang",
+    "start height": "hang",
     "swing": "swing",
     "single impulses": "impulse",
     "top rod": "departure",

@@ -104,7 +104,7 @@ def main(arguments: Namespace) -> int:
                 again=[
                     f"rig analyze {name} --json",
                     f"rig report {name} -o report.html",
-                    f"rig replay {name}    # the recorded bytes through the whole stack once more",
+                    f"rig replay {name}    # analyses the recorded bytes again",
                 ],
                 attachments=data,
                 sections=sections,

@@ -168,7 +168,7 @@ def flickering_gates(board: BoardFacts) -> Finding:
     name = "flickering gates"
     if not board.edges:
         if seen := board.states.flickering:
-            return Finding(name, listed(seen), f"{_BEAM}; let the chains hang still")
+            return Finding(name, listed(seen), f"{_BEAM}; let everything come to rest")
         if board.edges is None:
             return Finding(name, f"none seen at a glance; not recorded: {board.unwatched}")
         return Finding(name, f"none within {board.watched_s:g} s")
@@ -187,7 +187,7 @@ def flickering_gates(board: BoardFacts) -> Finding:
     return Finding(
         name,
         "; ".join(said) + f" within {board.watched_s:g} s",
-        lamp if mains else f"{_BEAM}; let the chains hang still",
+        lamp if mains else f"{_BEAM}; let everything come to rest",
     )
 
 

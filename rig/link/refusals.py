@@ -22,11 +22,11 @@ ADVICE: dict[RefusalReason, tuple[str, str]] = {
     ),
     RefusalReason.GATE_BLOCKED: (
         "{gates} blocked",
-        "move the chain or whatever else stands in the beam; check that the emitter has power",
+        "clear the beam, and check that its emitter has power",
     ),
     RefusalReason.GATE_UNSTEADY: (
         "{gates} changed after arming",
-        "let the chains come to rest, check for loose plugs and stray light, then arm again",
+        "let everything come to rest, check for loose plugs and stray light, then arm again",
     ),
     RefusalReason.BAD_PARAMETER: (
         "the device cannot do what was asked",

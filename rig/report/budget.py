@@ -1,4 +1,4 @@
-"""What uncertainties are made of: a stacked bar an incline."""
+"""Uncertainty budgets as stacked bars, a bar for each incline."""
 
 from __future__ import annotations
 
@@ -97,10 +97,9 @@ def budget_figure(analysis: Analysis, simulated: bool) -> PageFigure | None:
     return PageFigure(
         drawing.svg,
         "Standard uncertainty of one run by its sources",
-        "What the uncertainty of one run is made of. A bar is as long as u, the standard "
-        "uncertainty of one run (root mean square of those of its line); its parts are shares "
-        "of u², which add up. The diamond is u of the mean of all runs there: by how much "
-        "they really differ, over √n, and what they share, however many they are.",
+        "Each bar is u, the standard uncertainty of one run (root mean square over its line). "
+        "Its parts are shares of u². The diamond is u of the mean: the scatter of the runs over "
+        "√n, and everything that all runs share.",
         "budget",
     )
 

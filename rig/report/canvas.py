@@ -133,8 +133,8 @@ def kind_of(path: Path) -> Kind:
     kind = path.suffix.removeprefix(".")
     if kind not in KINDS:
         raise InputError(
-            f"{path}: a figure is written as {', '.join(f'.{one}' for one in KINDS)}",
-            f"such as {path.with_suffix('.svg')}",
+            f"{path}: unknown figure format; accepted: {', '.join(f'.{kind}' for kind in KINDS)}",
+            f"for example {path.with_suffix('.svg')}",
         )
     return kind
 

@@ -57,27 +57,27 @@ def in_order(figures: Iterable[PageFigure]) -> list[PageFigure]:
 
 
 def chapters(context: ReportContext) -> list[Chapter]:
-    """Make all chapters; the first is made last, for by then all failures are known."""
-    made = [
+    """Return all chapters; the summary is written last, when all failures are known."""
+    drafts = [
         Chapter("results", "Results", _results(context)),
-        Chapter("budget", "What the uncertainty is made of", _budget(context)),
-        Chapter("impacts", "The impacts", _impacts(context)),
-        Chapter("drops", "The drops", _drops(context)),
-        Chapter("timelines", "What the gates saw", _timelines(context)),
+        Chapter("budget", "Uncertainty budget", _budget(context)),
+        Chapter("impacts", "Impacts", _impacts(context)),
+        Chapter("drops", "Drops", _drops(context)),
+        Chapter("timelines", "Gate timelines", _timelines(context)),
         Chapter("method", "Method", _method(context)),
-        Chapter("again", "How to make every number again", _again(context)),
+        Chapter("again", "Reproduce every number", _again(context)),
         Chapter("citation", "Citation", _citation(context)),
         Chapter("provenance", "Provenance",
                 context.sections.make("The provenance", lambda: _provenance(context)) or ""),
     ]  # fmt: skip
-    found = [one for one in made if one.html]
-    return [Chapter("short", "In short", _short(context)), *found]
+    rest = [chapter for chapter in drafts if chapter.html]
+    return [Chapter("short", "Summary", _short(context)), *rest]
 
 
 def _short(context: ReportContext) -> str:
     said = paragraphs([finding(context.analysis)], "lead")
     if context.simulated:
-        said += paragraphs(["No chain fell: these drops were simulated."], "note")
+        said += paragraphs(["These drops were simulated; nothing fell."], "note")
     notes = [*context.notes, *context.sections.failed.values()]
     return said + bullets(map(raised, notes))
 
@@ -100,9 +100,9 @@ def _results(context: ReportContext) -> str:
 def _summary(analysis: Analysis) -> str:
     lines = analysis.summary
     if not lines:
-        good = any(one.verdict in GOOD for one in analysis.runs)
-        said = "No mean can be given." if good else "No accepted runs, so no summary."
-        return paragraphs([said], "")
+        good = any(drop.verdict in GOOD for drop in analysis.runs)
+        reason = "No mean can be given." if good else "No accepted runs, so no summary."
+        return paragraphs([reason], "")
     html = ""
     for row in averaged():
         those = [line for line in lines if row.name in line.means]
@@ -140,14 +140,14 @@ def _budget(context: ReportContext) -> str:
         Column("u, common", lambda one: _part(one, "common")),
         Column("u", lambda one: _fine(one, one[0].means[one[1].name].u)),
         Column("U", lambda one: _fine(one, one[0].means[one[1].name].expanded)),
-        Column("mostly", lambda one: _mostly(*one), numeric=False),
+        Column("largest common sources", lambda one: _largest(*one), numeric=False),
     )
     said = context.sections.make(
         "The uncertainty budget", lambda: table("Uncertainty of the means", columns, lines)
     )
     note = (
-        "More runs make the first part smaller; the common one stays, and is named by its largest "
-        "sources. The budget of every run, line by line, is budget.csv in the data below."
+        "More runs reduce the first part, not the common one. The budget of every run is in "
+        "budget.csv, in the data below."
     )
     return _figures(context, "budget") + (said or "") + paragraphs([note])
 
@@ -161,8 +161,8 @@ def _part(one: tuple[Incline, Measurand], name: str) -> str:
     return "" if part is None else _fine(one, part)
 
 
-def _mostly(line: Incline, row: Measurand) -> str:
-    """Name what makes most of the common part."""
+def _largest(line: Incline, row: Measurand) -> str:
+    """Name the two largest sources of the common part."""
     return ", ".join(list(line.causes.get(row.name, ()))[:2])
 
 
@@ -193,9 +193,9 @@ def _drops(context: ReportContext) -> str:
     )
     odd = [one for one in every if one.verdict != "accepted"]
     if odd:
-        html += f"<h3>Verdicts and their reasons</h3>{table('Verdicts', _VERDICTS, odd)}"
+        html += f"<h3>Reasons for verdicts</h3>{table('Verdicts', _VERDICTS, odd)}"
     if context.operator_notes:
-        html += f"<h3>The operator's notes</h3>{bullets(context.operator_notes)}"
+        html += f"<h3>Operator's notes</h3>{bullets(context.operator_notes)}"
     if context.deviations:
         html += f"<h3>Deviations from the plan</h3>{bullets(context.deviations)}"
     runs = context.sections.make("The table of runs", lambda: _runs(context))
@@ -210,8 +210,8 @@ def _runs(context: ReportContext) -> str:
         said = [f"Edges: {' / '.join(AUDIT)}."]
         if any(SEPARATION_RAW.name in one.quantities for one in analysis.runs):
             said.append(
-                "Δz is corrected to simultaneous release, raw Δz is as it happened. Skew is the "
-                "free chain's release less the impact chain's."
+                "Δz is corrected to simultaneous release; raw Δz is not. Skew is the release time "
+                "of the free chain minus that of the impact chain."
             )
         html += paragraphs(said)
     if analysis.superseded:
@@ -232,7 +232,7 @@ _VERDICTS: tuple[Column[DropResult], ...] = (
     Column("attempt", lambda one: str(one.attempt)),
     Column("incline (°)", run_incline),
     Column("verdict", lambda one: one.verdict, numeric=False),
-    Column("why", lambda one: signed(sentences(one.reasons)), numeric=False),
+    Column("reasons", lambda one: signed(sentences(one.reasons)), numeric=False),
     Column(
         "what to do",
         lambda one: "; ".join(remedies(one.reasons)) if one.verdict == "void" else "",
@@ -250,8 +250,8 @@ def _timelines(context: ReportContext) -> str:
         return ""
     drops = "".join(_drop(one) for one in context.timelines)
     words = (
-        "A line for each gate, a bar while its beam was blocked; marks above and below the line "
-        "are edges that belong to no rod."
+        "Each line is a gate; a bar shows when its beam was blocked. Marks across a line are "
+        "unexplained edges."
     )
     drawn = len(context.timelines)
     every = len(context.analysis.runs) + len(context.analysis.superseded)
@@ -276,8 +276,8 @@ def _drop(one: Timeline) -> str:
         if (found := result.quantities.get(row.name)) is not None
     )
     words = (
-        f"{strikes}{audit.matched} edges of rods, {audit.missed} missing, {audit.spurious} of no "
-        f"rod. {values}"
+        f"{strikes}{audit.matched} edges matched, {audit.missed} missed, {audit.spurious} "
+        f"unexplained. {values}"
     )
     picture = scrolling(f"Gates of run {run.number}", one.svg)
     return (
@@ -297,8 +297,8 @@ def _again(context: ReportContext) -> str:
     if context.again:
         commands = "\n".join(context.again)
         html = (
-            "<p>The session file holds the raw edges, the bytes of the line and the protocol. From "
-            f"it these make every number here anew:</p><pre>{escape(commands)}</pre>"
+            "<p>The session file holds the raw edges, the bytes received and the protocol. These "
+            f"commands compute every number again from it:</p><pre>{escape(commands)}</pre>"
         )
     return html + _files(one for one in context.attachments if one.name != METHOD)
 
@@ -310,8 +310,8 @@ def _files(attached: Iterable[Attachment]) -> str:
 
 def _citation(context: ReportContext) -> str:
     struck = any(one.run.impact is not None for one in context.analysis.runs)
-    model = [f"The experiment and its model: {PAPER}."] if struck else []
-    return bullets([*model, f"The software: {SOFTWARE}."])
+    model = [f"Experiment and model: {PAPER}."] if struck else []
+    return bullets([*model, f"Software: {SOFTWARE}."])
 
 
 def _provenance(context: ReportContext) -> str:

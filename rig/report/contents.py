@@ -57,13 +57,13 @@ def _timelines(session: Reader, protocol: Protocol, found: SessionResults) -> li
 def _data(session: Reader, found: SessionResults) -> list[Attachment]:
     files = csv_files(session, found.json(), tick_rates(session))
     protocol = {"protocol.yaml": session.protocol_text}
-    words = "results, budgets and edges as CSV files, and the protocol"
+    words = "results, budgets and edges as CSV files, with the protocol"
     packed = zipped({**files, **protocol})
     if len(packed) > _DATA:
-        words = "results and budgets as CSV files, and the protocol; rig export writes edges too"
+        words = "results and budgets as CSV files, with the protocol; rig export also writes edges"
         packed = zipped({**{n: t for n, t in files.items() if n != "edges.csv"}, **protocol})
     return [
         Attachment("data.zip", "application/zip", packed, words),
-        Attachment("summary.csv", "text/csv", files["summary.csv"].encode(), "the means alone"),
-        Attachment(METHOD, "text/markdown", method_page().encode(), "the method in full"),
+        Attachment("summary.csv", "text/csv", files["summary.csv"].encode(), "means only"),
+        Attachment(METHOD, "text/markdown", method_page().encode(), "the whole method"),
     ]

@@ -1,4 +1,4 @@
-"""How a session went on otherwise than its protocol planned."""
+"""Where a session departed from the plan of its protocol."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING
 
 from rig.protocol.plan import runs as planned_runs
 from rig.reasons import sentences
+from rig.report.numbers import ranges
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.analysis.session import Analysis
     from rig.protocol.protocol import Protocol
     from rig.session.reading import StateEntry
 
-NONE = "Nothing: every planned run was made once, in the order of the plan."
+NONE = "None: every planned run was recorded once, in the planned order."
 
 
 def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]) -> list[str]:
-    """Say what was left out, made again, interrupted, rejected or made in another order.
+    """List what was omitted, repeated, interrupted, rejected or recorded in another order.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
     Returns
     -------
     list of str
-        Sentences; that there is nothing to say is one too.
+        Sentences; `NONE` alone where there is no deviation.
     """
     return list(_sentences(protocol, analysis, states)) or [NONE]
 
@@ -38,33 +39,21 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
 def _sentences(
     protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]
 ) -> Iterator[str]:
-    made = {one.run.number for one in analysis.runs}
-    missing = [run.number for run in planned_runs(protocol) if run.number not in made]
+    recorded = {drop.run.number for drop in analysis.runs}
+    missing = [run.number for run in planned_runs(protocol) if run.number not in recorded]
     if missing:
-        yield f"Not made: {_numbers('run', missing)}."
-    for number, attempts in groupby(analysis.superseded, key=lambda one: one.run.number):
-        earlier = [f"attempt {one.attempt} was {one.verdict}" for one in attempts]
-        yield f"Made again: run {number} ({', '.join(earlier)})."
+        yield f"Not recorded: {ranges('run', missing)}."
+    for number, attempts in groupby(analysis.superseded, key=lambda drop: drop.run.number):
+        earlier = [f"attempt {drop.attempt} was {drop.verdict}" for drop in attempts]
+        yield f"Run {number} was repeated ({', '.join(earlier)})."
     for entry in states:
         if entry.state is RunState.INTERRUPTED:
             why = f": {sentences(entry.reasons)}" if entry.reasons else ""
-            yield f"Interrupted: run {entry.run}, attempt {entry.attempt}{why}."
-    rejected = [one.run.number for one in analysis.runs if one.verdict == "rejected"]
+            yield f"Run {entry.run}, attempt {entry.attempt} was interrupted{why}."
+    rejected = [drop.run.number for drop in analysis.runs if drop.verdict == "rejected"]
     if rejected:
-        yield f"Rejected by the operator: {_numbers('run', rejected)}."
+        yield f"Rejected by the operator: {ranges('run', rejected)}."
     first = list(dict.fromkeys(entry.run for entry in states if entry.state is RunState.RECORDED))
     late = [after for before, after in pairwise(first) if after < before]
     if late:
-        yield f"Not in the order of the plan: {_numbers('run', late)} came after later ones."
-
-
-def _numbers(noun: str, numbers: Iterable[int]) -> str:
-    """Write numbers, neighbours together: runs 3, 5–8."""
-    spans: list[tuple[int, int]] = []
-    for number in sorted(set(numbers)):
-        if spans and spans[-1][1] == number - 1:
-            spans[-1] = spans[-1][0], number
-        else:
-            spans.append((number, number))
-    told = [f"{low}" if low == high else f"{low}–{high}" for low, high in spans]
-    return f"{noun}{'s' if len(told) > 1 or '–' in told[0] else ''} {', '.join(told)}"
+        yield f"Out of the planned order: {ranges('run', late)}."

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from rig.estimate.rods import resolution
 from rig.measurands import MEASURANDS
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from rig.sections import Sections
 
     _Make = Callable[[str, SessionEstimate], Part | None]
+
+T = TypeVar("T")
 
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
 
@@ -90,8 +93,8 @@ def _single_alphas(heading: str, found: SessionEstimate) -> Part | None:
     tests = [
         f"{what}: {_chi2(test)}."
         for what, test in (
-            ("Runs of one incline share one α", found.alphas.runs_share_alpha),
-            ("Eqs. 8 to 13 with these coefficients give each α", found.alphas.by_model),
+            ("One α for all runs of an incline", found.alphas.runs_share_alpha),
+            ("α of each incline by Eqs. 8 to 13 with these coefficients", found.alphas.by_model),
         )
         if test is not None
     ]
@@ -115,7 +118,7 @@ def _impulses(heading: str, found: SessionEstimate) -> Part | None:
 def _comparison(heading: str, found: SessionEstimate) -> Part | None:
     if not found.comparison:
         return None
-    words = "Uncertainties of the rig and of the model's parameters are common to the inclines."
+    words = "The inclines share the uncertainties of the rig and of the model's parameters."
     return Part(heading, [words], _COMPARISON, found.comparison)
 
 
@@ -147,17 +150,17 @@ def _coefficient_words(told: Coefficients, *, free_chain: bool) -> Iterator[str]
     if pairs:
         yield f"Correlation: {', '.join(pairs)}."
     yield (
-        "Least squares takes nothing from the protocol but what is marked as held; the posterior "
-        "has the protocol's ± as prior."
+        "Least squares uses only the edges and the values marked as held. The posterior also uses "
+        "the protocol's ± as priors."
     )
     if told.drag is not None:
         value, expanded = told.drag.value, told.drag.expanded
-        said = "none to be seen"
+        said = "not significant"
         if abs(value) > expanded:
-            said = "which slows the chains" if value > 0 else "which no air does"
+            said = "which slows the chains" if value > 0 else "negative, which air cannot cause"
         yield f"Air: κ = ({plus_minus(told.drag, 1e3)})·10⁻³ /m in g − κv², {said}."
     elif free_chain:
-        yield "Air drag is not fitted: it takes a free chain, and rods that are all alike."
+        yield "Air drag is not fitted: this needs a free chain and identical rods."
 
 
 def symbol(name: str) -> str:
@@ -169,7 +172,7 @@ def symbol(name: str) -> str:
 def _chi2(test: LikelihoodRatio) -> str:
     p = test.p
     assert p is not None
-    verdict = "they do" if p > 0.05 else "doubtful" if p > 0.001 else "they do not"
+    verdict = "consistent" if p > 0.05 else "doubtful" if p > 0.001 else "inconsistent"
     return f"{verdict} (χ² {test.chi2:.1f} of {test.degrees}, p {p:.2g})"
 
 
@@ -193,6 +196,10 @@ def _worst(errors: Iterable[float | None]) -> str:
     return fixed(max((abs(one) for one in errors if one is not None), default=None), 2)
 
 
+def _worst_gain(impulses: Impulses) -> str:
+    return _worst(gain.normalized_error for gain in impulses.gains)
+
+
 def _counted(line: _Rods) -> str:
     """Count rods as people do, from 1."""
     return "–".join(str(1 + rod) for rod in dict.fromkeys((line.of.first, line.of.last)))
@@ -202,13 +209,12 @@ def _p(p: float | None) -> str:
     return "" if p is None else f"{p:.2g}"
 
 
-def _incline(condition: Condition) -> str:
-    return f"{condition.incline_deg:g}"
-
-
-def _strikes(condition: Condition) -> str:
-    """Which chain, where chains are unlike."""
-    return condition.impact_chain or ""
+def _condition(of: Callable[[T], Condition]) -> tuple[Column[T], Column[T]]:
+    """Columns of the incline and, where chains are unlike, of the one that strikes."""
+    return (
+        Column("incline (°)", lambda row: f"{of(row).incline_deg:g}"),
+        Column("strikes", lambda row: of(row).impact_chain or "", numeric=False),
+    )
 
 
 _COEFFICIENTS: tuple[Column[Coefficient], ...] = (
@@ -219,36 +225,32 @@ _COEFFICIENTS: tuple[Column[Coefficient], ...] = (
     Column("from", lambda one: "edges" if one.identified else "held", numeric=False),
 )
 _ALPHAS: tuple[Column[_Alpha], ...] = (
-    Column("incline (°)", lambda line: _incline(line.of.condition)),
-    Column("strikes", lambda line: _strikes(line.of.condition), numeric=False),
+    *_condition(attrgetter("of.condition")),
     Column("n", lambda line: str(line.of.n)),
     Column("α ± U", lambda line: plus_minus(line.of.alpha)),
     Column("α by coefficients", lambda line: fixed(line.of.model, 5)),
     Column("contact point ± U (mm)", _contact),
 )
 _IMPULSES: tuple[Column[Impulses], ...] = (
-    Column("incline (°)", lambda one: _incline(one.condition)),
-    Column("strikes", lambda one: _strikes(one.condition), numeric=False),
+    *_condition(attrgetter("condition")),
     Column("rods", lambda one: str(one.rods)),
     Column("resolved", lambda one: str(one.resolved)),
     Column("χ² of Eq. 9", lambda one: fixed(one.eq9.chi2, 1)),
     Column("p", lambda one: _p(one.eq9.p)),
-    Column("largest |Eₙ|", lambda one: _worst(gain.normalized_error for gain in one.gains)),
+    Column("largest |Eₙ|", _worst_gain),
 )
 _INCLINES: tuple[Column[_Compared], ...] = (
     Column("quantity", lambda line: MEASURANDS[line.quantity].symbol, numeric=False),
-    Column("incline (°)", lambda line: _incline(line.of.condition)),
-    Column("strikes", lambda line: _strikes(line.of.condition), numeric=False),
+    *_condition(attrgetter("of.condition")),
     Column("n", lambda line: str(line.of.n)),
-    Column("measured less model (mm, mm/s)", lambda line: fixed(1e3 * line.of.value, 2)),
+    Column("measured − model (mm, mm/s)", lambda line: fixed(1e3 * line.of.value, 2)),
     Column("u", lambda line: fixed(1e3 * line.of.u, 2)),
     Column("Eₙ", lambda line: fixed(line.of.normalized_error, 2)),
     Column("χ²", lambda line: fixed(line.of.chi2, 2)),
     Column("p", lambda line: _p(line.of.p)),
 )
 _RODS: tuple[Column[_Rods], ...] = (
-    Column("incline (°)", lambda line: _incline(line.condition)),
-    Column("strikes", lambda line: _strikes(line.condition), numeric=False),
+    *_condition(attrgetter("condition")),
     Column("rod", _counted),
     Column("ΔV ± U (m/s)", lambda line: plus_minus(line.of.measured)),
     Column("Eq. 9 (m/s)", lambda line: fixed(line.of.eq9_m_s, 5)),
@@ -269,7 +271,7 @@ _PARTS: dict[str, _Make] = {
     "End correction": _end_correction,
     "Speed gained from each rod, measured and by Eq. 9": _impulses,
     "The protocol's model": _comparison,
-    "Could not be worked out": _failed,
+    "Not estimated": _failed,
 }
 _PAGE_PARTS: dict[str, _Make] = {
     "The protocol's model, incline by incline": _incline_by_incline,

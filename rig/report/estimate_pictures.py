@@ -93,12 +93,12 @@ def _alpha(found: SingleAlphas, simulated: bool) -> PageFigure:
             low.axhspan(-2, 2, color=MODEL_BAND, alpha=0.6, linewidth=0)
             low.plot(*zip(*left, strict=True), "o", color=MODEL, markersize=3, markeredgewidth=0)
             low.set_ylabel("residual / u")
-        drawing.axes[-1].set_xlabel("inclination of the surface (°)")
+        drawing.axes[-1].set_xlabel("incline of the surface (°)")
     return PageFigure(
         drawing.svg,
-        "Impact coefficient against inclination, with residuals",
-        "The best single α of every incline and run; below, each run less the fitted coefficients, "
-        "in standard uncertainties (band: ±2).",
+        "Impact coefficient against incline, with residuals",
+        "The best single α of every incline and run. Below: each run minus the fit, in standard "
+        "uncertainties (band: ±2).",
         "impacts",
     )
 
@@ -140,8 +140,8 @@ def _impulses(found: Sequence[Impulses], simulated: bool) -> PageFigure:
     return PageFigure(
         drawing.svg,
         "Speed gained from each rod's impact",
-        "Speed that the chain gains as each rod strikes, as measured and by Eq. 9 with the best α "
-        "of the incline; below, their normalized errors.",
+        "Speed that the chain gains as each rod strikes: measured, and by Eq. 9 with the best α of "
+        "the incline. Below: the normalized errors.",
         "impacts",
     )
 
@@ -171,7 +171,7 @@ def _curves(found: Sequence[DropCurves], simulated: bool) -> PageFigure:
         if free
         else "Squared speed against height",
         f"Single drops: {'Δz(t) at simultaneous release and V²(z)' if free else 'V²(z)'}, with "
-        "95 % bands; dashed, the model with the protocol's coefficients.",
+        "95 % bands. Dashed: the model with the protocol's coefficients.",
     )
 
 
@@ -227,7 +227,7 @@ def _posterior(told: Coefficients, simulated: bool) -> PageFigure | None:
     return PageFigure(
         drawing.svg,
         "Posterior of restitution and friction",
-        "Posterior of β and μ: smallest regions that hold 68.3 % and 95 %.",
+        "Posterior of β and μ: the smallest regions that contain 68.3 % and 95 %.",
         "impacts",
     )
 

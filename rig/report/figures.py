@@ -226,7 +226,7 @@ def _incline_panel(
             axes.fill_between(inclines, low, high, color=MODEL_BAND, alpha=0.6, linewidth=0)
     for number, gap in enumerate(unanswered(curves) if key in curves else ()):
         axes.axvspan(*gap, facecolor="none", edgecolor=RULE, hatch="////", linewidth=0,
-                     label="no answer of the model" if number == 0 else None, zorder=0)  # fmt: skip
+                     label="model has no answer" if number == 0 else None, zorder=0)  # fmt: skip
     dots = list(_single_runs(analysis.runs, key))
     if dots:
         xs, ys = zip(*dots, strict=True)
@@ -267,7 +267,7 @@ def _single_runs(runs: Sequence[DropResult], name: str) -> Iterator[tuple[float,
 
 
 def _incline_axis(axes: Axes) -> None:
-    axes.set_xlabel("inclination of the surface (°)")
+    axes.set_xlabel("incline of the surface (°)")
     axes.margins(x=0.03)
     low, high = axes.get_xlim()
     if high - low < 10:  # one inclination alone must not fill the axis with thousandths

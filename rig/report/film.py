@@ -1,4 +1,4 @@
-"""A simulated fall in pictures: rods with their tilt, strings tight or slack, the pile."""
+"""Pictures of a simulated fall: rods with their tilt, strings tight or slack, the pile."""
 
 from __future__ import annotations
 

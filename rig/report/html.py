@@ -46,7 +46,7 @@ class ReportContext:
     notes
         Sentences for the reader: warnings, what was left out.
     operator_notes, deviations
-        What was noted to drops; how the session went on otherwise than planned.
+        What was noted to drops; where the session departed from the plan.
     parts, effects
         Tables on the impacts, and on chains and sides.
     timelines
@@ -117,7 +117,7 @@ def report_html(context: ReportContext) -> str:
         '<meta http-equiv="Content-Security-Policy" '
         "content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
         f"<title>{mark}{title}</title>\n<style>\n{css}</style>\n</head>\n"
-        f'<body>\n<a class="skip" href="#short">To the text</a>\n'
+        f'<body>\n<a class="skip" href="#short">Skip to content</a>\n'
         f"<header><h1>{title}</h1>{stamp}</header>\n"
         f'<nav aria-label="Contents"><ul>{links}</ul></nav>\n'
         f"<main>\n{body}\n</main>\n</body>\n</html>\n"

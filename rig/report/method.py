@@ -1,4 +1,4 @@
-"""How the numbers of a report came about, and whom to cite for them, in words for its readers."""
+"""The method behind the numbers of a report, and what to cite for them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig import __version__
-from rig.measurands import SEPARATION
+from rig.measurands import SEPARATION, acceleration_in
 
 if TYPE_CHECKING:
     from rig.analysis.session import Analysis
@@ -24,44 +24,45 @@ SOFTWARE = (
 
 
 def method_words(analysis: Analysis) -> tuple[str, str]:
-    """Say in two paragraphs how the results of a session were got.
+    """Return the method of a session's analysis in two paragraphs.
 
     Parameters
     ----------
     analysis
-        What its scene lacks is not spoken of.
+        Where it decides which equations were used.
     """
-    struck = any(one.run.impact is not None for one in analysis.runs)
-    apart = any(SEPARATION.name in one.quantities for one in analysis.runs)
-    falls = "At each impact the chain gains ΔV = V α m/(M + γ m) (the paper's Eq. 9), with α open. "
-    skew = (
-        "Δz is corrected to simultaneous release: the release of either chain is an unknown of "
-        "each drop. "
+    struck = any(drop.run.impact is not None for drop in analysis.runs)
+    apart = any(SEPARATION.name in drop.quantities for drop in analysis.runs)
+    measured = acceleration_in({name for drop in analysis.runs for name in drop.quantities})
+    pull = measured.symbol if measured else "g"
+    impact = (
+        "At each impact the chain gains ΔV = V α m/(M + γ m) (the paper's Eq. 9), with α free. "
     )
-    way = "Between impacts a chain falls with" if struck else "What falls has"
-    first = (
-        "Photogates along the fall give an edge each time a rod enters or leaves a beam, and a "
-        "board stamps it. Which edge is which rod is decided by likelihood among several falls; "
-        f"edges of no rod stay in the record and out of the fit. {way} g − κv². "
-        f"{falls if struck else ''}One least-squares adjustment of all unknowns of a "
-        f"drop gives its results. {skew if apart else ''}Raw edges are never altered."
+    skew = "Δz is corrected to simultaneous release, since both release times are fitted. "
+    drop = (
+        "A photogate gives an edge each time its beam is blocked or cleared, and a board "
+        "time-stamps it. Edges are assigned by likelihood among several falls; unexplained "
+        "edges stay in the record and out of the fit. "
+        f"The acceleration{' between impacts' if struck else ''} is {pull} − κv². "
+        f"{impact if struck else ''}One least-squares fit of all unknowns of a drop gives its "
+        f"results. {skew if apart else ''}Raw edges are never altered."
     )
     together = (
-        "All good drops were adjusted together: the clock, the beams' heights and the chain are "
-        "common unknowns, with what the protocol states behind ± as priors. "
+        "All good drops were fitted together. They share the clock, the beam heights and the "
+        "dimensions as unknowns; the protocol's ± values are their priors. "
         if analysis.joint is not None
-        else "Each drop was adjusted by itself: too few are good for an adjustment of all. "
+        else "Each drop was fitted alone: there are too few good drops for a joint fit. "
     )
-    second = (
-        f"{together}Standard uncertainties u come from that adjustment, where edges scatter more "
-        "than allowed for with a scale that says so; U = k·u is for 95 % with effective degrees of "
-        "freedom (GUM). A mean has the scatter of its runs over √n and, in full, what all runs "
-        "share. Predictions carry the uncertainty of the protocol's own numbers. Eₙ is the "
-        "difference of both over the expanded uncertainty of that difference, which contains the "
-        "scatter of the falls themselves: 1/√n of it for a mean of n drops. Within ±1 both agree "
-        "(ISO 13528)."
+    session = (
+        f"{together}Standard uncertainties u come from that fit. Where edges scatter more than "
+        "stated, u is enlarged to match, and a remark says so. U = k·u covers 95 % with effective "
+        "degrees of freedom (GUM). The uncertainty of a mean combines the scatter of its runs "
+        "over √n with everything that all runs share. Predictions carry the uncertainty of the "
+        "protocol's own numbers. Eₙ is the difference between measurement and prediction over the "
+        "expanded uncertainty of that difference, which contains the scatter of the falls "
+        "themselves: 1/√n of it for a mean of n drops. Within ±1 they agree (ISO 13528)."
     )
-    return first, second
+    return drop, session
 
 
 def method_page() -> str:

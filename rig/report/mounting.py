@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol, Side
     from rig.report.canvas import Canvas
 
-_WORDS: dict[Side, str] = {"impact": "strikes", "free": "falls beside it"}
+_BEAMS: dict[Side, str] = {"impact": "full (impact chain)", "free": "dashed (free chain)"}
 _COLOURS: dict[Side, str] = {"impact": SECOND, "free": MODEL}
 _LEGEND = "At each beam: channel: height in mm."
 _WIDTH_IN = 9.0
@@ -78,8 +78,8 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
     slope = math.radians(track.incline_deg.value)
     text = "\n".join([
         protocol.title, _LEGEND, "",
-        *_wrapped("Measure all lengths along the track from one mark (x), such as its lower end: "
-                  "to each beam, and to the middle of the glider before the release."),
+        *_wrapped("Lengths are measured along the track from one mark (x), such as its lower "
+                  "end, to each beam and to the glider's middle before release."),
     ])  # fmt: skip
     with canvas(
         (3.0, _LINE_IN * (text.count("\n") + 2)), _WIDTH_IN, simulated=False, sharex=False,
@@ -208,30 +208,25 @@ def _mm(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 def _zero(protocol: Protocol, gates: Gates) -> list[str]:
     """Say where heights are counted from, and how that is carried to both posts."""
     if not _inclines(protocol):
-        return ["Measure all heights from one level, such as the table: beams and drop alike."]
-    drawn = ", ".join(f"{word} (chain that {_WORDS[side]})" for side, word in _lines(gates))
+        return [
+            "Measure all heights, of the drop and of every beam, from one level, such as the table."
+        ]
     return [
         *_wrapped(
-            "Zero: lay one of the chain's rods on the board where the lowest rod will strike. "
-            "Where its middle is, is 0, for the drop and for every beam. Carry it to both posts at "
-            "once, with a hose of water or a spirit level on a straight edge, and mark it there; "
-            f"each beam is measured from its post's mark to ± {1e3 * gates.height_u:g} mm "
-            f"(height_uncertainty), the marks are good to ± {1e3 * gates.datum_u:g} mm "
-            "(datum_uncertainty). Another incline turns the board about the rod that lies there: 0 "
-            "stays."
+            "Zero: lay a rod on the board where the lowest rod will strike. Its middle is height "
+            "0, for the drop and for every beam. Transfer this level to both posts at once, with a "
+            "water hose or a spirit level on a straight bar, and mark it. Measure each beam from "
+            f"its post's mark to ± {1e3 * gates.height_u:g} mm (height_uncertainty); the marks "
+            f"agree to ± {1e3 * gates.datum_u:g} mm (datum_uncertainty). To change the incline, "
+            "turn the board about that rod: 0 stays."
         ),
-        f"Beams: {drawn}.",
+        f"Beams: {', '.join(_BEAMS[side] for side in gates.posts)}.",
         "",
     ]
 
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, _WRAP)
-
-
-def _lines(gates: Gates) -> list[tuple[Side, str]]:
-    words: dict[Side, str] = {"impact": "full", "free": "dashed"}
-    return [(side, words[side]) for side in gates.posts]
 
 
 def _slots(protocol: Protocol, gates: Gates) -> list[str]:
@@ -246,10 +241,9 @@ def _slots(protocol: Protocol, gates: Gates) -> list[str]:
         rows.append([f"{1e3 * height:g}", *(f"{1e3 * y:.0f} | {1e3 * s:.0f}" for y, s in ends)])
     return [
         *_wrapped(
-            "A beam crosses the rods front to back, and runs into the board so many mm uphill of "
-            "them | so many mm up along its face. As far as the board goes, cut a slot there, as "
-            "wide as the beam and its aim; or set the uphill part nearer to the rods than the "
-            "first number."
+            "Each beam crosses the rods front to back and meets the board at: mm uphill of the "
+            "rods | mm up along the board. Cut a slot there, a little wider than the beam. Or put "
+            "the uphill part closer to the rods than the first number."
         ),
         *text_table(rows),
     ]

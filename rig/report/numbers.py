@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 MINUS = "−"
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
@@ -80,3 +80,15 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
         return fixed(value * scale, default)
     decimals = decimals_for(uncertainty * scale, default)
     return f"{fixed(value * scale, decimals)} ± {fixed(uncertainty * scale, decimals)}"
+
+
+def ranges(noun: str, numbers: Iterable[int]) -> str:
+    """Write numbers, neighbours together: runs 3, 5–8."""
+    spans: list[tuple[int, int]] = []
+    for number in sorted(set(numbers)):
+        if spans and spans[-1][1] == number - 1:
+            spans[-1] = spans[-1][0], number
+        else:
+            spans.append((number, number))
+    names = [f"{low}" if low == high else f"{low}–{high}" for low, high in spans]
+    return f"{noun}{'s' if len(names) > 1 or '–' in names[0] else ''} {', '.join(names)}"

@@ -69,7 +69,7 @@ def run_points(
             markersize=4.2,
             elinewidth=0.8,
             capsize=0,
-            label=f"chain {chain} on the surface" if chain else "run ± U (95 %)",
+            label=f"chain {chain} strikes" if chain else "run ± U (95 %)",
             zorder=4,
         )
 

@@ -60,21 +60,13 @@ def paper_figure(
 
 
 def _caption(number: int) -> str:
-    lines = ["Where the paper's text (first) and its equations part:"]
+    lines = ["Where the paper's text and its equations differ:"]
     for claim in paper.claims():
         if claim.figure == number:
             said = f"· {claim.text}; equations: {claim.equations}"
             lines += textwrap.wrap(said, _WRAP, subsequent_indent="   ")
-    return "\n".join([*_NOTES.get(number, ()), *lines])
-
-
-_NOTES = {
-    3: [
-        "No line between level and the solid one: up to arctan μ = 11.3° rods would not slide, and "
-        "the",
-        "model has no answer.",
-    ],
-}
+    note = "No line from just above 0° to arctan μ = 11.3°: the rods would not slide there."
+    return "\n".join([*([note] if number == 3 else []), *lines])
 
 
 def _figure_3(axes: list[Axes], columns: Columns) -> None:
@@ -98,7 +90,7 @@ def _figure_3(axes: list[Axes], columns: Columns) -> None:
     axes[1].annotate("free fall by the equations", (1, _free_fall()), (0, 3),
                      textcoords="offset points", color=MUTED, va="bottom")  # fmt: skip
     axes[1].set_ylim(bottom=4.7)
-    axes[1].set_xlabel("inclination of the surface (°)")
+    axes[1].set_xlabel("incline of the surface (°)")
 
 
 def _free_fall() -> float:

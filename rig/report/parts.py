@@ -55,12 +55,12 @@ def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
     if effects:
         first, second = effects[0].first, effects[0].second
         yield Part(
-            f"Chain {first} less chain {second}, and sides",
+            f"Differences: chain {first} − chain {second}, and sides",
             [
                 f"Paired differences over blocks of {first}, {second}, {second}, {first}: the "
-                f"quantity when {first} strikes less that when {second} does. What stays of the "
-                "release skew when the chains change places goes with the sides: positive where "
-                "the free side lets go later."
+                f"value when {first} strikes minus that when {second} strikes. A release skew that "
+                "stays when the chains change places belongs to the sides; it is positive where "
+                "the free side releases later."
             ],
             tuple(_effect_columns()),
             effects,
@@ -73,7 +73,7 @@ _GATES: tuple[Column[GateMeans], ...] = (
     Column("n", lambda one: str(one.n)),
     Column("speed ± U (m/s)", lambda one: plus_minus(one.mean.speed, 1.0)),
     Column("SD (mm/s)", lambda one: _scaled(one.speed_sd)),
-    Column("since the gate before ± U (ms)", lambda one: plus_minus(one.mean.interval, 1e3)),
+    Column("time since previous gate ± U (ms)", lambda one: plus_minus(one.mean.interval, 1e3)),
     Column("SD (ms)", lambda one: _scaled(one.interval_sd)),
 )
 
@@ -82,8 +82,8 @@ def gate_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the section on what each gate saw of one object, where there is one."""
     for line in summary:
         if line.gates:
-            said = "Speed and time as the object's middle passes each beam, averaged over the runs."
-            yield Part("Gate by gate", [said], _GATES, line.gates)
+            caption = "Speed and time as the object's middle passes each beam: means of the runs."
+            yield Part("Gate by gate", [caption], _GATES, line.gates)
 
 
 def _scaled(value: float | None) -> str:
@@ -114,9 +114,9 @@ def scatter_part(summary: Sequence[Incline]) -> Part:
     return Part(
         "Scatter of the runs",
         [
-            "SD is the standard deviation of one run, SE that of the mean by scatter alone; u is "
-            "the standard uncertainty of the mean with what all runs have in common, U95 the "
-            "expanded one. SD/2 are the bars of Pantaleone's figures."
+            "SD: standard deviation of one run. SE: standard error of the mean, by scatter alone. "
+            "u and U95: standard and expanded uncertainty of the mean, with the errors that all "
+            "runs share. SD/2: half of SD, as in the bars of Pantaleone's figures."
         ],
         _SCATTER,
         [*_scatters(summary)],
@@ -138,8 +138,8 @@ _MOVES: tuple[Column[Mapping[str, Any]], ...] = (
 def prior_part(moves: Sequence[Mapping[str, Any]]) -> Part:
     """Make the table of what means move by with each prior, see `rig analyze --priors`."""
     return Part(
-        "What means move by with each prior",
-        ["Everything was adjusted again with one prior three times as wide, and as narrow."],
+        "Effect of each prior on the means",
+        ["Changes of the means when one prior becomes three times wider, or narrower."],
         _MOVES,
         [*moves],
     )

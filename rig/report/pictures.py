@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from rig.sections import Sections
 
 _GAP = (
-    " Hatched: inclines at which the rods would not slide, so that the model has no answer between "
-    "the level surface and arctan μ."
+    " Hatched: inclines below arctan μ, where the rods would not slide and the model has no answer."
 )
 
 
@@ -65,17 +64,17 @@ def pictures(
     drawn: list[tuple[Callable[[], str], PageFigure]] = []
     if two or SPEED.name in measured:
         both = "Separation and end speed" if two else "End speed"
-        apart = "Separation of the top rods and speed" if two else "Speed"
+        apart = "Separation and speed" if two else "Speed"
         chain = "impact chain" if two else "chain"
         drawn.append(
             (
                 lambda: incline_figure(analysis, curves, simulated, bars),
                 PageFigure(
                     "",
-                    f"{both} against inclination",
-                    f"{apart} of the {chain}'s end just before it reaches the surface, against "
-                    "inclination; lines are the model, their band its U (95 %). Below each, "
-                    "measured less predicted, with U (95 %) of that difference. Bars on means are "
+                    f"{both} against incline",
+                    f"{apart} of the {chain}'s top rod as it reaches the surface, against incline. "
+                    "Lines: the model, with its U (95 %) as a band. Below each: measured minus "
+                    "predicted, with U (95 %) of that difference. Bars on means: "
                     f"{LABELS[bars]}." + (_GAP if unanswered(curves or {}) else ""),
                 ),
             )
@@ -87,9 +86,9 @@ def pictures(
                 PageFigure(
                     "",
                     "Runs in order",
-                    "Every run in the order of execution. Bars are expanded uncertainties (95 %). "
-                    "Marks say which chain struck: where they lie apart, the chains are not "
-                    "alike; a skew that stays when the chains change places is the sides'.",
+                    "Every run, in the order of recording. Bars are expanded uncertainties (95 %). "
+                    "Markers show which chain struck. If the markers differ, the chains differ. If "
+                    "a skew stays when the chains change places, it belongs to the sides.",
                     "drops",
                 ),
             )
@@ -101,7 +100,7 @@ def pictures(
                 PageFigure(
                     "",
                     "Acceleration of each run",
-                    "Acceleration, run by run. Bars are expanded uncertainties (95 %).",
+                    "Acceleration of each run. Bars are expanded uncertainties (95 %).",
                 ),
             )
         )
@@ -113,9 +112,8 @@ def pictures(
                 PageFigure(
                     "",
                     f"How run {one.run.number} fell",
-                    f"Run {one.run.number}{judged} as the simulation let it fall at "
-                    f"{film.incline_deg:g}°: the striking chain from the front and, below, along "
-                    "its rods. Slack strings are dotted.",
+                    f"Run {one.run.number}{judged}, simulated at {film.incline_deg:g}°: the impact "
+                    "chain from the front and, below, along its rods. Slack strings are dotted.",
                     "impacts",
                 ),
             )

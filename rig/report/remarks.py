@@ -1,4 +1,4 @@
-"""What is remarked below results: why drops are void, where seconds come from, the air's share."""
+"""Remarks below results: void drops, shared errors, clock, air."""
 
 from __future__ import annotations
 
@@ -8,110 +8,122 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.likeness import likeness
 from rig.analysis.result import Measured
 from rig.measurands import averaged
-from rig.reasons import remedies, sentences
-from rig.report.columns import run_incline
-from rig.report.numbers import decimals_for, fixed, plus_minus, signed
+from rig.reasons import remedies, summarize_reasons
+from rig.report.numbers import decimals_for, fixed, plus_minus, ranges, signed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rig.analysis.joint_fit import JointFit
+    from rig.analysis.result import DropResult
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
+    from rig.reasons import Reason
     from rig.results import SessionResults
 
 _CLOCK_COVERAGE = 2.0  # about 95 %
 _ALONE = "the joint fit of all good runs did not converge: each run is shown by itself"
-_FOUND = 4.0  # standard uncertainties beyond which κ is worth a remark
+_SIGNIFICANT = 4.0  # standard uncertainties beyond which κ is worth a remark
 
 
-def remarks(found: SessionResults) -> list[str]:
-    """Make the remarks on a session's falls, clock and air."""
-    fitted = joint = found.analysis.joint
-    if joint is not None and joint.drops[0].model.protocol.drag is not None:
-        joint = None  # predictions are made in this air
+def remarks(results: SessionResults) -> list[str]:
+    """Return the remarks on a session's falls, clock and air."""
+    joint = results.analysis.joint
+    in_air = joint is not None and joint.drops[0].model.protocol.drag is not None
     return [
-        *([_ALONE] if found.analysis.unsettled else []),
-        *model_lines(fitted),
-        *common_lines(found.analysis.summary),
-        *clock_lines(found.calibration),
-        *air_lines(joint),
+        *([_ALONE] if results.analysis.unsettled else []),
+        *model_lines(joint),
+        *common_lines(results.analysis.summary),
+        *clock_lines(results.calibration),
+        *air_lines(None if in_air else joint),  # predictions are made in stated air
     ]
 
 
 def common_lines(summary: Sequence[Incline]) -> list[str]:
-    """Say what all means share, so that their errors, and Eₙ, go up and down together."""
-    told = []
+    """Name the largest systematic errors that all means share."""
+    causes: dict[str, None] = {}
     for row in averaged():
-        lines = [line.causes[row.name] for line in summary if line.causes.get(row.name)]
-        if lines:
-            most = {name: max(one.get(name, 0.0) for one in lines) for name in lines[0]}
-            first = [name for name, u in most.items() if u > 0.5 * max(most.values())]
-            told.append(f"{row.symbol} by {' and '.join(sorted(first, key=lambda n: -most[n]))}")
-    if not told:
+        budgets = [line.causes[row.name] for line in summary if line.causes.get(row.name)]
+        if budgets:
+            most = {name: max(part.get(name, 0.0) for part in budgets) for name in budgets[0]}
+            largest = [name for name, u in most.items() if u > 0.5 * max(most.values())]
+            causes |= dict.fromkeys(sorted(largest, key=lambda name: -most[name]))
+    if not causes:
         return []
     return [
-        "means share errors that no number of runs averages, and their Eₙ go up and down together: "
-        f"{'; '.join(told)}"
+        f"These means share systematic errors ({', '.join(causes)}). "
+        "More runs will not reduce them."
     ]
 
 
 def model_lines(joint: JointFit | None) -> list[str]:
-    """Say whether the falls look like the model, where that can be told."""
-    found = None if joint is None else likeness(joint)
-    return [] if found is None else [found.sentence]
+    """Compare the falls with the model, where enough edges allow it."""
+    match = None if joint is None else likeness(joint)
+    return [] if match is None else [match.sentence]
 
 
 def void_lines(analysis: Analysis) -> list[str]:
-    """Say of every void drop why, a line each, and below them what to do."""
+    """Return why drops are void, a line for each kind of reason, and what to do about them."""
     drops = sorted(
-        (*analysis.runs, *analysis.superseded), key=lambda one: (one.run.number, one.attempt)
+        (*analysis.runs, *analysis.superseded), key=lambda drop: (drop.run.number, drop.attempt)
     )
-    voids = [one for one in drops if one.verdict == "void"]
+    voids = [drop for drop in drops if drop.verdict == "void"]
     if not voids:
         return []
+    kinds: dict[tuple[object, ...], list[tuple[DropResult, Reason]]] = {}
+    for drop in voids:
+        for reason in drop.reasons:
+            kinds.setdefault(reason.kind, []).append((drop, reason))
     lines = ["void drops:"]
-    for one in voids:
-        tilt = run_incline(one)
-        at = f" at {tilt}°" if tilt else ""
-        reasons = signed(sentences(one.reasons))
-        lines.append(f"  run {one.run.number}, attempt {one.attempt}{at}: {reasons}")
-    what = remedies(reason for one in voids for reason in one.reasons)
-    return [*lines, "what to do:", *(f"  {one}" for one in what)]
+    for members in kinds.values():
+        where = _runs([drop for drop, _ in members])
+        lines.append(f"  {where}: {signed(summarize_reasons([why for _, why in members]))}")
+    advice = remedies(reason for drop in voids for reason in drop.reasons)
+    return [*lines, "what to do:", *(f"  {remedy}" for remedy in advice)]
 
 
-def clock_lines(said: Mapping[str, Any]) -> list[str]:
-    """Say in words where seconds come from, and what to know before trusting them.
+def _runs(drops: Sequence[DropResult]) -> str:
+    """Name drops by run and, where it is not the first alone, by attempt."""
+    attempts: dict[int, list[int]] = {}
+    for drop in drops:
+        attempts.setdefault(drop.run.number, []).append(drop.attempt)
+    names = [
+        f"{run}" if numbers == [1] else f"{run} ({ranges('attempt', numbers)})"
+        for run, numbers in attempts.items()
+    ]
+    return f"run{'s' if len(names) > 1 else ''} {', '.join(names)}"
+
+
+def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
+    """Say what times are corrected by, and how well that is known.
 
     Parameters
     ----------
-    said
-        ``calibration`` of ``rig analyze --json``.
+    calibration
+        Member of ``rig analyze --json``.
     """
-    expanded = _CLOCK_COVERAGE * said["u_ppm"]
-    u = fixed(expanded, decimals_for(expanded))
-    if said["source"] == "pings":
-        where = f"from {said['pings']} clock samples by the host's clock"
-    elif said["source"] == "reference":
-        where = f"from {said['pulses']} pulses of the 1 Hz reference"
-    elif "nominal_tick_hz" in said:
-        where = "as the board states it"
+    expanded, rate = _CLOCK_COVERAGE * calibration["u_ppm"], calibration["rate_ppm"]
+    u = fixed(expanded, max(decimals_for(expanded) - 1, 0))
+    by = {"pings": "", "reference": " by the 1 Hz reference"}.get(calibration["source"])
+    if by is not None:
+        way = "slow" if rate < 0.0 else "fast"
+        sentence = f"Board clock: {abs(rate):.4g} ppm {way}, corrected{by} (± {u} ppm)."
     else:
-        return [f"time scale: as the file gives it, ± {u} ppm (95 %)", *said["notes"]]
-    rate = fixed(said["rate_ppm"], decimals_for(expanded))
-    return [f"time scale: board {rate} ± {u} ppm off (95 %), {where}", *said["notes"]]
+        owner = "Board" if "nominal_tick_hz" in calibration else "Timer"
+        sentence = f"{owner} clock: used as stated, not compared (± {u} ppm)."
+    return [sentence, *calibration["notes"]]
 
 
 def air_lines(joint: JointFit | None) -> list[str]:
-    """Say what the air took, where it is more than nothing: the predictions are without it."""
+    """State the air drag that a fit finds, where it is significant: predictions ignore it."""
     block = None if joint is None else joint.shared.blocks.get("drag")
     if joint is None or block is None:
         return []
     value = float(joint.x[block][0])
     u = math.sqrt(joint.covariance.diagonal()[block][0]) * float(joint.sd[block][0])
-    if abs(value) <= _FOUND * u:
+    if abs(value) <= _SIGNIFICANT * u:
         return []
     return [
-        f"air: takes κv² from g, κ = {plus_minus(Measured(value, u))} per m; what is measured is "
-        "in this air, what is predicted is not (rig estimate takes it into account)"
+        f"Air drag: κ = {plus_minus(Measured(value, u))} per m in g − κv². "
+        "Predictions ignore air; the fit estimates it."
     ]

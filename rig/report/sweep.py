@@ -84,9 +84,9 @@ def _caption(facts: Mapping[str, Any]) -> str:
     fixed = "; ".join(_valued(labels[name], value) for name, value in facts["fixed"].items())
     lines = [
         f"{facts['title']}; chain {facts['chain']['name']}",
-        f"fixed: {fixed or 'nothing'}",
+        f"fixed: {fixed or 'none'}",
         f"{facts['made_by']}; protocol SHA-256 {facts['protocol_sha256'][:16]}…",
-        "hatched or dashed: beyond the model's domain; empty: no answer",
+        "hatched or dashed: outside the model's domain; empty: the model has no answer",
     ]
     return "\n".join(textwrap.fill(line, _WRAP) for line in lines)
 

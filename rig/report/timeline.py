@@ -1,4 +1,4 @@
-"""What each gate saw of a drop, as a small picture of its own: a bar while its beam was blocked."""
+"""Timeline of a drop: a line for each gate, with a bar while its beam was blocked."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def timeline(gates: Sequence[Gate], drop: Drop, hz: float | Fraction, result: Dr
     hz
         Calibrated ticks per second.
     result
-        Which of its edges belong to rods; the others are drawn as marks.
+        Which of its edges were matched; the others are drawn as marks.
 
     Returns
     -------
@@ -58,6 +58,7 @@ def timeline(gates: Sequence[Gate], drop: Drop, hz: float | Fraction, result: Dr
     """
     if not drop.edges:
         return ""
+    two_sides = len({gate.side for gate in gates}) > 1
     ordered = sorted(gates, key=lambda gate: (gate.side != "impact", -gate.height))
     times = [1e3 * float(edge.tick / hz) for edge in drop.edges]
     # Imported edges are counted from a whole second, not from the release.
@@ -70,9 +71,9 @@ def timeline(gates: Sequence[Gate], drop: Drop, hz: float | Fraction, result: Dr
     ]
     for place, gate in enumerate(ordered):
         y = _LANE * (place + 0.5)
-        word = "strikes" if gate.side == "impact" else "free"
+        side = f"{gate.side} " if two_sides else ""
         parts.append(
-            f'<text x="{_LEFT - 6:g}" y="{y + 3.5:g}" text-anchor="end">{word} '
+            f'<text x="{_LEFT - 6:g}" y="{y + 3.5:g}" text-anchor="end">{side}'
             f'{1e3 * gate.height:g} mm</text><path class="lane" d="M{_LEFT:g} {y:g}h{_WIDTH:g}"/>'
         )
         at = {
@@ -123,5 +124,5 @@ def _alt(result: DropResult) -> str:
     audit = result.audit
     return (
         f"When the gates were blocked in run {result.run.number}, attempt {result.attempt}: "
-        f"{audit.matched} edges of rods, {audit.missed} missing, {audit.spurious} of no rod"
+        f"{audit.matched} edges matched, {audit.missed} missed, {audit.spurious} unexplained"
     )

@@ -176,7 +176,7 @@ def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
 
 
 def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]]) -> str:
-    lines = ["SIMULATED DATA: no chain fell.", ""] if session.simulated else []
+    lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
     lines += [
         f"Session made {session.meta['created']} from {session.meta['origin']}",
         f"Protocol {session.protocol_source}, SHA-256 {session.meta['protocol_sha256']}",

@@ -1,4 +1,4 @@
-"""Everything an operator can do, in one table: key, palette text, and the command that does it too.
+"""Everything an operator can do, in one table: key, palette text, and the equivalent command.
 
 Keys, palette and help are made from it, and nothing else binds a key.
 """
@@ -49,57 +49,57 @@ class Action(NamedTuple):
 
 
 ACTIONS: tuple[Action, ...] = (
-    Action("stop", "f9", "STOP", "Stop: everything off, nothing falls", "Ctrl-C in rig run"),
-    Action("go_on", "enter", "go on", "Go on: open, next run; on the run page, arm",
+    Action("stop", "f9", "STOP", "Stop: switch everything off", "Ctrl-C in rig run"),
+    Action("go_on", "enter", "continue", "Continue: open, next run; on the run page, arm",
            "rig run PROTOCOL --port URL --session FILE",
            ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True),
-    Action("reject", "x", "reject", "Reject this drop for a reason, or take that back", "",
+    Action("reject", "x", "reject", "Reject this drop with a reason, or undo that", "",
            _JUDGED, driving=True),
-    Action("note", "n", "note", "Write a note to this drop, or change it", "", _JUDGED,
+    Action("note", "n", "note", "Write or change a note on this drop", "", _JUDGED,
            driving=True),
-    Action("again", "a", "again", "Another attempt at this run", "",
+    Action("again", "a", "repeat", "Repeat this run", "",
            frozenset({Stage.RESULT, Stage.HALTED, Stage.DONE}), driving=True),
-    Action("unblind", "b", "unblind", "Show a blind session's numbers from now on; once",
+    Action("unblind", "b", "unblind", "Show a blind session's numbers; cannot be undone",
            "rig unblind SESSION", _AT_REST, driving=True),
     Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
-    Action("close", "z", "close", "Close the session; another protocol can be chosen", "",
+    Action("close", "z", "close", "Close the session and choose another protocol", "",
            frozenset({Stage.DEVICE, Stage.PREPARE, Stage.HALTED, Stage.DONE}), driving=True),
-    Action("release_test", "l", "try release", "Try the release with nothing hung",
+    Action("release_test", "l", "test release", "Test the release with nothing attached",
            "rig selftest --port PORT --release",
            frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
-    Action("wave", "w", "wave", "Begin the wave-your-hand test and the counters again"),
+    Action("wave", "w", "wave", "Restart the hand test of the gates and their counters"),
     Action("page_protocol", "1,p", "protocol", "Page: protocol, its scene and plan",
            "rig check PROTOCOL"),
     Action("page_device", "2,d", "device", "Page: device, clock and gates", "rig selftest"),
-    Action("page_run", "3,u", "run", "Page: the run in hand"),
+    Action("page_run", "3,u", "run", "Page: the current run"),
     Action("page_result", "4,v", "result", "Page: result and verdict of the latest drop",
            "rig analyze SESSION"),
-    Action("page_session", "5,s", "session", "Page: the session so far",
+    Action("page_session", "5,s", "session", "Page: plan, means and control charts",
            "rig report SESSION -o FILE.html"),
-    Action("page_history", "6,h", "history", "Page: any drop again, forwards and back",
+    Action("page_history", "6,h", "history", "Page: replay any drop, forwards or backwards",
            "rig replay SESSION"),
-    Action("earlier", "left", "earlier", "History: back in time; elsewhere the plots' cursor left"),
-    Action("later", "right", "later", "History: on in time; elsewhere the plots' cursor right"),
+    Action("earlier", "left", "earlier", "History: back in time; other pages: plot cursor left"),
+    Action("later", "right", "later", "History: forward in time; other pages: plot cursor right"),
     Action("slower", "minus", "slower", "History: half the speed"),
     Action("faster", "plus", "faster", "History: twice the speed"),
-    Action("play", "full_stop", "play", "History: play, or stand still"),
-    Action("turn_round", "i", "turn", "History: play in the other direction"),
-    Action("sessions", "o", "sessions", "History: another session"),
-    Action("drops", "g", "drops", "History: another drop"),
-    Action("filter", "f", "filter", "History: only some drops, by incline, chain or verdict"),
-    Action("compare", "k", "compare", "History: all these drops in one picture, or one alone"),
+    Action("play", "full_stop", "play", "History: play or pause"),
+    Action("turn_round", "i", "reverse", "History: play in the other direction"),
+    Action("sessions", "o", "sessions", "History: choose another session"),
+    Action("drops", "g", "drops", "History: choose another drop"),
+    Action("filter", "f", "filter", "History: show only some drops, such as accepted"),
+    Action("compare", "k", "compare", "History: all these drops in one picture, or only one"),
     Action("report", "m", "report", "Write the session's report beside it",
            "rig report SESSION -o FILE.html"),
     Action("export", "e", "export", "Write the session's CSV files beside it",
            "rig export SESSION --csv DIR"),
-    Action("control_chart", "y", "skew/g", "Session: skew or g in the control chart",
+    Action("control_chart", "y", "skew/g", "Session: other quantity in the control chart",
            two_chains=True),
     Action("previous", "up", "previous", "Previous drop, protocol or line"),
     Action("next", "down", "next", "Next drop, protocol or line"),
-    Action("theme", "t", "theme", "Next theme: dark, light, high contrast"),
-    Action("help", "question_mark,f1", "help", "What can be done here", "rig --help"),
-    Action("palette", "ctrl+p", "palette", "Find an action by its name"),
-    Action("quit", "q,ctrl+q", "quit", "Leave; a run goes on without this screen"),
+    Action("theme", "t", "theme", "Change colours: dark, light, high contrast"),
+    Action("help", "question_mark,f1", "help", "Show all keys", "rig --help"),
+    Action("palette", "ctrl+p", "commands", "Search commands"),
+    Action("quit", "q,ctrl+q", "quit", "Quit; the rig keeps running"),
 )  # fmt: skip
 
 BY_NAME = {action.name: action for action in ACTIONS}
@@ -117,11 +117,11 @@ _NOT = {
     Stage.DEVICE: "before the first run",
     Stage.TESTING: "during the test of the release",
     Stage.PREPARE: "before the drop",
-    Stage.LIVE: "while chains fall",
+    Stage.LIVE: "during the fall",
     Stage.JUDGING: "while the drop is analysed",
-    Stage.RESULT: "before this drop is done with",
-    Stage.HALTED: "while the plan stands still",
-    Stage.DONE: "when the plan is done",
+    Stage.RESULT: "before this drop is finished",
+    Stage.HALTED: "while the plan is halted",
+    Stage.DONE: "after the plan is complete",
 }
 
 
@@ -136,7 +136,7 @@ def hindrance(
         return f"not {_NOT.get(stage, 'with the release armed')}"
     if action.driving and not driving:
         return "this screen only watches"
-    return "this scene has one chain" if action.two_chains and two_chains is False else ""
+    return "not in this scene" if action.two_chains and two_chains is False else ""
 
 
 def shown_key(keys: str) -> str:

@@ -61,8 +61,7 @@ _PAGE_OF = {
 
 
 _NOT_MEANT = (
-    "not armed: Enter came too soon after another key\n"
-    "take the hand away for half a second, then press Enter once"
+    "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
 
 THEMES = (
@@ -488,11 +487,11 @@ class RigApp(App[None], inherit_bindings=False):
             commands.do(self, name)
         elif action.driving and not self.driving:
             self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
-                               "c takes control when it is free"))  # fmt: skip
+                               "press c to take control when it is free"))  # fmt: skip
 
     def _hindrance(self, action: Action) -> str:
         if self.client is None and action.name not in OFFLINE:
-            return "only a file is looked at"
+            return "no rig is connected"
         two = self.model.two_chains
         return hindrance(action, self.flow.stage, driving=self.driving, two_chains=two)
 

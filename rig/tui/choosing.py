@@ -1,4 +1,4 @@
-"""Which drops of a session are looked at: words that say incline, chain or verdict."""
+"""Select drops of a session by words such as a verdict, an incline or a chain."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ from typing import TYPE_CHECKING
 
 from rig.analysis.result import GOOD
 from rig.records import Job
+from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
+    from rig.protocol.protocol import Run
     from rig.results.live import SessionView
 
-HOW = "Which drops? An incline, a chain or a verdict, or several of these: 40 A accepted"
+
+def condition(run: Run) -> str:
+    """Name what a run drops and, where it strikes, at which incline."""
+    if run.impact is None:
+        return plain(run.free, 20)
+    return f"{run.incline_deg:g}° impact {plain(run.impact, 20)}"
 
 
 def chosen(view: SessionView, words: str) -> tuple[Job, ...]:
@@ -19,20 +26,21 @@ def chosen(view: SessionView, words: str) -> tuple[Job, ...]:
     Parameters
     ----------
     words
-        Inclines in degrees, names of striking chains, verdicts, or ``counts``, separated by
-        blanks; empty for every drop.
+        Of `labels`, separated by blanks; empty for every drop.
     """
+    wanted = {word.casefold().rstrip("°") for word in words.split()}
+    return tuple(job for job, drop_labels in labels(view).items() if wanted <= {*drop_labels})
+
+
+def labels(view: SessionView) -> dict[Job, tuple[str, ...]]:
+    """Label every drop: incline and chain where it strikes, verdict, and whether it counts."""
     counting = {
-        Job(one.run.number, one.attempt) for one in view.analysis.runs if one.verdict in GOOD
+        Job(drop.run.number, drop.attempt) for drop in view.analysis.runs if drop.verdict in GOOD
     }
-    wanted = [word.casefold().rstrip("°") for word in words.split()]
-    return tuple(
-        job for job in view.jobs if set(wanted) <= _words_of(view, job, counts=job in counting)
-    )
-
-
-def _words_of(view: SessionView, job: Job, *, counts: bool) -> set[str]:
-    run = view.plan[job.run]
-    chain = run.impact or run.free or ""
-    found = {f"{run.incline_deg:g}", chain.casefold(), view.results[job].verdict}
-    return found | ({"counts"} if counts else set())
+    drops = {}
+    for job in view.jobs:
+        run = view.plan[job.run]
+        struck = (f"{run.incline_deg:g}", run.impact.casefold()) if run.impact else ()
+        counts = ("counts",) if job in counting else ()
+        drops[job] = (*struck, view.results[job].verdict, *counts)
+    return drops

@@ -62,7 +62,7 @@ class ReconnectingClient:
         self.url = url
         self.path = default_socket() if socket is None else socket
         self.name = f"rig tui {os.getpid()}"
-        self.silence = "looking for it"
+        self.silence = "connecting"
         self.changed = True
         self.lost: Mapping[str, Any] = {}
         self.disk_s = 0.0
@@ -115,7 +115,7 @@ class ReconnectingClient:
             As the daemon raised it, or it is not there.
         """
         if self._client is None:
-            raise DeviceError(f"no daemon: {self.silence}", "it is tried again by itself")
+            raise DeviceError(f"no daemon: {self.silence}", "reconnecting")
         return await self._client.call(method, **params)
 
     async def take_control(self) -> None:
@@ -169,7 +169,7 @@ class ReconnectingClient:
             reached = asyncio.get_running_loop().create_task(self._going_on())
             while not client.lost.is_set():
                 await self._beat(client)
-            self.silence = "it is gone\nan armed board has switched itself off"
+            self.silence = "it has ended\nan armed board has switched itself off"
         finally:
             self._hangs, self.disk_s = False, 0.0
             if reached is not None:
@@ -191,9 +191,9 @@ class ReconnectingClient:
             if not answer.done():
                 self._hangs = self.changed = True
                 self.silence = (
-                    f"it hangs, without a word for {monotonic() - begun:.0f} s\n"
-                    "an armed board has switched itself off, and a drop that fell waits in it; "
-                    f"if it does not go on: kill -9 {client.replica.state['daemon']['pid']}"
+                    f"no answer for {monotonic() - begun:.0f} s\n"
+                    "an armed board has switched itself off and keeps a drop that fell; "
+                    f"if this stays: kill -9 {client.replica.state['daemon']['pid']}"
                 )
         if answer.exception() is None:
             self.changed |= self._hangs or self.disk_s > 0.0
@@ -211,8 +211,8 @@ class ReconnectingClient:
         self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
             raise DeviceError(
-                f"the daemon has {self._port}, not {self.url};",
-                "leave --port out to watch that one, or give --socket for a second daemon",
+                f"the daemon has {self._port}, not {self.url}",
+                "leave out --port to watch that port, or give --socket for a second daemon",
             )
 
     def _start(self, error: DeviceError) -> None:
@@ -237,7 +237,7 @@ class ReconnectingClient:
                 stderr=log,
                 start_new_session=True,
             )
-        self.silence = "started one, waiting for it"
+        self.silence = "starting the daemon"
 
     def _note(self, replica: Replica) -> None:
         self.changed = True

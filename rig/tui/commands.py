@@ -13,6 +13,7 @@ from rig.tui import selectors
 from rig.tui.screens.ask import Ask, AskReason, Confirm
 from rig.tui.screens.help import Help
 from rig.tui.screens.palette import Palette
+from rig.tui.widgets.text import plain
 from rig.tui.writing import export_of, report_of, write
 
 if TYPE_CHECKING:
@@ -24,14 +25,13 @@ if TYPE_CHECKING:
 
 
 REASONS = (
-    "a chain was touched, or not at rest",
-    "hung otherwise than told",
-    "the incline was not as told",
+    "touched, or not at rest, before the release",
+    "not set up as the run page shows",
     "a knock or a draught at the rig",
-    "a chain caught on something",
-    "a try, not meant to count",
+    "caught on something",
+    "a trial that should not count",
 )
-"""Why drops are rejected that are good by their limits, as far as nobody types another reason."""
+"""Frequent reasons to reject a drop that is within its limits; the operator may type another."""
 
 
 def do(app: CommandContext, name: str) -> None:
@@ -50,8 +50,8 @@ def _go_on(app: CommandContext) -> None:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp.arm`."""
     stage = app.driver.flow.stage
     if stage is Stage.PREPARE and app.page == "run":
-        app.driver.take(Warned("the release is armed by the Enter key, not from here\n"
-                               "half a second after anything else"))  # fmt: skip
+        app.driver.take(Warned("only the Enter key arms the release\n"
+                               "press it half a second after any other key"))  # fmt: skip
     elif stage is Stage.PREPARE:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
@@ -68,8 +68,8 @@ def _control(app: CommandContext) -> None:
     client = app.client
     assert client is not None
     if client.driving:
-        question = "Another screen can take it then; this one goes on watching."
-        _confirm(app, "CONTROL OF THE RIG", question, "give it back",
+        question = "Another screen can then take it; this screen keeps watching."
+        _confirm(app, "Give control back?", question, "give it back",
                  lambda: app.begin(_quietly(client.release_control())))  # fmt: skip
     else:
         app.begin(_take_control(app))
@@ -98,14 +98,14 @@ def _close(app: CommandContext) -> None:
         app.driver.asked = None
         app.begin(_quietly(client.call("close_session")))
 
-    question = "What is recorded stays in its file, and can be continued."
-    _confirm(app, "CLOSE THE SESSION", question, "close it", close)
+    question = "Everything recorded stays in its file. You can continue it later."
+    _confirm(app, "Close the session?", question, "close", close)
 
 
 def _quit(app: CommandContext) -> None:
     """Ask, then leave."""
-    question = "What is armed or falls goes on without this screen." if app.client else ""
-    _confirm(app, "LEAVE", question, "leave", app.exit)
+    question = "The rig keeps running after you quit." if app.client else ""
+    _confirm(app, "Quit?", question, "quit", app.exit)
 
 
 def _confirm(
@@ -126,10 +126,10 @@ def _try_release(app: CommandContext) -> None:
         return
     pulse_ms = view.protocol.release.pulse * 1e3
     question = (
-        f"The release is driven once, for {pulse_ms:g} ms. Take the chains off: what hangs there "
-        "falls. It is no run of the plan, and nothing of it is counted."
+        f"This drives the release once, for {pulse_ms:g} ms. Take {view.protocol.vocabulary.body} "
+        "off first. The test is not a run of the plan and is not counted."
     )
-    _confirm(app, "TEST OF THE RELEASE", question, "drive it", lambda: app.driver.take(Try()))
+    _confirm(app, "Test the release?", question, "test", lambda: app.driver.take(Try()))
 
 
 def _sessions(app: CommandContext) -> None:
@@ -156,14 +156,17 @@ def _note(app: CommandContext) -> None:
 
 def _filter(app: CommandContext) -> None:
     """Ask which drops are looked at."""
-    from rig.tui.choosing import HOW  # noqa: PLC0415 - brings the analysis along
+    from rig.tui.choosing import labels  # noqa: PLC0415 - brings the analysis along
 
     def given(words: str | None) -> None:
         if words is not None:
             app.history.sift(words.strip())
 
     app.turn("history")
-    app.ask(Ask(HOW, app.history.words), given)
+    view = app.history.view
+    words = dict.fromkeys(word for drop in labels(view).values() for word in drop) if view else ()
+    question = f"Show drops with all of these words: {plain(' '.join(words))}"
+    app.ask(Ask(question, app.history.words), given)
 
 
 def _compare(app: CommandContext) -> None:
@@ -176,10 +179,10 @@ def _write(app: CommandContext, command: Callable[[Path], tuple[str, ...]]) -> N
     """Ask, then have files written of the session that is looked at."""
     view = (app.history.view if app.page == "history" else None) or app.model.view
     if view is None:
-        app.tell(app.model.loading or "no session is open: o lists them")
+        app.tell(app.model.loading or "no session is open: press o to choose one")
         return
     words = command(view.path)
-    _confirm(app, "WRITE FILES", f"{words[-1]}: what is there is replaced.", "write them",
+    _confirm(app, "Write files?", f"{words[-1]} will be replaced if it exists.", "write",
              lambda: app.begin(write(app, *words)))  # fmt: skip
 
 
@@ -196,8 +199,8 @@ def _reject(app: CommandContext) -> None:
     model = app.model
     if model.flow.verdict == "rejected":
         verdict, _ = model.flow.judged
-        question = f"The drop is {verdict} then, as it was by its limits. Both stay in the log."
-        _confirm(app, "TAKE THE REJECTION BACK", question, "take it back",
+        question = f"The drop becomes {verdict} again. The log keeps both verdicts."
+        _confirm(app, "Undo the rejection?", question, "undo",
                  lambda: app.driver.take(Restore()))  # fmt: skip
         return
 
@@ -208,8 +211,8 @@ def _reject(app: CommandContext) -> None:
     question = "Why is this drop rejected?"
     if model.replaced is not None:
         question += (
-            f" Attempt {model.replaced.attempt} was good, but of a run only the latest attempt "
-            "counts: it has no result then, until it is repeated."
+            f" Only the latest attempt of a run counts: attempt {model.replaced.attempt} was good, "
+            "but the run will have no result until you repeat it."
         )
     app.ask(AskReason(question, REASONS), given)
 
@@ -220,11 +223,11 @@ def _repeat(app: CommandContext) -> None:
     job = model.flow.job or model.job
     wanted = again(selectors.runs(model), job.run) if job else None
     if wanted is not None:
-        title = f"RUN {wanted.run}, ATTEMPT {wanted.attempt}"
-        question = "It is prepared next, and nothing is armed yet."
+        title = f"Repeat run {wanted.run} (attempt {wanted.attempt})?"
+        question = "This only prepares the run; nothing is armed yet."
         if selectors.good(model, wanted.run):
-            question += " The run has a good drop; from now on the new one counts instead of it."
-        _confirm(app, title, question, "prepare it", lambda: app.driver.take(Again(wanted)))
+            question += " The run has a good drop; the new attempt will count instead."
+        _confirm(app, title, question, "prepare", lambda: app.driver.take(Again(wanted)))
 
 
 def _unblind(app: CommandContext) -> None:
@@ -232,10 +235,10 @@ def _unblind(app: CommandContext) -> None:
     client = app.client
     assert client is not None
     if not app.model.blind:
-        app.driver.take(Warned("this session is not blind\nblind: true in a protocol makes it so"))
+        app.driver.take(Warned("this session is not blind\nwrite blind: true in its protocol"))
         return
-    question = "What was measured is shown from now on. This is recorded, and cannot be undone."
-    _confirm(app, "UNBLIND THE SESSION", question, "show the numbers",
+    question = "This shows all results. It is recorded and cannot be undone."
+    _confirm(app, "Unblind the session?", question, "show results",
              lambda: app.begin(_unblinded(app, client)))  # fmt: skip
 
 

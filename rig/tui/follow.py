@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 _UNHEARD = (
     "the daemon was lost before the release: nothing fell\n"
-    "a board that is not heard of switches itself off; arm again when all is well"
+    "the board switches itself off; arm again when the daemon is back"
 )
 _UNSEEN = (
-    "the daemon was lost while chains fell\n"
-    "the drop is kept by daemon or board, and judged when it is found"
+    "the daemon was lost during the fall\n"
+    "daemon or board keeps the drop; it is analysed when the daemon is back"
 )
 _CLOCK_S = 3.0
 """Clock samples come between drops too, so the file is read again so often."""
@@ -126,7 +126,7 @@ class Follower:
             events.append(Closed())
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
             events.append(
-                Lost("control of the rig went to another client\nc takes it when it is free")
+                Lost("another client took control of the rig\npress c to take it when it is free")
             )
         missed = unjudged(state.runs)
         if missed and missed not in self.judged and client.driving:
@@ -236,4 +236,4 @@ def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
     if stage is Stage.COUNTDOWN and drop.get("state") == "interrupted":
         line = state.line(drop["run"])
         why = line.reasons[0] if line and line.reasons else "stopped"
-        yield Lost(f"{why}: nothing fell\narm again when all is well")
+        yield Lost(f"{why}: nothing fell\narm again when this is mended")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ALWAYS = {"stop": "f9", "go_on": "enter"}
 """Keys that stay, whatever others an action is given: who knows only one key knows these."""
-_HOW = 'one line an action: reject = "r"'
+_HOW = 'write one line for each action, such as reject = "r"'
 RESERVED = ("escape",)
 """Keys whose meaning is fixed."""
 
@@ -93,14 +93,14 @@ def combined(
     for name, value in given.items():
         at = places.get(name, source)
         if name not in BY_NAME:
-            faults.append(f"{at}: {name}: no such action; there are {', '.join(BY_NAME)}")
+            faults.append(f"{at}: unknown action {name}; accepted: {', '.join(BY_NAME)}")
             continue
         if not isinstance(value, str) or not value.strip():
-            faults.append(f'{at}: {name}: a key or several, as in "r" or "r,f5"')
+            faults.append(f'{at}: {name}: give a key or several, such as "r" or "r,f5"')
             continue
         keys = [key.strip() for key in value.split(",") if key.strip()]
         faults += [
-            f"{at}: {name}: {key} is no key; they are named as r, f5, ctrl+r, enter, question_mark"
+            f"{at}: {name}: unknown key {key}; examples: r, f5, ctrl+r, enter, question_mark"
             for key in keys
             if not _is_key(key)
         ]
@@ -110,14 +110,14 @@ def combined(
             if key in RESERVED:
                 faults.append(f"{at}: {name}: {key} always means STOP")
             elif owner.setdefault(key, name) != name:
-                faults.append(f"{at}: {name}: {key} is the key of {owner[key]}")
+                faults.append(f"{at}: {name}: {key} already belongs to {owner[key]}")
         chosen[name] = keys
     for action in ACTIONS:
         if action.name not in chosen:
             own = action.keys.split(",")
             chosen[action.name] = [key for key in own if owner.get(key, action.name) == action.name]
             if not chosen[action.name]:
-                faults.append(f"{source}: {action.name} has no key left; give it one")
+                faults.append(f"{source}: {action.name} has no key left; give it a key")
     if faults:
         raise InputError("\n".join(faults))
     return {action.name: ",".join(chosen[action.name]) for action in ACTIONS}

@@ -9,6 +9,7 @@ from rig.analysis.result import GOOD
 from rig.campaign.events import Stage
 from rig.campaign.machine import BEFORE_RELEASE
 from rig.campaign.voids import Voids
+from rig.vocabulary import ANY_SCENE
 
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators
     from rig.tui.state import DaemonState
+    from rig.vocabulary import Vocabulary
 
 SLOW_DISK_S = 0.5
 """A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
@@ -95,7 +97,7 @@ class Model:
         waits = self.offline or bool(self.state.section("session"))
         if self.view is not None or self.unreadable or not waits:
             return ""
-        return f"loading the session: {self.read} drops so far …"
+        return f"Loading the session: {self.read} drops so far …"
 
     @property
     def stage(self) -> Stage:
@@ -116,8 +118,13 @@ class Model:
         return None if self.protocol is None else self.protocol.two_chains
 
     @property
+    def words(self) -> Vocabulary:
+        """The words of the scene."""
+        return ANY_SCENE if self.protocol is None else self.protocol.vocabulary
+
+    @property
     def run(self) -> Run | None:
-        """The planned run in hand."""
+        """The current planned run."""
         if self.view is None or self.job is None:
             return None
         return self.view.plan.get(self.job.run)
@@ -159,22 +166,22 @@ def alarm(model: Model) -> Alarm | None:
         silence, _, hint = model.silence.partition("\n")
         return Alarm(
             f"no daemon: {silence or 'connecting'}",
-            f"{hint}{'; ' * bool(hint)}tried again by itself; a drop that was fired is recorded "
-            "without this screen; in danger switch the release's supply off",
+            f"{hint}{'; ' * bool(hint)}reconnecting; a fired drop is recorded without this screen; "
+            "in danger, switch the release's supply off",
         )
     if model.disk_s > SLOW_DISK_S:
         return Alarm(
-            f"the disk has been at one write for {model.disk_s:.1f} s",
-            "nothing is lost, and a board that was armed has switched off by itself; "
-            "is the disk full, asleep, or across a network? another program may hold the file",
+            f"the disk has not finished a write for {model.disk_s:.1f} s",
+            "nothing is lost, and an armed board has switched itself off; check whether the disk "
+            "is full, asleep or on a network, and whether another program uses the file",
         )
     link, error = model.state.section("link"), model.state.section("error")
     if link.get("state") == "down" or (link.get("state") == "opening" and error):
         why, wait = link.get("error") or error, link.get("retry_s")
-        again = f" (next try in {float(wait):.0f} s)" if wait is not None else ""
+        again = f" in {float(wait):.0f} s" if wait is not None else ""
         return Alarm(
             f"the port is lost: {why.get('message', '')}",
-            f"it is found again by itself{again}; {why.get('hint') or 'check cable and power'}",
+            f"reconnecting{again}; {why.get('hint') or 'check cable and power'}",
         )
     if error:
         return Alarm(str(error.get("message", "")), str(error.get("hint", "")))

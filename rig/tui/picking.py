@@ -14,6 +14,7 @@ from rig.records import Job
 from rig.results import protocol_of
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
+from rig.tui.choosing import condition
 from rig.tui.replay import Player
 from rig.tui.screens.ask import Pick
 from rig.tui.widgets.banner import LOOKS
@@ -73,7 +74,7 @@ async def sessions(app: CommandContext) -> None:
         if number is not None and entries:
             app.begin(_open(app, entries[number]))
 
-    title = f"Sessions in {plain(folder.resolve(), 80)}, the newest first"
+    title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
     app.ask(Pick(title, [_line(one) for one in entries], at), chosen)
 
 
@@ -89,10 +90,8 @@ def drops(app: CommandContext) -> None:
         verdict = found.results[job].verdict
         symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
         run = found.plan[job.run]
-        falls = "free fall" if found.protocol.track is None else "down the track"
-        hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else falls
         lines.append(
-            Content.assemble(f"run {job.run:3}, attempt {job.attempt}   {hung:28}",
+            Content.assemble(f"run {job.run:3}, attempt {job.attempt}   {condition(run):28}",
                              (f"{symbol} {verdict:10}", color),
                              "counts" if job in counting else "")
         )  # fmt: skip

@@ -43,24 +43,24 @@ def chain_pictures(
         return None, None
     end = max((float(one.times[-1]) for one in found if one.times.size), default=0.0)
     end = max(end, _expected_end(found)) + _BEFORE_S
-    series, left = [], []
+    series, left, pair = [], [], len(found) > 1
     for one in found:
         times, heights = one.curve(end)
         series.append(Series("line", times * 1e3, heights * 1e2, "accent",
-                             label=f"model, {one.role} side"))  # fmt: skip
+                             label=f"model, {one.role} side" if pair else "model"))  # fmt: skip
     for one in reversed(found):  # the struck chain above the free one
         mark, color = _MARKS[one.role]
         thin = slice(None, None, 1 + one.times.size // _MOST)
         times, heights = one.times[thin], one.heights[thin]
         series.append(Series("dots", times * 1e3, heights * 1e2, color, mark,
-                             one.role))  # fmt: skip
+                             one.role if pair else "measured"))  # fmt: skip
         if one.model is not None and times.size:
             off = heights - one.model.heights(times - one.delay_s)[0]
             left.append(Series("dots", times * 1e3, off * 1e3, color, mark))
     limits = (0.0, end * 1e3)
     chains = Picture("z (cm) as it fell", _TIME, tuple(series), limits,
-                     residuals=tuple(left), residual_label="less the model (mm)")  # fmt: skip
-    if len(found) < 2:
+                     residuals=tuple(left), residual_label="minus model (mm)")  # fmt: skip
+    if not pair:
         return chains, None
     gap = separation(found, end, skew_s)
     how = "as it fell" if skew_s is None else "corrected"
@@ -74,7 +74,7 @@ def chain_pictures(
         ),
         limits,
         residuals=(Series("dots", gap.times[: off.size] * 1e3, off * 1e3, "success", "+"),),
-        residual_label="less the model (mm)",
+        residual_label="minus model (mm)",
     )
     return chains, apart
 
@@ -194,7 +194,7 @@ def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
                            [one * row.fine_scale for one in off], "primary", "●",
                            errors=[line.means[name].expanded * row.fine_scale for line in beside]),
                 ),
-                residual_label=f"means less the model ({row.fine})",
+                residual_label=f"means − model ({row.fine})",
             )
         )  # fmt: skip
     return found
@@ -234,7 +234,7 @@ def control_pictures(view: SessionView) -> list[Picture]:
     points = [(one, _gravity(view, one)) for one in runs]
     if view.gravity or any(point for _, point in points):
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
-        what = "g of the free chain" if view.protocol.track is None else "a down the track"
+        what = "g in free fall" if view.protocol.track is None else "a along the track"
         found.append(_chart(f"{what} (m/s²)", view, expected, points))
     return found
 
@@ -243,14 +243,14 @@ def meaning(label: str) -> str:
     """Say in a line what a control chart is read for."""
     if label.startswith(RELEASE_SKEW.label):
         return (
-            "skew: how much later the free chain left; beyond the limit a drop is void; "
-            "a drift says that a release wears"
+            "skew: how much later the free chain was released; beyond the limit a drop is void; "
+            "a drift means that a release wears"
         )
     if label.startswith("a "):
-        return "a: acceleration down the track, friction and all, beside that without friction"
+        return "a: acceleration along the track, with friction; the line is without friction"
     return (
-        "g: gravity by each free chain; bars that keep off the protocol's mean wrong heights, "
-        "clock or side"
+        "g: gravity from each free fall; if the bars miss the protocol's value, check heights "
+        "and clock"
     )
 
 

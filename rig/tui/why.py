@@ -1,4 +1,4 @@
-"""Why the chain that strikes arrives first, in words and as speed against time."""
+"""A drop beside the model and free fall, in words and as speed against time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from rig.analysis.comparison import compare
 from rig.analysis.result import Measured
 from rig.measurands import MEASURANDS, SEPARATION, SPEED, averaged
 from rig.predictions import predict_incline, predicted_run
-from rig.report.numbers import fixed, plus_minus
+from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.tui.motion import model_fall
 from rig.tui.plotting import Picture, Series
 
 if TYPE_CHECKING:
+    from rig.measurands import Measurand
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.results.live import SessionView
@@ -25,14 +26,14 @@ _POINTS = 400  # of a curve whose steps stand 10 ms apart
 
 
 def expected_words(protocol: Protocol, run: Run) -> str:
-    """Say before the drop what the model expects of it; empty where it has no answer."""
+    """State the model's prediction for a run; empty where it has no answer."""
     expected = predicted_run(protocol, run)
-    told = [
+    values = [
         f"{row.symbol} {plus_minus(stated(expected[row.name]), row.scale)} {row.unit}"
         for row in averaged()
         if row.name in expected
     ]
-    return "  ".join(told)
+    return "  ".join(values)
 
 
 def stated(model: Quantity) -> Measured | float:
@@ -41,40 +42,44 @@ def stated(model: Quantity) -> Measured | float:
 
 
 def why_words(view: SessionView, job: Job) -> str:
-    """Say what a drop means beside the model and free fall; empty where nothing was measured."""
-    run, found = view.plan[job.run], view.results[job].quantities
+    """Compare a drop with the model and with free fall; empty where nothing was measured."""
+    run, measured = view.plan[job.run], view.results[job].quantities
     expected = predicted_run(view.protocol, run)
     lines = []
-    speed = found.get(SPEED.name)
+    speed = measured.get(SPEED.name)
     if speed is not None and run.impact is not None:
         free = predict_incline(view.protocol, run.incline_deg, run.impact, run.free).free_fall_speed
         model = expected.get(SPEED.name)
-        told = f"model {plus_minus(stated(model), SPEED.scale)}, " if model is not None else ""
-        here = f"here {plus_minus(speed, SPEED.scale)} {SPEED.unit}"
-        lines.append(f"V: free fall {free:.3f}, {told}{here}")
-    apart = found.get(SEPARATION.name)
+        by_model = f"model {plus_minus(stated(model), SPEED.scale)}, " if model is not None else ""
+        by_gates = f"measured {plus_minus(speed, SPEED.scale)} {SPEED.unit}"
+        lines.append(f"V: free fall {free:.3f}, {by_model}{by_gates}")
+    apart = measured.get(SEPARATION.name)
     fall = model_fall(view.protocol, run, "free") if run.free is not None else None
     if apart is not None and fall is not None and run.free is not None:
         length = view.protocol.chains[run.free].chain.length
-        late = np.diff(fall.times(np.array([apart.value - length, -length])))[0]
+        lead = np.diff(fall.times(np.array([apart.value - length, -length])))[0]
         lines.append(
-            f"it arrives {apart.value * SEPARATION.scale:.1f} {SEPARATION.unit} ahead: "
-            f"free fall needs {late * 1e3:.0f} ms more for that"
+            f"the striking chain {'wins' if lead > 0.0 else 'loses'} by "
+            f"{abs(apart.value) * SEPARATION.scale:.1f} {SEPARATION.unit}, "
+            f"or {abs(lead) * 1e3:.0f} ms"
         )
-    for one in compare(view.protocol, [[view.results[job]]]):
-        error = one.differences[0].normalized_error
-        if error is not None:
-            lines.append(f"{MEASURANDS[one.quantity].symbol} {_agreement(error)}")
+    for comparison in compare(view.protocol, [[view.results[job]]]):
+        difference = comparison.differences[0]
+        error = difference.normalized_error
+        if error:
+            row = MEASURANDS[comparison.quantity]
+            lines.append(_difference(row, abs(difference.value), abs(difference.value / error)))
     return "\n".join(lines)
 
 
-def _agreement(error: float) -> str:
-    """Put Eₙ into words: the difference over the expanded uncertainty that it has."""
-    share = fixed(abs(error), 1)
-    if abs(error) <= 1.0:
-        return f"agrees with the model: off by {share} of what the uncertainties allow"
-    side = "above" if error > 0.0 else "below"
-    return f"is {side} the model by {share} times what the uncertainties allow"
+def _difference(row: Measurand, difference: float, limit: float) -> str:
+    """State a difference from the model beside the expanded uncertainty that it has."""
+    decimals = decimals_for(limit * row.fine_scale)
+    size, normal = (fixed(value * row.fine_scale, decimals) for value in (difference, limit))
+    return (
+        f"{row.symbol} differs from the model by {size} {row.fine}; "
+        f"± {normal} {row.fine} would be normal"
+    )
 
 
 def speed_picture(view: SessionView, job: Job) -> Picture | None:

@@ -41,5 +41,5 @@ async def write(app: CommandContext, *command: str) -> None:
         await process.wait()
         raise
     lines = [line for line in said.decode("utf-8", "replace").splitlines() if line.strip()]
-    told = lines[-1:] if process.returncode == 0 else lines[-2:]
-    app.tell("; ".join(told) or f"rig {command[0]} ended with {process.returncode}")
+    shown = lines[-1:] if process.returncode == 0 else lines[-2:]
+    app.tell("; ".join(shown) or f"rig {command[0]} ended with {process.returncode}")

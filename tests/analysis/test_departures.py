@@ -121,10 +121,10 @@ def test_falls_are_said_to_look_like_the_model_or_not(straight, crooked):
     assert (like.like, unlike.like) == (True, False)
     assert unlike.json()["departure_m"] == pytest.approx(DEPARTURE, rel=0.15)
     (line,) = model_lines(crooked.joint)
-    assert line.startswith("these falls do not look like the model")
+    assert line.startswith("Measured positions differ from the model by ")
     assert not Likeness(departure=0.0, impulses=0.2).like
     assert "0.00 mm" not in Likeness(departure=4e-6, impulses=None).sentence
-    assert "by 0.03 mm" in Likeness(departure=3e-5, impulses=None).sentence
+    assert "to 0.03 mm" in Likeness(departure=3e-5, impulses=None).sentence
 
 
 def without(one: Case, lost: dict[int, int]) -> Case:

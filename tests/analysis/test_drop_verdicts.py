@@ -289,7 +289,7 @@ def test_what_is_known_exactly_stays_as_it_is(scene):
     one = case(exact, Dials.quiet(), clock_u=0.0)
     result = one.analyze()
     assert result.verdict == "accepted"
-    ours = {"edges", "hanging height", "side", "single impulses", "beam offsets", "air"}
+    ours = {"edges", "start height", "side", "single impulses", "beam offsets", "air"}
     ours |= {"contact", "top rod", "strings", "swing"}
     if scene == "fence":
         ours.add("gravity")  # what is measured, so it is never known

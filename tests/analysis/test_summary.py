@@ -79,9 +79,9 @@ def test_every_common_source_stays_and_every_own_one_averages():
         "datum",
         "beam offsets",
         "rod places",
-        "rod width",
+        "width",
     )
-    own = ("edges", "single impulses", "hanging height")
+    own = ("edges", "single impulses", "start height")
     for names, expected in ((common, 1.0), (own, 0.5)):
         for name in names:
             run = Measured(1.0, 1.0, math.inf, {name: 1.0})
@@ -195,8 +195,8 @@ def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
 
 def test_guessed_scales_are_known_to_a_quarter_of_themselves():
     """Welch and Satterthwaite: 3 guessed with ν = 8, 4 known exactly."""
-    budget = {"hanging height": 3.0, "datum": 4.0}
+    budget = {"start height": 3.0, "datum": 4.0}
     assert effective_degrees(5.0, budget, {}) == pytest.approx(5.0**4 / (3.0**4 / 8.0))
-    told = effective_degrees(5.0, budget, {"hanging height": 20.0})
+    told = effective_degrees(5.0, budget, {"start height": 20.0})
     assert told == pytest.approx(5.0**4 / (3.0**4 / 20.0))
     assert effective_degrees(4.0, {"datum": 4.0}, {}) == math.inf

@@ -93,10 +93,10 @@ def test_the_report_has_the_stamp_all_figures_and_every_run(page, analysis, fini
     assert len(drawn) == 7  # two of results, one of the budget, four of the impacts
     assert all("SIMULATED" in figure for figure in drawn)
     assert len(figures) - len(drawn) == 4  # what the gates saw of each drop
-    assert "Separation and end speed against inclination" in html
+    assert "Separation and end speed against incline" in html
     assert "Runs in order" in html
     assert "4 runs, 4 drops." in html
-    assert "Nothing: every planned run was made once" in html
+    assert "None: every planned run was recorded once" in html
     assert len(html) < 2_000_000
     with Session.open(finished.session, readonly=True) as session:
         assert session.meta["protocol_sha256"] in html

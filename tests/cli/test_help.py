@@ -43,7 +43,10 @@ RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
         (["analyze", "x", "--josn"], "usage: rig analyze"),
         (["run", "p", "--port", "sim://", "--session", "s", "--seed", "-1"], "found '-1'"),
         (["predict", "nothere.yaml", "--figure", "3"], "leave nothere.yaml out"),
-        (["predict", "--figure", "3", "-o", "x.doc"], "x.doc: a figure is written as .svg, .png"),
+        (
+            ["predict", "--figure", "3", "-o", "x.doc"],
+            "x.doc: unknown figure format; accepted: .svg, .png",
+        ),
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
         (["selftest", "--port", "/dev"], "/dev: it is a folder"),
         (["import", "/dev/zero", "--protocol", "p", "--session", "s"], "/dev/zero: it is a device"),

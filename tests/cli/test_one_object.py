@@ -19,7 +19,7 @@ def test_each_gate_says_speed_and_time(name, call, tmp_path):
     ran = call("run", protocol, "--port", "sim://?missed=0", "--session", session, "--yes")
     assert ran.code == 0, ran.err
     table = call("analyze", session).out
-    assert "since the gate before ± U (ms)" in table
+    assert "time since previous gate ± U (ms)" in table
     found = json.loads(call("analyze", session, "--json").out)
     (line,) = found["summary"]
     first, second, *_ = line["gates"]

@@ -97,7 +97,7 @@ def test_bars_of_residuals_are_u_of_the_difference() -> None:
 
 def test_where_the_model_has_no_answer_is_hatched() -> None:
     gap = {**CURVES, "incline_deg": [0.0, 12.0, *CURVES["incline_deg"][2:]]}
-    assert "no answer of the model" in incline_figure(TWO, gap)
+    assert "model has no answer" in incline_figure(TWO, gap)
     (first, *_) = pictures(TWO, gap, sections=Sections())
     assert "arctan μ" in first.caption
 
@@ -112,7 +112,7 @@ def test_words_beside_colours() -> None:
         assert words in svg
     assert "free fall, 5.14 m/s" in svg
     svg = runs_figure(TWO, skew_limit_s=0.005)
-    for words in ("chain A on the surface", "chain B on the surface", "limit ±5 ms", "void"):
+    for words in ("chain A strikes", "chain B strikes", "limit ±5 ms", "void"):
         assert words in svg
 
 
@@ -153,7 +153,7 @@ def test_pictures_follow_the_scene() -> None:
     fell, lost = pictures(TWO, CURVES, films=films, sections=Sections())[2:4]
     assert fell.alt == f"How run {first.run.number} fell"
     void = next(one for one in TWO.runs if one.verdict == "void")
-    assert f"Run {void.run.number} (void) as the simulation let it fall" in lost.caption
+    assert f"Run {void.run.number} (void), simulated at " in lost.caption
     assert pictures(fake_analysis.EMPTY, sections=Sections()) == []
     picture, _ = pictures(fake_analysis.single_chain(), sections=Sections())
     assert "eparation" not in picture.alt + picture.caption

@@ -12,6 +12,7 @@ from rig.measurands import SEPARATION
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
+from rig.reasons import plain_reason
 from rig.records import Drop, Edge
 from rig.report.attachments import zipped
 from rig.report.budget import largest, stacks
@@ -83,15 +84,15 @@ def test_departures_from_the_plan_are_named():
     )  # fmt: skip
     states = [
         entry(4), entry(1),
-        StateEntry(1, 1, RunState.INTERRUPTED, 0, ("somebody came in",)),
+        StateEntry(1, 1, RunState.INTERRUPTED, 0, (plain_reason("somebody came in"),)),
     ]  # fmt: skip
     last = planned[-1].number
     assert deviations(protocol, parted, states) == [
-        f"Not made: runs 2–3, 5–{last}.",
-        "Made again: run 1 (attempt 1 was void).",
-        "Interrupted: run 1, attempt 1: somebody came in.",
+        f"Not recorded: runs 2–3, 5–{last}.",
+        "Run 1 was repeated (attempt 1 was void).",
+        "Run 1, attempt 1 was interrupted: somebody came in.",
         "Rejected by the operator: run 4.",
-        "Not in the order of the plan: run 1 came after later ones.",
+        "Out of the planned order: run 1.",
     ]
 
 
@@ -111,7 +112,7 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
         Run(1, 40.0, "A", "B"), 1, "marginal", (), Audit(5, 4, 0, 1, 0), {}, matches
     )
     svg = timeline(GATES, drop, 1000, result)
-    assert re.findall(r">(\w+ \d+ mm)<", svg) == ["strikes 60 mm", "strikes 25 mm", "free 80 mm"]
+    assert re.findall(r">(\w+ \d+ mm)<", svg) == ["impact 60 mm", "impact 25 mm", "free 80 mm"]
     bars = re.findall(r'class="blocked" [^>]* d="([^"]*)"', svg)
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
     assert bars == ["M256 0h256m768 0h0", "M0 0h640", "M1024 0h256"]

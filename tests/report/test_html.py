@@ -11,6 +11,7 @@ from pathlib import Path
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
+from rig.reasons import plain_reason
 from rig.report.html import ReportContext, report_html, write_report
 from rig.report.pictures import pictures
 from rig.sections import Sections
@@ -97,7 +98,7 @@ def test_text_is_escaped() -> None:
         Run(1, 40.0, bad, bad),
         1,
         "void",
-        (bad,),
+        (plain_reason(bad),),
         Audit(0, 0, 0, 0, 0),
         {bad: Measured(1.0, 1.0, budget={bad: 1.0})},
     )

@@ -29,11 +29,11 @@ def test_the_method_speaks_of_what_there_is():
     first, second = method_words(fake_analysis.two_chains())
     assert "Eq. 9" in first
     assert "simultaneous release" in first
-    assert second.startswith("Each drop was adjusted by itself")
+    assert second.startswith("Each drop was fitted alone")
     first, _ = method_words(fake_analysis.gravity())
     assert not re.search("Eq. 9|simultaneous", first)
     together = replace(fake_analysis.two_chains(), joint=object())
-    assert method_words(together)[1].startswith("All good drops were adjusted together")
+    assert method_words(together)[1].startswith("All good drops were fitted together")
 
 
 def test_the_method_travels_with_the_program():

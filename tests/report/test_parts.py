@@ -16,7 +16,7 @@ def test_effects_have_the_digits_that_they_deserve():
         {"release_skew_s": Measured(0.2e-3, 0.4e-3)},
     )  # fmt: skip
     (part,) = effects_parts([one])
-    assert part.heading.startswith("Chain A less chain B")
+    assert part.heading.startswith("Differences: chain A − chain B")
     text = "\n".join(aligned(part.columns, part.records))
     assert "\n       42.5 " in text
     assert "1.234 ± 0.098" in text

@@ -125,9 +125,7 @@ def test_a_page_says_what_it_lacks():
         ReportContext(title="t", analysis=two, simulated=True, figures=[figure], sections=sections)
     )
     assert "The figure of the budget could not be made: TypeError: " in page
-    assert (
-        "Separation and end speed against inclination&quot; could not be made: IndexError" in page
-    )
+    assert "Separation and end speed against incline&quot; could not be made: IndexError" in page
     assert "<h3>Every run</h3>" in page
 
 
@@ -161,7 +159,7 @@ def test_a_report_is_written_without_its_estimate(single, tmp_path, capsys, monk
     html = (tmp_path / "r.html").read_text("utf-8")
     assert sentence in html
     assert "<h3>Every run</h3>" in html
-    assert "End speed against inclination" in html
+    assert "End speed against incline" in html
 
 
 def test_what_an_estimate_lacks_is_said_on_stderr_too(single, tmp_path, capsys, monkeypatch):

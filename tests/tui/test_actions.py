@@ -34,7 +34,7 @@ def test_stop_is_possible_always():
 def test_of_one_chart_there_is_no_other():
     for two_chains in (True, False, None):
         why = hindrance(BY_NAME["control_chart"], Stage.DONE, driving=True, two_chains=two_chains)
-        assert why == ("this scene has one chain" if two_chains is False else "")
+        assert why == ("not in this scene" if two_chains is False else "")
 
 
 def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
@@ -48,22 +48,22 @@ def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
 def test_f9_always_stops_and_enter_goes_on():
     given = combined({"stop": "f12", "go_on": "space"}, "k")
     assert (given["stop"], given["go_on"]) == ("f12,f9", "space,enter")
-    with pytest.raises(InputError, match="f9 is the key of stop"):
+    with pytest.raises(InputError, match="f9 already belongs to stop"):
         combined({"note": "f9"}, "k")
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('fly = "x"', "fly: no such action"),
-        ("note = 3", "note: a key or several"),
+        ('fly = "x"', "unknown action fly"),
+        ("note = 3", "note: give a key or several"),
         ('note = "escape"', "escape always means STOP"),
-        ('note = "k"\nreject = "k"', "reject: k is the key of note"),
+        ('note = "k"\nreject = "k"', "reject: k already belongs to note"),
         ('note = "x"', "reject has no key left"),
         ("note", "keys.toml:1:5: "),
-        ('reject = "r"\n\nfly = "x"', "keys.toml:3: fly"),
-        ('note = "rr"', "keys.toml:1: note: rr is no key"),
-        ('note = "hyper+r,."', "hyper+r is no key"),
+        ('reject = "r"\n\nfly = "x"', "keys.toml:3: unknown action fly"),
+        ('note = "rr"', "keys.toml:1: note: unknown key rr"),
+        ('note = "hyper+r,."', "unknown key hyper+r"),
     ],
 )
 def test_a_wrong_key_file_says_what_is_wrong(tmp_path, text, said):

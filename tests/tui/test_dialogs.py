@@ -103,13 +103,13 @@ def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
         async with lab.ready() as op:
             async with listening(op) as called:
                 await op.press("l")
-                await op.sees("TEST OF THE RELEASE", "once, for 80 ms", "Take the chains off")
+                await op.sees("Test the release?", "once, for 80 ms", "Take the chains off")
                 await op.press("n")
                 await op.until(lambda: len(op.app.screen_stack) == 1)
                 assert not called
             await op.press("l")
             await op.means()
-            await op.sees("release driven for 80 ms", "no gate saw anything")
+            await op.sees("Release driven for 80 ms", "no gate saw an edge")
             assert op.app.page == "device"
             await op.press("3")
             await op.sees("RUN 1 of 3", "Enter arms")

@@ -21,7 +21,7 @@ def test_a_killed_daemon_is_said_replaced_and_gone_on_with(lab):
         async with lab.ready() as op:
             await asyncio.to_thread(lab.kill)
             await op.press("f9")
-            await op.sees("STOP NOT HEARD: switch the release's supply off")
+            await op.sees("STOP NOT CONFIRMED: switch the release's supply off")
             await recovered(op, lab)
             await op.until(lambda: "no daemon" not in text_of(op.app))
             await op.press("3")
@@ -63,7 +63,7 @@ def test_a_disk_that_takes_nothing_is_said(lab):
                 sqlite3.connect(lab.session, PATIENCE_S, check_same_thread=False)
             ) as other:
                 await asyncio.to_thread(other.execute, "BEGIN IMMEDIATE")
-                await op.sees("the disk has been at one write for", "armed has switched off")
+                await op.sees("the disk has not finished a write for", "armed board has switched")
             await op.until(lambda: "the disk" not in text_of(op.app))
 
     run(work())

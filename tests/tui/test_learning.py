@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from textual.widgets import OptionList
 
+from rig.predictions import predicted_run
 from rig.reasons import NOTE, plain_reason
 from rig.records import Job
 from rig.results import detailed
@@ -58,7 +60,7 @@ def test_both_control_charts_are_there(recorded):
     found = LiveAnalysis(recorded).read()
     skew, gravity = control_pictures(found)
     assert "skew" in skew.y_label
-    assert "g of the free chain" in gravity.y_label
+    assert "g in free fall" in gravity.y_label
     for chart in (skew, gravity):
         points = [x for one in chart.series if one.kind == "bars" for x in one.x]
         assert sorted(points) == [1.0, 2.0, 3.0, 4.0]
@@ -73,8 +75,13 @@ def test_why_the_chain_that_strikes_arrives_first(recorded):
     later_ms = 1e3 * (math.sqrt(2 * way / g) - math.sqrt(2 * (way - apart) / g))
     said = why_words(view, job)
     assert f"free fall {math.sqrt(2 * g * way):.3f}, model" in said
-    assert f"arrives {apart * 100:.1f} cm ahead: free fall needs {later_ms:.0f} ms more" in said
-    assert "Δz agrees with the model" in said
+    assert f"the striking chain wins by {apart * 100:.1f} cm, or {later_ms:.0f} ms" in said
+    size, normal = map(
+        float, re.search(r"Δz differs from the model by (\S+) mm; ± (\S+) mm", said).groups()
+    )
+    expected = predicted_run(view.protocol, view.plan[job.run])["separation_m"]
+    assert size == pytest.approx(1e3 * abs(apart - expected.value), abs=0.06)
+    assert normal > 1e3 * 2.0 * measured["separation_m"].u
     drawn = {one.label: one for one in speed_picture(view, job).series}
     assert drawn["model"].y[-1] - drawn["free fall"].y[-1] > 1.0
     jumps = np.diff(drawn["model"].y) - np.diff(drawn["free fall"].y)
@@ -114,16 +121,16 @@ def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path
             await op.press("k")
             await op.sees("3 others", "mean SD", "Δz corrected (cm)")
             await op.press("f", *"nothing", "enter")
-            await op.sees("No drop is nothing")
+            await op.sees("No drop matches nothing")
             await op.press("f", *["backspace"] * 7, *"40 B", "enter")
-            await op.sees("drop 1 of 2 that are 40 B")
+            await op.sees("drop 1 of 2 (40 B)")
             await op.press("g")
             await op.sees("Drops of this session")
             assert op.app.screen.query_one(OptionList).option_count == 2
             await op.press("backspace")
             await op.until(lambda: len(app.screen_stack) == 1)
             await op.press("e")
-            await op.sees("WRITE FILES", "mine.csv")
+            await op.sees("Write files?", "mine.csv")
             await op.means()
             await op.sees("CSV files: ")
 
@@ -144,7 +151,7 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
         app = RigApp(Options(session=other, offline=True), KEYS)
         async with app.run_test(size=(120, 36)) as pilot:
             op = Operator(app, pilot)
-            await op.sees("No drop is recorded yet")
+            await op.sees("No drop recorded yet")
             await op.press("o")
             await op.sees("abba.session", "4 drops", "broken.session")
             await op.press("down", "enter")
@@ -167,8 +174,8 @@ def test_the_session_page_says_how_many_taught_each_other(recorded):
         async with app.run_test(size=(120, 36)) as pilot:
             op = Operator(app, pilot)
             await op.press("5")
-            await op.sees("what 4 runs say together", "release skew")
+            await op.sees("joint fit of 4 runs", "release skew")
             await op.press("y")
-            await op.sees("g of the free chain", "wrong heights")
+            await op.sees("g in free fall", "check heights")
 
     run(work())

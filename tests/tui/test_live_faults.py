@@ -10,7 +10,7 @@ from rig.campaign.events import Stage
 from rig.session.store import Session
 from tests.tui.lab import run
 
-PULLED = ("✗ the port is lost", "it is found again by itself")
+PULLED = ("✗ the port is lost", "reconnecting")
 RESTARTED = ("✗ the port was lost and is back: the board restarted", "check its power supply")
 
 

@@ -127,14 +127,14 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
             await op.press("x")
             await op.press("escape")
             await op.press("a")
-            await op.sees("the new one counts instead of it")
+            await op.sees("the new attempt will count instead")
             await op.means()
             await op.arms(Stage.RESULT)
             await op.until(lambda: op.app.flow.logged)
             await op.press("x")
-            await op.sees("Attempt 2 was good")
+            await op.sees("attempt 2 was good")
             await op.press("down", "down", "enter")
-            await op.sees("attempt 2 was good, but the latest one counts: run 1 has no result now")
+            await op.sees("attempt 2 was good, but run 1 has no result now")
             await op.until(lambda: op.app.flow.logged)
             await op.press("enter")
             await op.at(Stage.PREPARE)
@@ -174,7 +174,7 @@ def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
     async def work():
         async with lab.ready() as op:
             await op.arms(Stage.RESULT)
-            await op.sees("BLIND: what was measured is kept back", "ACCEPTED")
+            await op.sees("BLIND: results are hidden", "ACCEPTED")
             assert op.app.state.edges == ()
             for page in "4356":
                 await op.press(page)

@@ -17,7 +17,7 @@ from rig.tui.model import Model, alarm
 from rig.tui.state import DaemonState, typed
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
-       "reasons": []}  # fmt: skip
+       "reasons": [], "reason_codes": []}  # fmt: skip
 STATE = {
     "phase": "idle", "link": {"state": "up", "error": None, "retry_s": None},
     "port": {"url": "sim://", "simulated": True}, "gates": {"blocked": 5, "age_s": 0.0},

@@ -134,8 +134,8 @@ def test_an_abba_session_by_keys_alone(terminal, url):
     terminal.sees("4 of 4 runs", "✓✓✓✓")
     pid = _daemon_of(terminal.folder)
     terminal.press("q")
-    terminal.sees("LEAVE")
-    terminal.enters("LEAVE")
+    terminal.sees("Quit?")
+    terminal.enters("Quit?")
     os.kill(pid, 0)  # it is there without the screen
     os.kill(pid, signal.SIGTERM)
     assert_whole(session, 4)

@@ -55,7 +55,7 @@ def test_enter_is_not_offered_before_the_verdict_is_kept():
     kept, job = replace(waits, flow=replace(waits.flow, logged=True)), Job(2, 1)
     waits = replace(waits, flow=replace(waits.flow, logged=False))
     assert step(waits.flow, GoOn(job, 0.0)) == (waits.flow, ())
-    assert "Enter once the verdict is kept" in hints(waits, "result", KEYS, 80).plain
+    assert "Enter after the verdict is saved" in hints(waits, "result", KEYS, 80).plain
     assert step(kept.flow, GoOn(job, 0.0))[0].job == job
     assert "Enter next run" in hints(kept, "result", KEYS, 80).plain
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from textual import on
 from textual.widgets import Input, OptionList
 
-from rig.tui.screens.dialog import Dialog, how
+from rig.tui.screens.dialog import Dialog, how, said
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
@@ -28,14 +28,10 @@ class Ask(Dialog[str | None]):
         self._text = text
 
     def contents(self) -> ComposeResult:
-        asked, keys = Words(id="question"), Words(id="how")
-        asked.say((self._question, "bold"))
-        keys.say_content(
-            how(("Enter", "say so", "screen.say"), ("Esc", "leave it", "screen.leave"))
-        )
-        yield asked
+        keys = how(("Enter", "save", "screen.say"), ("Esc", "cancel", "screen.leave"))
+        yield said("question", (self._question, "bold"))
         yield Input(self._text, max_length=200, select_on_focus=False)
-        yield keys
+        yield said("how", keys)
 
     def on_mount(self) -> None:
         self.query(Input).focus()
@@ -61,12 +57,11 @@ class AskReason(Dialog[str | None]):
 
     def contents(self) -> ComposeResult:
         self._keys = Words(id="how")
-        asked, options = Words(id="question"), OptionList(*self._reasons, markup=False)
-        asked.say((self._question, "bold"))
+        options = OptionList(*self._reasons, markup=False)
         options.can_focus = False
-        self._tell("Enter", "reject for this reason")
-        yield asked
-        yield Input(max_length=200, placeholder="type a reason, or choose one below with ↑ ↓")
+        self._tell("Enter", "reject")
+        yield said("question", (self._question, "bold"))
+        yield Input(max_length=200, placeholder="type a reason, or choose below with ↑ ↓")
         yield options
         yield self._keys
 
@@ -76,7 +71,7 @@ class AskReason(Dialog[str | None]):
         self.query(Input).focus()
 
     def _tell(self, key: str, text: str) -> None:
-        self._keys.say_content(how((key, text, "screen.say"), ("Esc", "leave it", "screen.leave")))
+        self._keys.say_content(how((key, text, "screen.say"), ("Esc", "cancel", "screen.leave")))
 
     def move(self, by: int) -> None:
         """Go to the previous or next of the list."""
@@ -96,13 +91,13 @@ class AskReason(Dialog[str | None]):
         if reason:
             self.dismiss(reason)
         else:
-            self._tell("✗", "a drop is rejected only for a reason")
+            self._tell("✗", "type or choose a reason first")
 
 
 class Confirm(Dialog[bool | None]):
-    """Ask whether something is really wanted; Enter means it, any other key leaves it.
+    """Ask for confirmation: Enter confirms, any other key cancels.
 
-    A click never means it: it is the second step of something, and the first may have been one.
+    A click never confirms: it is the second step of something, and the first may have been one.
     """
 
     DEFAULT_CSS = "Confirm > Vertical { border: heavy $warning; }"
@@ -113,15 +108,9 @@ class Confirm(Dialog[bool | None]):
         self._yes = yes
 
     def contents(self) -> ComposeResult:
-        # Told before they are mounted: a screen that ends meanwhile mounts nothing any more.
         title, question = self._said
-        asked, keys = Words(id="question"), Words(id="how")
-        asked.say((f"{title}\n", "bold $warning"), question)
-        keys.say_content(
-            how(("Enter", self._yes, ""), ("any other key", "leave it", "screen.leave"))
-        )
-        yield asked
-        yield keys
+        yield said("question", (f"{title}\n", "bold $warning"), question)
+        yield said("how", how(("Enter", self._yes, ""), ("any other key", "stay", "screen.leave")))
 
 
 class Pick(Dialog[int | None]):
@@ -140,14 +129,10 @@ class Pick(Dialog[int | None]):
         self._chosen = chosen
 
     def contents(self) -> ComposeResult:
-        asked, keys = Words(id="question"), Words(id="how")
-        asked.say((self._question, "bold"))
-        keys.say_content(
-            how(("Enter", "take it", "screen.take"), ("Backspace", "leave", "screen.leave"))
-        )
-        yield asked
+        keys = how(("Enter", "choose", "screen.take"), ("Backspace", "cancel", "screen.leave"))
+        yield said("question", (self._question, "bold"))
         yield OptionList(*self._lines, markup=False)
-        yield keys
+        yield said("how", keys)
 
     def on_mount(self) -> None:
         for chooser in self.query(OptionList):

@@ -1,4 +1,4 @@
-"""Is the rig well? Connection, firmware, clock, and every gate as a indicator."""
+"""State of the rig: connection, firmware, clock, and an indicator for every gate."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def _facts(model: Model) -> Content:
     device, link = model.state.section("device"), model.state.section("link")
     statistics = model.state.section("statistics")
     lines: list[tuple[str, str]] = []
-    state = {"up": "● up", "down": "✗ down: comes back by itself", "opening": "◌ opening",
-             "closed": "○ closed until a session is open"}  # fmt: skip
+    state = {"up": "● up", "down": "✗ down: reconnecting", "opening": "◌ opening",
+             "closed": "○ opens with the session"}  # fmt: skip
     lines.append(("connection", state.get(str(link.get("state")), "unknown")))
     if device:
         who = [f"{name.replace('_', ' ')} {plain(value, 40)}" for name, value in device.items()
@@ -63,8 +63,8 @@ def _facts(model: Model) -> Content:
         answer = "–" if trip is None else f"{float(trip) * 1e3:.1f} ms"
         bad = int(statistics.get("rx_bad", 0)) + int(statistics.get("rx_unreadable", 0))
         lines.append(
-            ("line", f"answers in {answer} · {statistics.get('rx_frames', 0)} frames, {bad} damaged"
-                     f" · {statistics.get('repeats', 0)} requests repeated")
+            ("traffic", f"answers in {answer} · {statistics.get('rx_frames', 0)} frames, {bad} bad"
+                        f" · {statistics.get('repeats', 0)} requests repeated")
         )  # fmt: skip
     return Content("\n").join(
         Content.assemble((f"{name:11}", "bold $primary"), text) for name, text in lines
@@ -74,32 +74,32 @@ def _facts(model: Model) -> Content:
 def _release(model: Model) -> Content:
     """Say what the test of the release saw."""
     if model.flow.stage is Stage.TESTING:
-        return Content.styled("the release is tested; any key stops", "bold $warning")
+        return Content.styled("Testing the release; any key stops.", "bold $warning")
     seen = model.state.section("release_test")
     if not seen:
-        return Content.styled("Release not tried yet, without chains.", "$foreground 70%")
+        return Content.styled("Release not tested yet.", "$foreground 70%")
     sense = seen["release_sense_s"]
-    felt = "no release sense" if sense is None else f"release sense after {sense * 1e3:.1f} ms"
-    told = f"release driven for {seen['pulse_s'] * 1e3:g} ms, {felt}"
-    gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
+    sensed = "no release sense" if sense is None else f"release sense after {sense * 1e3:.1f} ms"
+    pulse = f"Release driven for {seen['pulse_s'] * 1e3:g} ms, {sensed}"
     if not seen["edges"]:
-        return Content.assemble(("✓ ", "bold $success"), f"{told}, and no gate saw anything")
-    where = ", ".join(named(gates, channel) for channel in seen["gates"][:2])
+        return Content.assemble(("✓ ", "bold $success"), f"{pulse}; no gate saw an edge.")
+    where = ", ".join(named(model, channel) for channel in seen["gates"][:2])
     return Content.assemble(
-        ("✗ ", "bold $error"), f"{told}, but {seen['edges']} edges at {where}: "
-        "something fell, or the release shakes or disturbs the gates"
+        ("✗ ", "bold $error"), f"{pulse}; {seen['edges']} edges at {where}. "
+        "Something fell, or the release disturbs the gates."
     )  # fmt: skip
 
 
 def _clock(model: Model) -> str:
     details = model.view.clock.details if model.view else {}
     if "error_ppm" not in details or not details.get("samples"):
-        return "not compared yet: needs a second or two"
+        return "not compared yet; this takes a few seconds"
     u = 2.0 * details["u_ppm"]
     digits = decimals_for(u)
     return (
-        f"off by {fixed(details['error_ppm'], digits)} ± {fixed(u, digits)} ppm, from "
-        f"{details['samples']} comparisons; times are corrected for it"
+        f"{fixed(abs(details['error_ppm']), digits)} ± {fixed(u, digits)} ppm "
+        f"{'slow' if details['error_ppm'] < 0.0 else 'fast'}, corrected "
+        f"({details['samples']} comparisons)"
     )
 
 
@@ -107,18 +107,18 @@ def _gate_check(model: Model) -> Content:
     gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
     indicators = model.indicators
     if not indicators.known:
-        return Content("No word from the gates yet.")
+        return Content("Waiting for the gates.")
     if indicators.alone is not None:
         return Content.assemble(
-            ("☞ ", "bold $warning"), "you block ", (named(gates, indicators.alone), "bold")
+            ("☞ ", "bold $warning"), "blocked: ", (named(model, indicators.alone), "bold")
         )
     if indicators.blocked:
         return Content.assemble(
             ("● ", "bold $warning"),
-            f"{len(indicators.blocked)} beams are blocked: move what is in their way, or align them"
+            f"{len(indicators.blocked)} beams are blocked. Clear or align them."
         )  # fmt: skip
     left = [gate.channel for gate in gates if gate.channel not in indicators.checked]
     if not left:
-        return Content.assemble(("✓ ", "bold $success"), "every gate has answered to your hand")
-    many = "" if len(left) == len(gates) else f" ({len(gates) - len(left)} of {len(gates)} seen)"
-    return Content(f"Wave a hand through each beam: the gate is named here{many}.")
+        return Content.assemble(("✓ ", "bold $success"), "every gate works")
+    tested = f"{len(gates) - len(left)} of {len(gates)} gates tested"
+    return Content(f"Wave a hand through each beam: {tested}.")

@@ -11,6 +11,7 @@ from textual.screen import ModalScreen
 from textual.style import Style
 
 from rig.tui.widgets.stopbar import StopLine
+from rig.tui.widgets.text import Styled, Words
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult
@@ -45,6 +46,13 @@ class Dialog(ModalScreen[Answer]):
     def action_leave(self) -> None:
         """Give nothing."""
         self.dismiss(None)
+
+
+def said(name: str, *parts: Styled | Content) -> Words:
+    """Make text that stands there when it is mounted: a screen that ends mounts nothing more."""
+    words = Words(id=name)
+    words.say_content(Content.assemble(*parts))
+    return words
 
 
 def how(*ways: tuple[str, str, str]) -> Content:

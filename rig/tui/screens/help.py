@@ -1,4 +1,4 @@
-"""Every action with its key and the command that does the same."""
+"""Every action with its key and the equivalent command."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from textual.containers import VerticalScroll
 from textual.content import Content
 
 from rig.tui.actions import BY_NAME, shown_key
-from rig.tui.screens.dialog import Dialog
-from rig.tui.widgets.text import Words
+from rig.tui.screens.dialog import Dialog, said
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,22 +18,22 @@ if TYPE_CHECKING:
     from rig.tui.actions import Action
 
 PAGES = {
-    "protocol": "Choose what is to be dropped. ✗ shows what is wrong, with its line in the file.",
-    "device": "See that every gate answers: wave a hand through each beam, and it is named.",
-    "run": "Hang the chains as told, see the checks turn ✓, arm, and keep clear.",
-    "result": "Read the verdict, then go on, reject the drop for a reason, or write a note.",
-    "session": "Watch the means settle on the model's curve, and the skew stay within its limits.",
-    "history": "Play any drop again, as slowly as you like.",
+    "protocol": "Choose an experiment. ✗ shows what is wrong, with its line in the file.",
+    "device": "Wave a hand through each beam: the page names the gate.",
+    "run": "Prepare the run as shown, wait for every ✓, arm, and keep clear.",
+    "result": "Read the verdict. Then continue, reject the drop with a reason, or write a note.",
+    "session": "Compare the means with the model, and check the control charts.",
+    "history": "Replay any drop, as slowly as you like.",
 }
 """What an operator does on each page."""
 
 
 GROUPS = {
     "At the rig": ("stop", "go_on", "again", "release_test", "wave", "control", "close"),
-    "What a drop is worth": ("reject", "note", "unblind", "report", "export"),
+    "Judge a drop, write files": ("reject", "note", "unblind", "report", "export"),
     "Pages": ("page_protocol", "page_device", "page_run", "page_result", "page_session",
               "page_history", "previous", "next", "control_chart"),
-    "Drops again": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "filter",
+    "Replay": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "filter",
                     "compare", "sessions"),
     "This program": ("help", "palette", "theme", "quit"),
 }  # fmt: skip
@@ -53,9 +52,7 @@ class Help(Dialog[None]):
 
     def contents(self) -> ComposeResult:
         with VerticalScroll(can_focus=False):
-            told = Words(id="table")
-            told.say_content(table(self._page, self._keys, self.app.size.width >= 100))
-            yield told
+            yield said("table", table(self._page, self._keys, self.app.size.width >= 100))
 
     def move(self, by: int) -> None:
         """Scroll."""
@@ -66,15 +63,15 @@ def table(page: str, keys: Mapping[str, str], wide: bool) -> Content:
     """Write what can be done, one action a line."""
     lines = [
         Content.styled(PAGES.get(page, ""), "bold"),
-        Content("STOP works on every screen: its key, Esc where nothing is typed, or the red bar."),
+        Content("STOP works on every screen: its key, Esc outside text fields, or the red bar."),
         Content(""),
     ]
     for head, names in GROUPS.items():
         lines.append(Content.styled(head, "bold"))
         lines += [_line(BY_NAME[name], keys, wide=wide) for name in names]
         lines.append(Content(""))
-    own = 'Other keys: ~/.config/chainrig/keys.toml, such as reject = "r"'
-    lines += [Content(own), Content("↑ and ↓ scroll, any other key closes this.")]
+    own = 'To change keys, write ~/.config/chainrig/keys.toml: reject = "r"'
+    lines += [Content(own), Content("↑ ↓ scroll; any other key closes this page.")]
     return Content("\n").join(lines)
 
 

@@ -13,7 +13,7 @@ from rig.films import read_films
 from rig.measurands import listed
 from rig.reasons import notes_in
 from rig.report.numbers import fixed
-from rig.tui.choosing import chosen
+from rig.tui.choosing import chosen, condition
 from rig.tui.motion import motions
 from rig.tui.plots import drop_pictures, laid_over, run_picture
 from rig.tui.replay import Player, end_of, indicators_at, until
@@ -152,16 +152,16 @@ class HistoryPage(Page):
         """Draw the drop at its moment."""
         self._view = self.other or model.view
         view, job = self.view, self.job
-        said = self.query_one("#which", Words)
+        title = self.query_one("#which", Words)
         if view is not None and job is None:
             self._blank()
-            said.say(f"No drop is {plain(self.words, 40)}: f asks for others.")
+            title.say(f"No drop matches {plain(self.words, 40)}. Press f to change this.")
             return
         if view is None or job is None:
             self._blank()
-            said.say(model.loading or "No drop is recorded yet. o lists other sessions.")
+            title.say(model.loading or "No drop recorded yet. Press o to choose another session.")
             return
-        said.say_content(_which(view, job, self))
+        title.say_content(_which(view, job, self))
         drop, hz = view.drops[job], view.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
         indicators = indicators_at(view.channels, drop, seen)
@@ -228,18 +228,17 @@ def _which(view: SessionView, job: Job, page: HistoryPage) -> Content:
     player = page.player
     run, result = view.plan[job.run], view.results[job]
     symbol, colour = LOOKS.get(result.verdict, ("?", "$foreground"))
-    hung = f"{run.incline_deg:g}° impact {plain(run.impact, 20)}" if run.impact else "free fall"
     place = page.jobs.index(job) + 1
-    only = f" that are {plain(page.words, 40)}" if page.words else ""
+    only = f" ({plain(page.words, 40)})" if page.words else ""
     said = (one.reasons for one in reversed(view.states) if (one.run, one.attempt) == job)
     note = "".join(f"\nnote: {plain(text, 160)}" for text in notes_in(next(said, ())))
     arrow = "◀" if player.back else "▶"
-    state = f"{arrow} playing" if player.playing else f"‖ still {arrow}"
-    speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} of"
+    state = f"{arrow} playing" if player.playing else f"‖ paused {arrow}"
+    speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"
     stamp = "  ▲ SIMULATED" if view.simulated else ""
     return Content.assemble(
         (f"drop {place} of {len(page.jobs)}{only}", "bold $primary"),
-        f"  run {job.run}, attempt {job.attempt} · {hung} · ",
+        f"  run {job.run}, attempt {job.attempt} · {condition(run)} · ",
         (f"{symbol} {result.verdict}", colour),
         f"\n{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · ",
         (plain(view.path.name, 60), "$foreground 70%"),

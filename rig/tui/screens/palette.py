@@ -1,4 +1,4 @@
-"""Every action by its name: what is typed narrows the list, and what cannot be done says why."""
+"""Search all commands; those that are not available now say why."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from textual.fuzzy import Matcher
 from textual.widgets import Input, OptionList
 from textual.widgets.option_list import Option
 
-from rig.tui.screens.dialog import Dialog, how
-from rig.tui.widgets.text import Words
+from rig.tui.screens.dialog import Dialog, how, said
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,14 +50,12 @@ class Palette(Dialog[str | None]):
         self._choices = sorted(choices, key=lambda one: bool(one.hindrance))
 
     def contents(self) -> ComposeResult:
-        options, keys = _Choices(*self._fitting(""), markup=False), Words(id="how")
+        options = _Choices(*self._fitting(""), markup=False)
         options.can_focus = False
-        keys.say_content(
-            how(("↑ ↓ Enter", "do it", "screen.take"), ("Esc", "leave it", "screen.leave"))
-        )
-        yield Input(placeholder="what is to be done?")
+        keys = how(("↑ ↓ Enter", "run", "screen.take"), ("Esc", "cancel", "screen.leave"))
+        yield Input(placeholder="Search commands")
         yield options
-        yield keys
+        yield said("how", keys)
 
     def on_mount(self) -> None:
         for options in self.query(OptionList):

@@ -1,4 +1,4 @@
-"""Pick a protocol, and see what follows from it or what is wrong with it at which line."""
+"""Choose a protocol, and see its plan, or what is wrong with it at which line."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class ProtocolPage(Page):
             style = "bold $primary" if at == self.chosen else "$foreground"
             rows.append(Content.assemble((mark + plain(file.stem, 25), style)).stylize(press))
         if not rows:
-            rows = [Content("no protocol in this folder:\nname one, rig tui PROTOCOL")]
+            rows = [Content("no experiment in this folder")]
         if self.last is not None:
             press = Style.from_meta({"@click": "app.do('sessions')"})
             last = Content.assemble("\nlast session:\n", ("o ", "bold $primary"),
@@ -106,12 +106,8 @@ class ProtocolPage(Page):
             rows.append(last.stylize(press))
         self.query_one("#files", Words).say_content(Content("\n").join(rows))
         if self._protocol is None or self._problem:
-            what = "choose a protocol" if not self.files else f"{plain(self.files[self.chosen])}"
-            self.query_one("#scene", Words).say(
-                (f"{what}\n\n", "bold"),
-                ("✗ this cannot be used yet\n", "bold $error"),
-                self._problem,
-            )
+            name = plain(self.file) if self.file else "no experiment in this folder"
+            self.query_one("#scene", Words).say((f"✗ {name}\n\n", "bold $error"), self._problem)
             return
         session = plain(self.session) if self.session else ""
         into = Content.assemble(("→ ", "$primary"), f"session file: {session}\n\n")
@@ -138,7 +134,7 @@ class ProtocolPage(Page):
         """Read the chosen file again when it changed: it may be open in an editor beside this."""
         file = self.file
         if file is None:
-            self._problem = "no file"
+            self._problem = "Leave this screen, write an experiment with rig new, and come back."
             return
         try:
             stamp = file, file.stat().st_mtime_ns
@@ -150,7 +146,9 @@ class ProtocolPage(Page):
         try:
             self._protocol = reader.read(file)
             if self._protocol.gates is None:
-                self._problem = "this scene has no gates: nothing can be measured"
+                self._problem = (
+                    "This scene has no gates: nothing can be measured. Add gates to the protocol."
+                )
             else:
                 check_recordable(self._protocol)
         except InputError as error:

@@ -101,7 +101,7 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     for one in result.gates:
         line = f"{f'at gate {one.channel}':15}{plus_minus(one.speed, 1.0):>20} m/s "
         if wide and one.interval is not None:
-            line += f"{plus_minus(one.interval, 1e3):>16} ms since the gate before"
+            line += f"{plus_minus(one.interval, 1e3):>16} ms since previous gate"
         lines.append(Content(line))
     counts = " · ".join(f"{kind} {count}" for kind, count in result.audit.json().items())
     lines.append(Content(f"{'edges':15}{counts}"))

@@ -1,4 +1,4 @@
-"""The run in hand: what to hang where, the checklist, the countdown, and the fall itself."""
+"""The current run: how to prepare it, the checklist, the countdown, and the fall."""
 
 from __future__ import annotations
 
@@ -129,26 +129,27 @@ class RunPage(Page):
 
 
 def _card(model: Model, expected: str, *, low: bool) -> Content:
-    """Say what to hang where; on a low screen in few lines."""
+    """Say how to prepare the run; on a low screen in few lines."""
     run, job, protocol = model.run, model.job, model.protocol
     if model.loading:
         return Content(model.loading)
     if job is None or run is None or protocol is None:
         if model.state.runs and model.flow.stage is not Stage.PROTOCOL:
-            return Content("Every run of the plan is done with.")
-        return Content("No session is open: choose a protocol first.")
+            return Content("All runs of the plan are complete.")
+        return Content("No session is open. Choose an experiment first.")
     attempt = f" · attempt {job.attempt}" if job.attempt > 1 else ""
     head = Content.assemble((f"RUN {job.run} of {len(model.state.runs)}{attempt}", "bold $primary"))
-    facts = [("let fall", plain(run.free, 40))]
+    facts = [(model.words.body.removeprefix("the "), plain(run.free, 40))]
     if run.impact is not None:
         free = [("free side", plain(run.free, 40))] if run.free is not None else []
         incline = ("incline", f"{run.incline_deg:g}°")
         facts = [("impact side", plain(run.impact, 40)), *free, incline]
     expects = [("model", expected)] if expected else []
-    start = ("bottom rod", f"{protocol.drop.value * 1e3:.0f} mm above the {protocol.zero}")
+    above = "along the track" if protocol.track else f"above the {protocol.zero}"
+    start = ("drop", f"{protocol.drop.value * 1e3:.0f} mm {above}")
     width, between = (0, "   ") if low else (12, "\n")
-    hung = Content(between).join(_fact(*fact, width) for fact in facts)
-    return Content("\n").join([head, hung, *(_fact(*fact, width) for fact in (start, *expects))])
+    setup = Content(between).join(_fact(*fact, width) for fact in facts)
+    return Content("\n").join([head, setup, *(_fact(*fact, width) for fact in (start, *expects))])
 
 
 def _fact(name: str, value: str, width: int) -> Content:
@@ -157,41 +158,41 @@ def _fact(name: str, value: str, width: int) -> Content:
 
 def _checks(model: Model) -> Content:
     stage = model.stage
+    rest = "hang still" if model.words.part == "rod" else "come to rest"
     if stage in _WAITING:
         words = {
-            Stage.SETTLING: "the chains come to rest, clocks are compared …",
-            Stage.ARMING: "arming …",
-            Stage.COUNTDOWN: "ARMED. It falls when the count is over."
+            Stage.SETTLING: f"Waiting: let everything {rest} …",
+            Stage.ARMING: "Arming …",
+            Stage.COUNTDOWN: "ARMED. The release opens at zero."
             if model.driving
             else "ARMED by another client. Keep clear.",
-            Stage.FIRING: "letting go …",
+            Stage.FIRING: "Releasing …",
         }
-        keys = "\nAny key stops, and nothing falls." if model.driving else ""
+        keys = "\nAny key stops." if model.driving else ""
         return Content.assemble((words[stage], "bold $warning"), keys)
     if stage is Stage.LIVE:
         return Content.styled(f"FALLING  {len(model.state.edges)} edges so far", "bold $primary")
     if stage is Stage.JUDGING:
-        return Content.styled("reading the drop back and analysing it …", "bold $primary")
+        return Content.styled("Reading and analysing the drop …", "bold $primary")
     if model.job is None or model.run is None:
         return Content("")
     indicators = model.indicators
-    gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
     blocked, restless = indicators.blocked, indicators.restless(model.now_s)
-    where = named(gates, blocked[0]) if blocked else ""
+    where = named(model, blocked[0]) if blocked else ""
     more = f" and {len(blocked) - 1} more" if len(blocked) > 1 else ""
     lines = [
         _check(model.connected and model.state.link == "up", "device connected", "no device"),
         _check(indicators.known and not blocked, "every beam clear",
-               f"blocked: {where}{more}" if indicators.known else "no word from the gates"),
+               f"blocked: {where}{more}" if indicators.known else "waiting for the gates"),
         _check(indicators.known and not restless, "gates steady",
-               "gates moving: let the chains rest"),
-        Content.assemble(("○ ", "bold"), "hung as above, at rest, hands away"),
+               f"A beam keeps changing. Let everything {rest}."),
+        Content.assemble(("○ ", "bold"), "set up as above, at rest, hands away"),
     ]  # fmt: skip
     settle = duration(model.settle_s)
     end = (
-        f"\nEnter arms: {settle} of rest, a count of three, then it falls."
+        f"\nEnter arms: {settle} of rest, 3 s of countdown, release."
         if model.driving
-        else "\nWatching: c takes control when it is free."
+        else "\nWatching. Press c to take control when it is free."
     )
     return Content.assemble(Content("\n").join(lines), end)
 

@@ -1,4 +1,4 @@
-"""The session so far: the plan with its states, Fig. 3 growing, and the control chart."""
+"""The session so far: the plan with its states, results against incline, the control chart."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def _progress(model: Model) -> Content:
     return Content.assemble(
         ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
         (f"  {over} of {len(runs)} runs", "bold"), f"{left}  ", (session, "$foreground 70%"),
-        _taught(model),
+        _fit_words(model),
     )  # fmt: skip
 
 
@@ -152,16 +152,16 @@ def _plan(model: Model) -> Content:
     return Content("\n").join(lines)
 
 
-def _taught(model: Model) -> tuple[str, str]:
-    """Say whether the drops have taught each other what they have in common."""
+def _fit_words(model: Model) -> tuple[str, str]:
+    """Say whether the means come from a joint fit."""
     view = model.view
     if view is None or not view.analysis.summary:
         return "", ""
-    more = " · the newest is being added …" if view.lagging else ""
+    more = " · adding the newest …" if view.lagging else ""
     if view.fitted:
-        return f"\nwhat {view.fitted} runs say together{more}", "$foreground 70%"
-    few = f"; from {FEWEST} good ones on they are read together" if not more else ""
-    return f"\neach drop by itself{few}{more}", "$foreground 70%"
+        return f"\njoint fit of {view.fitted} runs{more}", "$foreground 70%"
+    joint = f"; joint fit from {FEWEST} good drops on" if not more else ""
+    return f"\neach drop fitted alone{joint}{more}", "$foreground 70%"
 
 
 def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:

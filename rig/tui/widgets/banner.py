@@ -42,11 +42,11 @@ class Banner(Words):
 def verdict_words(model: Model) -> Content:
     """Write the verdict and its reasons."""
     if model.job is None:
-        return Content(model.loading or "no drop yet")
+        return Content(model.loading or "No drop yet.")
     run = f"run {model.job.run}, attempt {model.job.attempt}"
     verdict, reasons = model.verdict
     if not verdict:
-        return Content(model.loading or f"{run}: not judged yet")
+        return Content(model.loading or f"{run}: no verdict yet")
     symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
     lines = [
         Content.assemble((f" {symbol} {verdict.upper()} ", f"bold $background on {colour}"),
@@ -58,14 +58,12 @@ def verdict_words(model: Model) -> Content:
     replaced = model.replaced
     if verdict not in GOOD and replaced is not None:
         lines += [
-            Content(f"  attempt {replaced.attempt} was good, but the latest one counts: "
-                    f"run {model.job.run} has no result now"),
-            Content("  → a repeats it, in its block and before anything is changed at the rig"),
+            Content(f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
+                    f"but run {model.job.run} has no result now."),
+            Content("  → press a to repeat it before you change anything at the rig"),
         ]  # fmt: skip
     if model.blind:
-        lines.append(
-            Content("  BLIND: what was measured is kept back until the session is unblinded")
-        )
+        lines.append(Content("  BLIND: results are hidden until you unblind the session"))
     if verdict == "void":
         lines += [Content(f"  → {what}") for what in remedies(reasons)[:_REMEDIES]]
     return Content("\n").join(lines)

@@ -40,5 +40,5 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
     inks = np.array([_COLORS.index(one.color) for one in strokes], dtype=np.int64)
     sheet.strokes(scale * ends.reshape(-1, 2, 2), inks)
     apart = "" if drawing.apart_m is None else f"Δz {drawing.apart_m * 1e2:.1f} cm as it falls"
-    words = [Span(apart, "success", bold=True)], [Span("beside: the model", "accent")]
+    words = [Span(apart, "success", bold=True)], [Span("left: measured  right: model", "accent")]
     return [*sheet.rows(), *words]

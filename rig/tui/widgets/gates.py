@@ -1,4 +1,4 @@
-"""An indicator a gate: state, edges, steadiness; told by shape and word, not colour alone."""
+"""An indicator for each gate: state, edges, steadiness, by shape and word, not colour alone."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from rig.tui.braille import Span
 from rig.tui.widgets.spans import SpanView
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.protocol.protocol import Gate, Protocol
     from rig.tui.indicators import Indicator, Indicators
+    from rig.tui.model import Model
 
 _WIDE, _SHORT = 50, 34
 """Widths of one indicator with all words, and with the needed ones."""
@@ -44,7 +43,8 @@ def board(
     for side in ("impact", "free"):
         gates = sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
         for begin in range(0, len(gates), _MOST):
-            title = "" if begin else f"{side} side"
+            title = f"{side} side" if protocol.vocabulary.two_sides else "gates"
+            title = "" if begin else title
             columns.append((title, gates[begin : begin + _MOST]))
     wide = width // len(columns)
     rows = [[Span("".join(title.ljust(wide) for title, _ in columns), bold=True)]]
@@ -76,7 +76,7 @@ def _indicator(
             "FLICKERS" if indicator.flickers(now_s) else "" if indicator.steady(now_s) else "moving"
         )
         if not quiet and gate.channel in indicators.checked:
-            quiet = "seen ✓"
+            quiet = "works ✓"
     where = f"{gate.height * 1e3:7.1f} mm"
     if width >= _WIDE:
         text = f" {where}  channel {gate.channel:2}  {word:7}  {edges:5} edges  {quiet}"
@@ -87,9 +87,10 @@ def _indicator(
     return [Span(symbol, color, bold=True), Span(text[: width - 2].ljust(width - 1))]
 
 
-def named(gates: Sequence[Gate], channel: int) -> str:
-    """Say which gate a channel is."""
-    for gate in gates:
+def named(model: Model, channel: int) -> str:
+    """Name the gate of a channel."""
+    for gate in model.protocol.gates.gates if model.protocol and model.protocol.gates else ():
         if gate.channel == channel:
-            return f"channel {channel}: {gate.side} side, {gate.height * 1e3:.1f} mm"
+            side = f"{gate.side} side, " if model.words.two_sides else ""
+            return f"channel {channel}: {side}{gate.height * 1e3:.1f} mm"
     return f"channel {channel}, which the protocol does not use"

@@ -27,7 +27,7 @@ _GO_ON = {
     Stage.PREPARE: "arm",
     Stage.RESULT: "next run",
     Stage.HALTED: "try again",
-    Stage.DONE: "what is left",
+    Stage.DONE: "next run",
 }
 _OF_PAGE = {
     "history": ("play", "turn_round", "earlier", "later", "slower", "faster", "drops", "filter",
@@ -106,10 +106,10 @@ def _label(name: str, label: str, model: Model, page: str) -> str:
         if model.flow.stage is Stage.PREPARE and page != "run":
             return "to the run"
         if not model.flow.logged:  # what comes next depends on it
-            return "once the verdict is kept"
+            return "after the verdict is saved"
         return _GO_ON.get(model.flow.stage, label)
     if name == "reject" and model.flow.verdict == "rejected":
-        return "take back"
+        return "undo rejection"
     if name == "control":
         return "give control back" if model.driving else "take control"
     return label
@@ -128,24 +128,24 @@ def _answer(model: Model) -> str:
     if waited > _TOLD_S and (model.connected or not unheard):
         return ""
     if unheard:
-        return "STOP NOT HEARD: switch the release's supply off"
+        return "STOP NOT CONFIRMED: switch the release's supply off"
     return "STOP: everything is off" if model.stop.heard else "STOP …"
 
 
 def _doing(model: Model) -> str:
     words = {
         Stage.TESTING: "RELEASE TEST; any key stops",
-        Stage.SETTLING: "chains come to rest; any key stops",
+        Stage.SETTLING: "waiting for rest; any key stops",
         Stage.ARMING: "arming; any key stops",
-        Stage.COUNTDOWN: f"ARMED: falls in {max(0.0, model.flow.left_s):.1f} s; any key stops"
+        Stage.COUNTDOWN: f"ARMED: release in {max(0.0, model.flow.left_s):.1f} s; any key stops"
         if model.driving
         else "ARMED by another client",
-        Stage.FIRING: "letting go",
+        Stage.FIRING: "releasing",
         Stage.LIVE: "FALLING, recording",
         Stage.JUDGING: "reading and analysing the drop",
     }
     if model.offline:
-        return "a file is looked at: no rig is connected"
+        return "no rig is connected: this shows a file"
     if not model.connected:
         return _answer(model) or "no daemon: nothing can be stopped from here"
     answer = _answer(model)
