@@ -127,7 +127,7 @@ class DropModel:
             # Told by the edges alone, so its uncertainty counts as theirs.
             unknowns.add(f"{role} release", "edges", ANYTHING)
             unknowns.add(f"{role} hang", "start height", components.hang)
-            unknowns.add(f"{role} rods", "rod places", places)
+            unknowns.add(f"{role} rods", "spacing", places)
             unknowns.add(f"{role} width", "width", chain.width_u)
             if not free_only and chain.chain.rods > 1:
                 sd = components.swing * swing_sd(chain.chain, protocol)

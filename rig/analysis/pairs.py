@@ -29,7 +29,7 @@ SIGNS = (0.5, -0.5, -0.5, 0.5)
 MEANS = (0.25, 0.25, 0.25, 0.25)
 """The same in the mean."""
 _REST = np.array([-1.0, 3.0, -3.0, 1.0])  # orthogonal to a mean, a linear drift, and A less B
-_CHAINS_OWN = ("rod places", "width")  # lines of a budget that are not the same for both
+_CHAINS_OWN = ("spacing", "width")  # lines of a budget that are not the same for both
 
 Block = tuple["DropResult", "DropResult", "DropResult", "DropResult"]
 

@@ -51,7 +51,7 @@ COMMON = frozenset(
         "datum",
         "side",
         "beam offsets",
-        "rod places",
+        "spacing",
         "width",
     }
 )

@@ -28,7 +28,7 @@ _DEGREES = {
     "edges": "jitter",
     "beam heights": "gates",
     "beam offsets": "beam",
-    "rod places": "rods",
+    "spacing": "rods",
     "start height": "hang",
     "swing": "swing",
     "single impulses": "impulse",

@@ -240,7 +240,8 @@ def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     start, gravity = protocol.drop.value, protocol.gravity.value
-    name = run.impact if role == "impact" else run.free
+    # A chain that strikes alone is set beside its own free fall.
+    name = run.impact if role == "impact" else run.free or run.impact
     assert name is not None
     kappas = air_of(protocol, name) or [0.0] * protocol.chains[name].chain.rods
     if role == "free" or protocol.surface is None:

@@ -64,7 +64,7 @@ def test_no_blocks_no_effects(order):
 def test_runs_by_themselves_share_nothing_but_their_own_chain():
     """The scatter of each run, ½² of four of them; of what is common, that of two chains."""
     runs_ = [
-        replace(one, quantities={n: Measured(1.0, 5e-3, budget={"edges": 3e-3, "rod places": 4e-3})
+        replace(one, quantities={n: Measured(1.0, 5e-3, budget={"edges": 3e-3, "spacing": 4e-3})
                                  for n in NAMES})
         for one in made_up(lambda n, _: 0.0)
     ]  # fmt: skip

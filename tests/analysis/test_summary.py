@@ -78,7 +78,7 @@ def test_every_common_source_stays_and_every_own_one_averages():
         "beam heights",
         "datum",
         "beam offsets",
-        "rod places",
+        "spacing",
         "width",
     )
     own = ("edges", "single impulses", "start height")

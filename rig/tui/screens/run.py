@@ -139,11 +139,12 @@ def _card(model: Model, expected: str, *, low: bool) -> Content:
         return Content("No session is open. Choose an experiment first.")
     attempt = f" · attempt {job.attempt}" if job.attempt > 1 else ""
     head = Content.assemble((f"RUN {job.run} of {len(model.state.runs)}{attempt}", "bold $primary"))
-    facts = [(model.words.body.removeprefix("the "), plain(run.free, 40))]
+    names = {"impact side": run.impact, "free side": run.free}
+    facts = [(side, plain(name, 40)) for side, name in names.items() if name is not None]
+    if not model.words.two_sides:
+        facts = [(model.words.body.removeprefix("the "), facts[0][1])]
     if run.impact is not None:
-        free = [("free side", plain(run.free, 40))] if run.free is not None else []
-        incline = ("incline", f"{run.incline_deg:g}°")
-        facts = [("impact side", plain(run.impact, 40)), *free, incline]
+        facts.append(("incline", f"{run.incline_deg:g}°"))
     expects = [("model", expected)] if expected else []
     above = "along the track" if protocol.track else f"above the {protocol.zero}"
     start = ("drop", f"{protocol.drop.value * 1e3:.0f} mm {above}")
