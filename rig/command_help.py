@@ -70,7 +70,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-_NAMED = re.compile(rf"(?<![\w/.-])rig (?={'|'.join(sum(GROUPS.values(), ()))}|--help)")
+_NAMED = re.compile(rf"(?<![\w/.-])rig (?=(?:{'|'.join(sum(GROUPS.values(), ()))}|--help)(?![\w:-]))")
 
 
 def runnable(text: str) -> str:

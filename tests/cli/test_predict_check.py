@@ -36,7 +36,7 @@ SINGULAR = (
     without("gates", short("[5 deg, 60 deg]"))
     .replace(PILE, "")
     .replace("friction: 0.20 ± 0.02", "friction: 1")
-    .replace("tilt: 12 deg", "tilt: 12 deg, inertia: 0.01")
+    .replace("tilt: 12 deg", "tilt: 12 deg, inertia: 0.0025")
 )
 
 

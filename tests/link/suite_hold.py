@@ -114,7 +114,7 @@ class HoldSuite(Suite):
             device.collect(LABEL)
         (drop,) = device.transcript.unfinished()
         assert drop == device.transcript.pending(LABEL)
-        assert any("restarted" in fault for fault in drop.faults)
+        assert "restarted" in {fault.code for fault in drop.faults}
         device.connect(boot_wait_s=0)
         self.refused(RefusalReason.NO_SUCH_DROP, device.fetch, LABEL)
         assert device.status().phase is Phase.IDLE

@@ -9,6 +9,7 @@ import pytest
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.messages import RefusalReason
+from rig.reasons import make_reason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import LossyPort, Wire, arm
@@ -33,7 +34,7 @@ class MemorySuite(Suite):
         drop = self.drop(device, record_ms=record_ms(count))
         assert len(drop.edges) == drop.certificate.events == identity.capacity
         assert drop.certificate.overflows == 20
-        assert drop.faults == ("20 events lost: the device's memory was full",)
+        assert drop.faults == (make_reason("edges_lost", lost=20),)
 
     def test_a_streamed_drop_may_be_longer_than_the_memory(self, bench, device, identity):
         if not identity.streams:
@@ -44,7 +45,7 @@ class MemorySuite(Suite):
         self.check(bench, drop, identity)
         late = self.reconnected(bench).fetch(LABEL)
         assert late.edges == drop.edges[-len(late.edges) :]
-        assert any("no longer kept" in fault for fault in late.faults)
+        assert "events_overwritten" in {fault.code for fault in late.faults}
 
     def test_a_streaming_device_reads_out_what_it_keeps(self, bench, identity):
         if not identity.streams:
@@ -74,7 +75,8 @@ class MemorySuite(Suite):
         device.fire(arm(device, record_ms=record_ms(count)))
         port.lose_rx_until_ns = bench.clock().now_ns() + (record_ms(count) + 20) * 1_000_000
         drop = device.collect(LABEL)
-        assert drop.faults == (f"60 of {count} events no longer kept by the device, from number 0",)
+        overwritten = make_reason("events_overwritten", missing=60, events=count, first=0)
+        assert drop.faults == (overwritten,)
         assert len(drop.edges) == identity.capacity - 1  # behind the gap one change is in doubt
         self.release(device, drop)
 

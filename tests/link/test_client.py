@@ -23,6 +23,7 @@ from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.restarts import Restart
 from rig.link.transcript import Received, Transcript
+from rig.reasons import make_reason
 from rig.records import ClockSample, Drop
 from tests.link.strategies import MESSAGES
 
@@ -242,7 +243,7 @@ def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
     port = Liar(clock, {wire.Identify: [IDENTITY]})
     drop = Device(port, clock).fetch(1)
     assert len(port.written) == 3  # certificate, events, events once more
-    assert "the events do not match the certificate's CRC-32" in drop.faults
+    assert make_reason("crc_mismatch") in drop.faults
 
 
 def test_a_device_that_never_gives_the_events_is_faulty(clock):
@@ -280,7 +281,7 @@ def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
     one = Device(port, clock)
     one.connect(boot_wait_s=0)
     faults = one.fetch(1).faults
-    assert faults == ("3 of 5 events no longer kept by the device, from number 0",)
+    assert faults == (make_reason("events_overwritten", missing=3, events=5, first=0),)
     assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
 
 
@@ -317,7 +318,7 @@ def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(cl
     while port.out:
         one.poll()
     drop = one.fetch(1)
-    assert drop.faults == ("the events do not match the certificate's CRC-32",)
+    assert drop.faults == (make_reason("crc_mismatch"),)
     assert [edge.tick for edge in drop.edges] == [1, 2, 3]  # event 4 as it was read: no change
 
 
@@ -398,7 +399,7 @@ def test_a_gap_in_the_events_invents_no_edge():
     say(transcript, "rx", certificate(1, 5))
     drop = transcript.pending(1)
     assert drop.edges == ((10, 0, True), (50, 0, True))
-    assert drop.faults == ("2 of 5 events missing, from number 1",)
+    assert drop.faults == (make_reason("events_missing", missing=2, events=5, first=1),)
     assert transcript.assembly(1).missing() == [(1, 2)]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from textual.widgets import OptionList
 
-from rig.predictions import predicted_run
+from rig.analysis.comparison import compare
 from rig.reasons import NOTE, plain_reason
 from rig.records import Job
 from rig.results import detailed
@@ -79,8 +79,12 @@ def test_why_the_chain_that_strikes_arrives_first(recorded):
     size, normal = map(
         float, re.search(r"Δz differs from the model by (\S+) mm; ± (\S+) mm", said).groups()
     )
-    expected = predicted_run(view.protocol, view.plan[job.run])["separation_m"]
-    assert size == pytest.approx(1e3 * abs(apart - expected.value), abs=0.06)
+    ((difference,),) = (
+        one.differences
+        for one in compare(view.protocol, [[view.results[job]]])
+        if one.quantity == "separation_m"
+    )
+    assert size == pytest.approx(1e3 * abs(difference.value), abs=0.06)
     assert normal > 1e3 * 2.0 * measured["separation_m"].u
     drawn = {one.label: one for one in speed_picture(view, job).series}
     assert drawn["model"].y[-1] - drawn["free fall"].y[-1] > 1.0
