@@ -70,7 +70,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-_NAMED = re.compile(rf"(?<![\w/.-])rig (?=(?:{'|'.join(sum(GROUPS.values(), ()))}|--help)(?![\w:-]))")
+_COMMANDS = "|".join(sum(GROUPS.values(), ()))
+_NAMED = re.compile(rf"(?<![\w/.-])rig (?=(?:{_COMMANDS}|--help)(?![\w:-]))")
+"""A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
 
 
 def runnable(text: str) -> str:

@@ -39,7 +39,7 @@ def test_every_command_of_the_readme_works(tmp_path):
         )
         assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
         said[command] = done.stdout
-    held, of = re.search(r"([0-9]+) of ([0-9]+) results hold", said["./run demo"]).groups()
+    held, of = re.search(r"([0-9]+) of ([0-9]+) results agree", said["./run demo"]).groups()
     assert int(of) == 18
     assert int(held) >= 14, "at 95 % that is fewer once in a thousand seeds"
     for symbol, hidden in (("β", 0.5), ("μ", 0.2)):

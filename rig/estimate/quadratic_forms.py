@@ -17,7 +17,7 @@ import numpy as np
 
 from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
-from rig.analysis.square_root import Rows, eliminate
+from rig.analysis.square_root import RowBlock, eliminate
 from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class QuadraticForm:
     chain: Chain
     ratios: Array
     here: Index
-    rows: Rows
+    rows: RowBlock
     alphas: Array
     arrivals: Array
     edges: int
@@ -112,7 +112,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     )
 
 
-def _blocks(drop: Fit | JointDrop, alphas: Array, inflation: float) -> tuple[list[Rows], int]:
+def _blocks(drop: Fit | JointDrop, alphas: Array, inflation: float) -> tuple[list[RowBlock], int]:
     """‖r/σ‖² in the drop's unknowns, `EXTRA`, and the mean of each impulse, all in SI.
 
     The impulses stand for whole α, and the unknown α for nothing; κ stands behind, free of what is
@@ -141,7 +141,7 @@ def _blocks(drop: Fit | JointDrop, alphas: Array, inflation: float) -> tuple[lis
         sigma = rows.residuals.sigma * inflation
         weight = np.sqrt(robust_weights(rows.residuals.values / sigma, STRAY)) / sigma
         left = rows.residuals.values - slopes @ point[columns]
-        blocks.append(Rows(slopes * weight[:, None], left * weight, columns))
+        blocks.append(RowBlock(slopes * weight[:, None], left * weight, columns))
         edges += int((weight > 0.0).sum())
     return blocks, edges
 
