@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.equations import Linearization, linearize, scaled, with_kept_slopes
-from rig.analysis.square_root import Root, RowBlock, square_root
+from rig.analysis.square_root import EquationRows, Root, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -76,7 +76,7 @@ class Estimate:
     edges: int
     scatter: float
     settled: bool = True
-    rows: Mapping[str, RowBlock] = field(default_factory=dict, repr=False)
+    rows: Mapping[str, EquationRows] = field(default_factory=dict, repr=False)
     near: Linearization | None = field(default=None, repr=False)
 
     @cached_property

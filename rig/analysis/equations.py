@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.square_root import RowBlock
+from rig.analysis.square_root import EquationRows
 from rig.analysis.swing import drawn, lever
 
 if TYPE_CHECKING:
@@ -273,7 +273,7 @@ class Linearization:
         Of each side, where they were set up from edges.
     """
 
-    rows: Mapping[str, RowBlock]
+    rows: Mapping[str, EquationRows]
     chi2: float
     size: int
     loss: float
@@ -289,7 +289,7 @@ def plain_equations(residuals: Array, slopes: Array) -> Linearization:
         In standard deviations of each, shapes ``(observations,)`` and ``(observations, unknowns)``.
     """
     chi2 = float(residuals @ residuals)
-    rows = RowBlock(slopes, residuals, np.arange(slopes.shape[1]))
+    rows = EquationRows(slopes, residuals, np.arange(slopes.shape[1]))
     return Linearization({"": rows}, chi2, residuals.size, chi2)
 
 
@@ -307,14 +307,14 @@ def linearize(
     cut
         Standard deviations beyond which an edge does not count.
     """
-    rows: dict[str, RowBlock] = {}
+    rows: dict[str, EquationRows] = {}
     weights: dict[str, Weights] = {}
     chi2, loss, size = 0.0, 0.0, 0
     for role, match in matches.items():
         left, _, slopes, columns, _ = model.equations(role, x, match)
         residuals, weight = _weighed(left, inflation, cut)
         slopes *= weight.scale[:, None]  # in place: nobody else has them
-        rows[role], weights[role] = RowBlock(slopes, residuals, columns), weight
+        rows[role], weights[role] = EquationRows(slopes, residuals, columns), weight
         chi2, loss = _added(chi2, loss, residuals, weight)
         size += residuals.size
     return Linearization(rows, chi2, size, loss, weights)

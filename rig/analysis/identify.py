@@ -31,7 +31,7 @@ from rig.analysis.pattern import (
     slack_of,
 )
 from rig.analysis.pattern import guesses as votes
-from rig.analysis.square_root import RowBlock, square_root
+from rig.analysis.square_root import EquationRows, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -510,7 +510,7 @@ def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, Lineariza
     the solution of all. With them goes what an adjustment may begin with.
     """
     at = model.unknowns
-    rows: dict[str, RowBlock] = {}
+    rows: dict[str, EquationRows] = {}
     weights: dict[str, Weights] = {}
     edges = 0
     for side in sides:
@@ -528,7 +528,7 @@ def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, Lineariza
             places = np.append(places[columns], at["side"].start)
         else:
             places = places[columns]
-        rows[role] = RowBlock(slopes, left, places)
+        rows[role] = EquationRows(slopes, left, places)
         edges += estimate.edges
         if estimate.near is not None:
             weights |= estimate.near.weights

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 
-class RowBlock(NamedTuple):
+class EquationRows(NamedTuple):
     """Observations in standard deviations: for a step d they leave ``left + slopes @ d[columns]``.
 
     Attributes
@@ -32,12 +32,12 @@ class RowBlock(NamedTuple):
     left: Array
     columns: Index
 
-    def triangle(self) -> RowBlock:
+    def triangle(self) -> EquationRows:
         """Return the same sum of squares of any step, in no more rows than columns and one."""
         whole = _triangle(np.column_stack([self.slopes, self.left]))
         return self._replace(slopes=whole[:, :-1], left=whole[:, -1])
 
-    def after(self, step: Array) -> RowBlock:
+    def after(self, step: Array) -> EquationRows:
         """Return the same about the point that a step leads to."""
         return self._replace(left=self.left + self.slopes @ step[self.columns])
 
@@ -101,10 +101,10 @@ class Eliminated(NamedTuple):
     inverse: Array
     gain: Array
     own: Array
-    rest: RowBlock
+    rest: EquationRows
 
 
-def square_root(blocks: Sequence[RowBlock], sd: Array, pull: Array) -> Root:
+def square_root(blocks: Sequence[EquationRows], sd: Array, pull: Array) -> Root:
     """Reduce observations and priors to a square root.
 
     Parameters
@@ -124,7 +124,7 @@ def square_root(blocks: Sequence[RowBlock], sd: Array, pull: Array) -> Root:
 
 
 def eliminate(
-    blocks: Sequence[RowBlock], sd: Array, pull: Array, own: Index, others: Index
+    blocks: Sequence[EquationRows], sd: Array, pull: Array, own: Index, others: Index
 ) -> Eliminated:
     """Eliminate some unknowns, priors of these included.
 
@@ -144,13 +144,13 @@ def eliminate(
     right = inverse @ whole[: own.size, columns[more.size :]]
     last = last[more.size :, more.size :]
     return Eliminated(
-        inverse, right[:, :-1], -right[:, -1], RowBlock(last[:, :-1], last[:, -1], others)
+        inverse, right[:, :-1], -right[:, -1], EquationRows(last[:, :-1], last[:, -1], others)
     )
 
 
 def _eliminate_private(
-    blocks: Sequence[RowBlock], sd: Array, pull: Array, among: Index
-) -> tuple[Array, Index, list[RowBlock]]:
+    blocks: Sequence[EquationRows], sd: Array, pull: Array, among: Index
+) -> tuple[Array, Index, list[EquationRows]]:
     """Eliminate from each block those of some unknowns that no other block knows of.
 
     Returns
@@ -180,11 +180,11 @@ def _eliminate_private(
         whole[begin : begin + count, np.append(columns, size)] = stack[:count]
         begin += count
         top.append(columns[:count])
-        rest.append(RowBlock(stack[count:, count:-1], stack[count:, -1], columns[count:]))
+        rest.append(EquationRows(stack[count:, count:-1], stack[count:, -1], columns[count:]))
     return whole, np.concatenate([np.zeros(0, dtype=np.intp), *top]), rest
 
 
-def _stacked(blocks: Sequence[RowBlock], columns: Index, pull: Array) -> Array:
+def _stacked(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Array:
     """Stack blocks and the priors of the first columns to a triangle, the left side behind."""
     place = np.full(int(columns.max(initial=-1)) + 1, -1)
     place[columns] = np.arange(columns.size)

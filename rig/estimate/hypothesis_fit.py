@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.adjust import least_squares
 from rig.analysis.equations import Linearization
-from rig.analysis.square_root import RowBlock
+from rig.analysis.square_root import EquationRows
 from rig.errors import RigError
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
             # The targets are taken as linear: where the fit is good, their curvature counts little.
             slopes = np.column_stack([slopes[:, :n], slopes[:, n:] @ by_parameters])
             columns = np.append(form.here, np.arange(shared, at.size))
-            blocks[str(number)] = RowBlock(slopes, left, columns)
+            blocks[str(number)] = EquationRows(slopes, left, columns)
         chi2 = sum(float(rows.left @ rows.left) for rows in blocks.values())
         return Linearization(blocks, chi2, sum(form.edges for form in forms), chi2)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
-from rig.analysis.square_root import RowBlock, eliminate
+from rig.analysis.square_root import EquationRows, eliminate
 from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class QuadraticForm:
     chain: Chain
     ratios: Array
     here: Index
-    rows: RowBlock
+    rows: EquationRows
     alphas: Array
     arrivals: Array
     edges: int
@@ -112,7 +112,9 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     )
 
 
-def _blocks(drop: Fit | JointDrop, alphas: Array, inflation: float) -> tuple[list[RowBlock], int]:
+def _blocks(
+    drop: Fit | JointDrop, alphas: Array, inflation: float
+) -> tuple[list[EquationRows], int]:
     """‖r/σ‖² in the drop's unknowns, `EXTRA`, and the mean of each impulse, all in SI.
 
     The impulses stand for whole α, and the unknown α for nothing; κ stands behind, free of what is
@@ -141,7 +143,7 @@ def _blocks(drop: Fit | JointDrop, alphas: Array, inflation: float) -> tuple[lis
         sigma = rows.residuals.sigma * inflation
         weight = np.sqrt(robust_weights(rows.residuals.values / sigma, STRAY)) / sigma
         left = rows.residuals.values - slopes @ point[columns]
-        blocks.append(RowBlock(slopes * weight[:, None], left * weight, columns))
+        blocks.append(EquationRows(slopes * weight[:, None], left * weight, columns))
         edges += int((weight > 0.0).sum())
     return blocks, edges
 
