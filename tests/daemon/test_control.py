@@ -109,7 +109,7 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
         (reason,) = session.latest_state(1).reasons
     assert re.fullmatch(r"nothing was heard from one for \d\.\d s, so it lost control", reason.text)
     one, token = armed
-    with pytest.raises(StoppedError, match=reason):
+    with pytest.raises(StoppedError, match=reason.text):
         one.fire(token)
 
 
