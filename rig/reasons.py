@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+from rig.units import Quantity, format_quantity
 from rig.vocabulary import ANY_SCENE, VOCABULARIES
 
 if TYPE_CHECKING:
@@ -302,15 +303,14 @@ WORDINGS: dict[str, Wording] = {
     ),
     "last_speed_differs": Wording(
         _DOUBT, "end of the fall",
-        "the last passages alone give V = {alone_m_s:.3g} ± {alone_U95:.2g} m/s, the whole fall "
-        "{whole_m_s:.3g} ± {whole_U95:.2g} m/s: the end of the fall differs from the model",
+        "the last passages alone give V = {alone}, the whole fall {whole}: the end of the fall "
+        "differs from the model",
         _LOOK,
     ),
     "last_separation_differs": Wording(
         _DOUBT, "end of the fall",
-        "the last passages alone give Δz as it fell = {alone_m:.3g mm} ± {alone_U95:.2g mm}, the "
-        "whole fall {whole_m:.3g mm} ± {whole_U95:.2g mm}: the end of the fall differs from the "
-        "model", _LOOK,
+        "the last passages alone give Δz as it fell = {alone}, the whole fall {whole}: the end of "
+        "the fall differs from the model", _LOOK,
     ),
     "differs_from_session": Wording(
         _REMARK, "differs from the session",
@@ -486,11 +486,19 @@ def _each_part(phrases: _Phrases) -> str:
     return f"every {words.part} of {_chain(phrases)}"
 
 
+def _measured(phrases: _Phrases, name: str) -> str:
+    speed = phrases.get(f"{name}_m_s")
+    value, unit = (phrases[f"{name}_m"], "mm") if speed is None else (speed, "m/s")
+    return format_quantity(Quantity(float(value), float(phrases[f"{name}_U95"])), unit)
+
+
 _LEAST_MM = 0.1
 _PHRASES: dict[str, Callable[[_Phrases], str]] = {
     "gate": lambda p: _gate(p, p.words),
     "gates": lambda p: " and ".join(_gate(gate, p.words) for gate in p["at"]),
     "on_side": _side,
+    "alone": lambda p: _measured(p, "alone"),
+    "whole": lambda p: _measured(p, "whole"),
     "chain": _chain,
     "each_part": _each_part,
     "size": lambda p: f"{abs(p['size_m']) * 1e3:.1f} ± {max(p['U95_m'] * 1e3, _LEAST_MM):.1f} mm",

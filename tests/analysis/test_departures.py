@@ -233,5 +233,5 @@ def test_a_last_leg_that_the_whole_fall_does_not_bear_out_is_remarked():
     slower, nearer = disagreements(
         whole, {"speed_m_s": Measured(6.4, 0.06), "separation_raw_m": Measured(0.105, 0.0006)}
     )
-    assert "V = 6.40 ± 0.12 m/s, the whole fall 6.920 ± 0.098 m/s" in slower
-    assert "Δz as it fell = 105.0 ± 1.2 mm, the whole fall 115.00 ± 0.98 mm" in nearer
+    assert "V = 6.40 ± 0.12 m/s, the whole fall 6.920 ± 0.098 m/s" in slower.text
+    assert "Δz as it fell = 105.0 ± 1.2 mm, the whole fall 115.00 ± 0.98 mm" in nearer.text

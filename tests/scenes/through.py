@@ -258,7 +258,8 @@ class _Journey:
         told = [
             run
             for run in found["runs"]
-            if run["verdict"] in GOOD and not any("did not settle" in why for why in run["reasons"])
+            if run["verdict"] in GOOD
+            and "not_converged" not in {reason["code"] for reason in run["reason_codes"]}
         ]
         promised = (DONE,) if self.scene.protocol.surface is not None and told else (BAD_INPUT,)
         done = self.call("estimate", self.session, promised=promised)
