@@ -66,7 +66,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "replay": ("rig replay my.session", "rig replay old.session"),
     "recover": ("rig recover my.session", "rig recover my.session -o saved.session"),
     "completion": ("rig completion bash", "rig completion fish"),
-    "bench": ("rig bench stability", "./run bench layouts -o my-folder"),
+    "bench": ("rig bench stability", "rig bench scenes -o my-folder"),
 }  # fmt: skip
 
 

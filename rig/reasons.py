@@ -161,6 +161,10 @@ WORDINGS: dict[str, Wording] = {
     "crc_mismatch": Wording(
         _VOID, "checksum wrong", "the events do not match the certificate's CRC-32", _BOARD
     ),
+    "record_damaged": Wording(
+        _VOID, "record damaged", "damaged: {text}; see rig recover SESSION",
+        "rig recover SESSION says what is whole, and with -o NEW saves it",
+    ),
     "record_torn": Wording(
         _VOID, "record torn", "a part of the record was lost with its file",
         "measure this run again",

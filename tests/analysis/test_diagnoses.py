@@ -11,7 +11,6 @@ import pytest
 from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
-from rig.analysis import explanations
 from rig.analysis.diagnoses import diagnose
 from rig.analysis.drop import fit_drop
 from rig.analysis.faults import faults, upside_down
@@ -20,7 +19,7 @@ from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Drag, Protocol
 from rig.protocol.reader import parse
-from rig.reasons import sentences
+from rig.reasons import make_reason, sentences
 from rig.units import Quantity
 from sim.dials import Dials, read_dials
 from tests.analysis.drops import GRADED, SCENES, UNIFORM, Case, case, codes, with_dials
@@ -281,11 +280,16 @@ def test_a_post_of_two_gates_may_stand_wrong_and_of_one_it_is_the_gate():
     for count in (1, 2):
         gates = (*UNIFORM.gates.on("impact"), *[*of.values()][:count])
         few = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=gates))
-        words = [fault.words(0.01, 0.001) for fault in faults(few, runs(few)[0], ())]
-        assert any("the impact side's post" in one for one in words)
-        assert any("the free side's post" in one for one in words) == (count > 1)
+        posts = [
+            fault.values(0.01, 0.001)["side"]
+            for fault in faults(few, runs(few)[0], ())
+            if fault.code == "post"
+        ]
+        assert sorted(posts) == ["free", "impact"][2 - count :]
 
 
 def test_odds_are_numbers_up_to_what_nobody_reads_any_more():
-    assert explanations._odds(math.log(9_000.0)) == "9000"
-    assert explanations._odds(math.log(15_000.0)) == "more than 10000"
+    for odds, words in ((9_000.0, "(odds 9000 to 1)"), (15_000.0, "(odds more than 10,000 to 1)")):
+        assert make_reason("gravity", share=0.01, U95=0.001, log_odds=math.log(odds)).text.endswith(
+            words
+        )

@@ -122,6 +122,6 @@ def test_what_was_found_out_where_less_was_unknown_is_found_out_anew():
     one, known = case(UNIFORM, Dials.quiet()), {}
     cold = fit_drop(one.protocol, one.run, one.drop, one.scale, known=known)[0]
     ((job, kept),) = known.items()
-    known[job] = replace(kept, begun=kept.begun._replace(x=kept.begun.x[:-1]), alone=None)
+    known[job] = replace(kept, begun=kept.begun._replace(x=kept.begun.x[:-1]))
     assert fit_drop(one.protocol, one.run, one.drop, one.scale, known=known)[0] == cold
     assert known[job].begun.x.size == kept.begun.x.size

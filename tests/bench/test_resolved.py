@@ -39,14 +39,14 @@ GOOD = JudgedDrop(
     truth={"separation_m": 0.12, "separation_strike_m": 0.11, "speed_m_s": 7.0,
            "contact_height_m": 0.01},
 )  # fmt: skip
-REASON = "the chains left 7.3 ms apart, more than 5 ms"
+REASON = "release_skew"
 VOID = replace(GOOD, run=2, verdict="void", reasons=(REASON,), errors={})
 
 
 def test_shares_are_of_drops_that_could_have_been_good():
     found = summary([GOOD, VOID, replace(VOID, run=3, beyond=True)])
     assert (found["drops"], found["beyond"], found["void_share"]) == (3, 1, 0.5)
-    assert found["reasons"] == {"the chains left … ms apart, more than … ms": 1}
+    assert found["reasons"] == {REASON: 1}
     assert found["quantities"]["separation_m"]["coverage"] == 1.0
     assert found["quantities"]["speed_m_s"]["coverage"] == 0.0
     assert found["quantities"]["speed_m_s"]["bias"] == pytest.approx(0.03)
@@ -128,7 +128,7 @@ def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
 def test_a_figure_without_falls_says_so(tmp_path, capsys):
     target = str(tmp_path / "figure.svg")
     assert cli.main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
-    assert "figures 3 and 4" in capsys.readouterr().err
+    assert "figure 6 has no resolved falls" in capsys.readouterr().err
 
 
 WORK = [

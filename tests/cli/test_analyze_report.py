@@ -143,7 +143,6 @@ def test_a_title_cannot_break_the_page(call, tmp_path):
     ("command", "work", "place"),
     [
         (["report", "SESSION", "-o"], "report.results", "none/r.html"),
-        (["report", "SESSION", "-o"], "report.results", "."),
         (["estimate", "SESSION", "-o"], "estimate.detailed", "file/figures"),
         (["export", "SESSION", "--csv"], "export.results", "file/tables"),
         (["design", PROTOCOLS / "picket-fence.yaml", "-o"], "design.better", "none/new.yaml"),

@@ -13,6 +13,7 @@ from rig.commands import output
 from rig.commands.growing import Growing
 from rig.protocol import reader
 from rig.protocol.plan import runs
+from rig.reasons import plain_reason
 from tests.cli.lab import short
 
 
@@ -33,7 +34,8 @@ def size(monkeypatch):
 
 def dropped(run, verdict="accepted", *reasons):
     found = {"separation_m": Measured(0.115, 0.001), "speed_m_s": Measured(6.93, 0.01)}
-    return DropResult(run, 1, verdict, reasons, Audit(4, 4, 0, 0, 0), found)
+    why = tuple(map(plain_reason, reasons))
+    return DropResult(run, 1, verdict, why, Audit(4, 4, 0, 0, 0), found)
 
 
 def screen(written: str) -> list[str]:

@@ -40,7 +40,7 @@ RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
     ("words", "said"),
     [
         (["analyse", "x"], "did you mean analyze?"),
-        (["analyze", "x", "--josn"], "usage: rig analyze"),
+        (["analyze", "x", "--josn"], "rig analyze [-h]"),
         (["run", "p", "--port", "sim://", "--session", "s", "--seed", "-1"], "found '-1'"),
         (["predict", "nothere.yaml", "--figure", "3"], "leave nothere.yaml out"),
         (

@@ -40,11 +40,19 @@ def test_each_gate_says_speed_and_time(name, call, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("rods: 1", "rods: 1\n    length: 20 mm", "p.yaml:9:5: chains.ball.length: one rod alone"),
-        ("rods: 1", "rods: 2\n    length: 1 m", "track: only one object that strikes nothing"),
+        (
+            "rods: 1",
+            "rods: 1\n    length: 20 mm",
+            "p.yaml:9:5: chains.ball.length: one object has no length",
+        ),
+        (
+            "rods: 1",
+            "rods: 2\n    length: 1 m",
+            "track: a track is for one object without a surface",
+        ),
         ("850 mm", "895 mm", "which ball blocks before the release"),
         ("850 mm", "950 mm", "ball does not pass above 900.0 mm"),
-        ("drop: 900", "surface: {restitution: 0.5}\ndrop: 900", "leave surface out for one object"),
+        ("drop: 900", "surface: {restitution: 0.5}\ndrop: 900", "for one object leave surface out"),
     ],
 )
 def test_what_makes_no_sense_is_said_at_its_place(old, new, said, call, tmp_path, monkeypatch):

@@ -55,7 +55,7 @@ chains:
     rods: {len(self.masses)}
     masses: [{masses}]
     spacing: [{gaps}]
-    inertia: {self.inertia!r}
+    inertia: {self.inertia / 4.0!r}
 surface: {{restitution: {self.restitution!r}, friction: {self.friction!r}}}
 drop: {self.drop!r} m
 initial_speed: {self.speed!r} m/s
