@@ -65,7 +65,8 @@ def supposed(model: DropModel) -> Supposed:
         absent[at["strings"]] = 1.0
         alpha, block = abs(model.guesses["impact"].alpha), at["impulses"]
         bounces = model.components.bounce * alpha / above(block.stop - block.start)
-        absent[block] = (bounces / at.sd[block]) ** 2
+        sd = at.sd[block]  # zero where impulses are known exactly: then none bounce either
+        absent[block] = np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2
     return Supposed(known, absent)
 
 

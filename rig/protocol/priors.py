@@ -45,7 +45,7 @@ PRIORS: dict[str, Prior] = {
     ),
     "hang": Prior(
         _LENGTH,
-        "scatter of a chain's hanging height from run to run",
+        "scatter of the start height from run to run",
         "hung by hand against a mark: ±0.5 mm, uniform, is 0.29 mm (GUM 4.3.7)",
     ),
     "side": Prior(

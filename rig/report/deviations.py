@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.session.reading import StateEntry
 
-NONE = "None: every planned run was recorded once, in the planned order."
+NONE = "No deviations: every planned run was recorded once, in the planned order."
 
 
 def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]) -> list[str]:

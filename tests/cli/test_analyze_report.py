@@ -96,7 +96,7 @@ def test_the_report_has_the_stamp_all_figures_and_every_run(page, analysis, fini
     assert "Separation and end speed against incline" in html
     assert "Runs in order" in html
     assert "4 runs, 4 drops." in html
-    assert "None: every planned run was recorded once" in html
+    assert "No deviations: every planned run was recorded once" in html
     assert len(html) < 2_000_000
     with Session.open(finished.session, readonly=True) as session:
         assert session.meta["protocol_sha256"] in html
