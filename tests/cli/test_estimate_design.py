@@ -82,7 +82,7 @@ def test_a_design_proposes_heights_and_writes_them(call, tmp_path):
     new = tmp_path / "new.yaml"
     done = call("design", FENCE, "--lowest", "40 mm", "--spacing", "5 cm", "-o", new)
     assert done.code == 0, done.err
-    (line,) = re.findall(r"^proposed, free side \(mm\): (.*)$", done.out, re.MULTILINE)
+    (line,) = re.findall(r"^proposed \(mm\): (.*)$", done.out, re.MULTILINE)
     proposed = [float(one) * 1e-3 for one in line.split(", ")]
     assert "sweep 1" in done.err
     assert "±" not in done.out
