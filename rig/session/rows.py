@@ -58,6 +58,8 @@ def _json(name: str, accepted: str, read: Callable[[str], object]) -> ColumnRule
     def accepts(value: object) -> bool:
         try:
             read(value)  # type: ignore[arg-type]
+            # JSON's escapes can name halves of characters, which no file or screen takes.
+            json.dumps(json.loads(value), ensure_ascii=False).encode()  # type: ignore[arg-type]
         except (TypeError, ValueError, RecursionError):
             return False
         return True

@@ -148,13 +148,13 @@ def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     found = json.loads(call("analyze", "--json", path).out)
     assert [run["run"] for run in found["runs"] if run.get("damaged")] == [2]
     assert "1 of 3 drops (run 2, attempt 1)" in call("analyze", path).out
-    assert "see rig recover SESSION" in call("export", path, "--csv", tmp_path / "tables").err
+    assert "rig recover SESSION" in call("export", path, "--csv", tmp_path / "tables").err
     page = tmp_path / "page.html"
     assert "1 of 3 drops (run 2, attempt 1)" in page.read_text("utf-8")
 
 
 def test_what_recover_saves_of_a_damaged_drop_is_whole_again(call, sound, tmp_path):
-    path, new = tmp_path / "altered", tmp_path / "new"
+    path, new = tmp_path / "altered", tmp_path / "new.session"
     path.write_bytes(sound.read_bytes())
     with unguarded(path) as connection:
         connection.execute('UPDATE edge SET tick = tick + 64 WHERE "drop" = 2 AND idx = 5')

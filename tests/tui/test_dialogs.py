@@ -103,7 +103,7 @@ def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
         async with lab.ready() as op:
             async with listening(op) as called:
                 await op.press("l")
-                await op.sees("Test the release?", "once, for 80 ms", "Take the chains off")
+                await op.sees("Test the release?", "once, for 80 ms", "Take the fence off")
                 await op.press("n")
                 await op.until(lambda: len(op.app.screen_stack) == 1)
                 assert not called

@@ -43,10 +43,10 @@ def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_o
             await op.arms(Stage.COUNTDOWN)
             os.kill(lab.daemons[0].pid, signal.SIGSTOP)
             try:
-                await op.sees("no daemon: it hangs", "an armed board has switched itself off")
+                await op.sees("no daemon: no answer for", "an armed board has switched itself off")
                 assert op.app.flow.stage is Stage.PREPARE
                 await op.press("f9")
-                await op.sees("STOP NOT HEARD")
+                await op.sees("STOP NOT CONFIRMED")
             finally:
                 os.kill(lab.daemons[0].pid, signal.SIGCONT)
             await op.sees("the daemon was lost before the release: nothing fell")
@@ -116,7 +116,7 @@ def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab, fence
     async def work():
         async with lab.operator() as op:
             await op.until(lambda: op.app.client.driving)
-            await op.sees("✗ this cannot be used", "fence.yaml:4:")
+            await op.sees("fence.yaml:4:17:", "found 'many'")
             await op.press("enter")
             lab.protocol.write_text(good, "utf-8")
             await op.sees("mended")

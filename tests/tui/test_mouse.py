@@ -59,7 +59,7 @@ def test_pages_keys_and_dialogs_go_by_mouse_alone(lab):
             await op.at(Stage.PREPARE)
             await op.until(lambda: op.app.page == "run")
             await click(op, "app.do('go_on')")
-            await op.sees("armed by the Enter key")
+            await op.sees("only the Enter key arms")
             await op.arms(Stage.RESULT)
             await op.until(lambda: op.app.flow.logged)
             await click(op, "app.do('note')")

@@ -48,7 +48,7 @@ def test_a_chosen_protocol_is_described_once_with_what_the_model_notes(lab, monk
     async def work():
         async with lab.operator(size=(160, 90)) as op:
             await op.at(Stage.PROTOCOL)
-            await op.sees("note: 0°: rods gather on a pile", "recorded for 1.5 s")
+            await op.sees("note: 0°: rods gather on a pile", "recording: 1.5 s")
             for _ in range(3):
                 op.app.draw()
 
@@ -110,7 +110,7 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
             assert op.app.flow.verdict == "accepted"
             await op.press("x")
             await op.until(lambda: isinstance(op.app.screen, AskReason))
-            await op.until(pressed_and_seen(op, "enter", "only for a reason"))
+            await op.until(pressed_and_seen(op, "enter", "type or choose a reason first"))
             await op.press(*"draught", "enter")
             await op.sees("REJECTED", "draught", "note: [/b] hm")
             await op.until(lambda: op.app.flow.logged)
