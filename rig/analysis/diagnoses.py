@@ -14,7 +14,8 @@ import numpy as np
 from rig.analysis.equations import scaled
 from rig.analysis.faults import gate_values
 from rig.analysis.identify import MISSED
-from rig.reasons import Reason, Severity, make_reason
+from rig.reasons import Reason, make_reason
+from rig.wordings import Severity
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence

@@ -11,8 +11,9 @@ from rig.analysis.distributions import most_by_chance
 from rig.analysis.identify import MISSED
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import disagreements
-from rig.reasons import Reason, Severity, make_reason
+from rig.reasons import Reason, make_reason
 from rig.vocabulary import ANY_SCENE
+from rig.wordings import Severity
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping

@@ -40,8 +40,9 @@ from rig.campaign.events import (
 )
 from rig.campaign.voids import after, why_halted
 from rig.link.messages import RefusalReason
-from rig.reasons import NOTE, OPERATOR, plain_reason
+from rig.reasons import plain_reason
 from rig.records import Job
+from rig.wordings import NOTE, OPERATOR
 
 if TYPE_CHECKING:
     from rig.campaign.events import Effect, Event

@@ -176,6 +176,7 @@ def error_to_data(error: RigError) -> dict[str, Any]:
         "reason": refused.reason.name if refused else None,
         "detail": refused.detail if refused else None,
         "disarmed": refused.disarmed.name if refused and refused.disarmed else None,
+        "reason_codes": [refused.why.json()] if refused else [],
     }
 
 

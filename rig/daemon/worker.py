@@ -15,6 +15,7 @@ import threading
 import time
 from concurrent.futures import Future
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.daemon.lease import ControlError
@@ -23,6 +24,7 @@ from rig.daemon.stopper import Stopper
 from rig.errors import InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
+from rig.reasons import make_reason
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
 
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.daemon.lease import Lease
+    from rig.reasons import Reason
     from rig.recorder.published import PublishedState
 
 log = logging.getLogger(__name__)
@@ -43,7 +46,6 @@ _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
 STALL_S = 1.0
 """Held up for longer, the worker is said to be: nothing is known of the board meanwhile."""
 _KEPT = "what is waiting is kept in memory until it can be written"
-_LOST = "the client in control was lost"
 
 
 class _Job(NamedTuple):
@@ -279,18 +281,16 @@ class Worker:
         self._beat()
         with self._guard:
             reason, stops = self._stop, [*self._stops]  # one that comes from here on is not lost
+        why: Reason | str = reason
         if reason:
             self._drain(StoppedError(reason))
         elif armed and not self._held:
             silence = self._lease.silence(self._holder)
-            reason = (
-                f"nothing was heard from {self._lease.name} for {silence:.1f} s, so it lost control"
-                if silence
-                else _LOST
-            )
-        if reason:
+            client = {"client": self._lease.name, "silence_s": silence} if silence else {}
+            why = make_reason("client_silent" if silence else "client_lost", **client)
+        if why:
             self._stopper.taken_over()
-            self._trying(lambda: self.controller.stop(reason))
+            self._trying(partial(self.controller.stop, why))
         with self._guard:
             self._stops = [one for one in self._stops if one not in stops]
             if not self._stops:

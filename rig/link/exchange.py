@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
-from rig.link.refusals import refusal
+from rig.link.refusals import DeviceRefusedError
 from rig.link.restarts import SUPPLY, WIRING, Restart
 from rig.link.transcript import Received, Record, Transcript
 
@@ -128,7 +128,7 @@ class Exchange:
             if isinstance(answer, expected):
                 return answer
             if isinstance(answer, wire.Refused):
-                raise refusal(answer)
+                raise DeviceRefusedError(answer.reason, answer.detail)
             if answer is not None:
                 raise DeviceError(
                     f"the device answered {type(message).__name__} with {type(answer).__name__}",

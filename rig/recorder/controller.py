@@ -16,7 +16,7 @@ from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_recordable
-from rig.reasons import make_reason, plain_reason
+from rig.reasons import make_reason, plain_reason, remedies
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
@@ -356,7 +356,7 @@ class Controller:
         if recorder is None or recorder.armed is None or recorder.lapsed is None:
             return
         refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, recorder.lapsed)
-        self.stop(refusal.message)
+        self.stop(refusal.why)
         self._unarmed = refusal
 
     def fire(self, token: int) -> None:
@@ -455,8 +455,8 @@ class Controller:
             self._connected().state(run, attempt, state, reasons)
             self.session.settle()
 
-    def stop(self, reason: str) -> None:
-        """Switch everything off; log an armed drop as interrupted.
+    def stop(self, reason: Reason | str) -> None:
+        """Switch everything off; log an armed drop as interrupted, a text as somebody's words.
 
         Raises
         ------
@@ -467,14 +467,13 @@ class Controller:
         if recorder is None:
             return
         armed = recorder.armed
-        self._unarmed = StoppedError(
-            reason, "arm again when all is well; a rig run goes on by the same command"
-        )
+        why = plain_reason(reason, "stopped") if isinstance(reason, str) else reason
+        self._unarmed = StoppedError(why.text, *remedies([why]))
         try:
             recorder.abort()
         finally:
             if armed is not None:
-                recorder.state(*armed, RunState.INTERRUPTED, (plain_reason(reason),))
+                recorder.state(*armed, RunState.INTERRUPTED, (why,))
 
     def stop_past(self) -> bool:
         """Send ABORT from another thread than the controller's; `False` when nobody can hear it."""

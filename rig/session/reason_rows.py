@@ -6,7 +6,8 @@ import json
 import re
 from typing import TYPE_CHECKING, Any
 
-from rig.reasons import NOTE, Reason, make_reason, plain_reason, read_record
+from rig.reasons import Reason, make_reason, plain_reason, read_record
+from rig.wordings import NOTE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -17,9 +17,10 @@ from rig.analysis.verdict import _SURE, _pushed
 from rig.errors import InputError
 from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
-from rig.reasons import OPERATOR, Reason, make_reason, plain_reason
+from rig.reasons import Reason, make_reason, plain_reason
 from rig.records import Certificate, Edge
 from rig.units import Quantity
+from rig.wordings import OPERATOR
 from sim.dials import Dials
 from tests.analysis.drops import SCENES, SINGLE, UNIFORM, Case, case, codes, first_run, with_dials
 

@@ -35,8 +35,9 @@ from rig.campaign.events import (
 )
 from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, step
 from rig.link.messages import RefusalReason
-from rig.reasons import NOTE, OPERATOR, make_reason, plain_reason
+from rig.reasons import make_reason, plain_reason
 from rig.records import Job
+from rig.wordings import NOTE, OPERATOR
 
 JOB = Job(1, 1)
 NEXT = Job(2, 1)

@@ -6,10 +6,11 @@ import pytest
 
 from rig.campaign.plan import ATTEMPTS
 from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halted
-from rig.reasons import NOTE, make_reason, plain_reason
+from rig.reasons import make_reason, plain_reason
 from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
+from rig.wordings import NOTE
 
 SKEW = [make_reason("release_skew", skew_s=skew, limit_s=5e-3) for skew in (7.78e-3, -0.01, 1.0)]
 LOST = make_reason("edges_lost", lost=3)

@@ -107,6 +107,7 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
     with Session.open(processes.session, readonly=True) as session:
         (reason,) = session.latest_state(1).reasons
+    assert (reason.code, reason.values["client"]) == ("client_silent", "one")
     assert re.fullmatch(r"nothing was heard from one for \d\.\d s, so it lost control", reason.text)
     one, token = armed
     with pytest.raises(StoppedError, match=reason.text):
@@ -135,6 +136,9 @@ def test_a_device_that_disarms_itself_is_noticed(processes, armed):
     with pytest.raises(DeviceRefusedError, match="the emergency stop was opened") as refused:
         one.fire(token)
     assert refused.value.reason is RefusalReason.NOT_ARMED
+    until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
+    with Session.open(processes.session, readonly=True) as session:
+        assert [reason.code for reason in session.latest_state(1).reasons] == ["disarmed_stopped"]
     processes.hand("stop 0")
     one.close()
     gone_on_with(processes)

@@ -50,8 +50,16 @@ def test_an_error_comes_out_as_it_went_in(error):
     assert type(again.value) is type(error)
     assert str(again.value) == str(error)
     assert again.value.exit_code == error.exit_code
-    for name in ("reason", "detail", "disarmed"):
+    for name in ("reason", "detail", "disarmed", "why"):
         assert getattr(again.value, name, None) == getattr(error, name, None)
+
+
+def test_a_refusal_has_its_code_and_values_as_results_have_them():
+    data = rpc.error_to_data(DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b1010))
+    values = {"channels": [1, 3]}
+    assert data["reason_codes"] == [{"code": "refused_gate_blocked", "values": values}]
+    assert data["message"] == "gates 1, 3 are blocked"
+    assert rpc.error_to_data(InputError("no"))["reason_codes"] == []
 
 
 def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():

@@ -12,7 +12,7 @@ import pytest
 from textual.widgets import OptionList
 
 from rig.analysis.comparison import compare
-from rig.reasons import NOTE, plain_reason
+from rig.reasons import plain_reason
 from rig.records import Job
 from rig.results import detailed
 from rig.results.live import LiveAnalysis
@@ -25,6 +25,7 @@ from rig.tui.context import Options
 from rig.tui.picking import session_list
 from rig.tui.plots import control_pictures, laid_over, run_picture
 from rig.tui.why import speed_picture, why_words
+from rig.wordings import NOTE
 from tests.cli.lab import rig, short
 from tests.tui.lab import KEYS, Operator, run
 
