@@ -97,22 +97,20 @@ def _program() -> str:
     return quote(installed if here.startswith(os.pardir) else here)
 
 
-def _joined_map(words: Sequence[str]) -> list[str]:
-    """Join what was typed after ``--map``: ``1=0 2=1`` and ``D0 = 2`` are one word each there."""
-    joined: list[str] = []
-    mapping = False
-    for word in words:
-        if word == "--map":
-            joined += [word, ""]
-        elif mapping and (not joined[-1] or "=" in word or joined[-1].endswith("=")):
-            pair = joined[-1].endswith("=") or word.startswith("=")
-            comma = "," if joined[-1] and not pair else ""
-            joined[-1] = f"{joined[-1]}{comma}{word.strip(',')}"
-            continue
-        else:
-            joined.append(word)
-        mapping = word == "--map"
-    return joined
+def _join_pairs(typed: Sequence[str]) -> list[str]:
+    """Make a single word of the pairs after ``--map``, whatever blanks were typed."""
+    words = [part for word in typed for part in re.split(r"(?<=^--map)=", word, maxsplit=1)]
+    if "--map" not in words:
+        return words
+    first = words.index("--map") + 1
+    end = next((n for n in range(first, len(words)) if words[n].startswith("-")), len(words))
+    # A file's name may follow: the pairs end with the last "=" and the channel behind it.
+    signs = [n for n in range(first, end) if "=" in words[n]]
+    if signs:
+        last = min(end, signs[-1] + 1 + words[signs[-1]].endswith("="))
+        last += words[last : last + 1] == [","]
+        words[first:last] = [" ".join(words[first:last])]
+    return words
 
 
 class Parser(argparse.ArgumentParser):
@@ -127,7 +125,7 @@ class Parser(argparse.ArgumentParser):
 
     def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
         """Parse; what is left over is the mistake of the sub-command that was named."""
-        words = _joined_map(sys.argv[1:] if args is None else args)
+        words = _join_pairs(sys.argv[1:] if args is None else args)
         arguments, rest = self.parse_known_args(words)
         if rest:
             inner = next((parser for word in words if (parser := self._inner(word))), None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -111,7 +112,7 @@ def _channels(protocol: Protocol, found: TimerFile, arguments: Namespace) -> dic
     if not labels:
         return {"": _beam(protocol, arguments.channel).channel}
     if arguments.map is not None:
-        return _mapped(arguments.map, labels, gates)
+        return _read_pairs(arguments.map, labels, gates)
     if len(labels) == 1 and (arguments.channel is not None or len(gates) == 1):
         return {labels[0]: _beam(protocol, arguments.channel).channel}
     channels = {one: n for one in labels if (n := label_number(one)) in gates and n is not None}
@@ -127,21 +128,22 @@ def _channels(protocol: Protocol, found: TimerFile, arguments: Namespace) -> dic
     return channels
 
 
-def _mapped(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[str, int]:
-    found = {}
-    for part in text.split(","):
-        label, _, channel = (one.strip() for one in part.rpartition("="))
+def _read_pairs(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[str, int]:
+    channels = {}
+    pairs = re.findall(r"\s*([^=]+?)\s*(?:=\s*([^\s,=]*)[\s,]*|$)", text) or [(text, "")]
+    for label, channel in pairs:
         if label not in labels:
             raise InputError(
                 f"--map: the file has no input {label!r}", f"it has {', '.join(labels)}"
             )
         if not channel.isdecimal() or int(channel) not in gates:
+            wrong = f"{channel!r} is no gate's channel" if channel else f"{label!r} has no channel"
             raise InputError(
-                f"--map: {channel!r} is no gate's channel",
+                f"--map: {wrong}",
                 f"the protocol's gates are at {', '.join(map(str, gates))}",
             )
-        found[label] = int(channel)
-    return found
+        channels[label] = int(channel)
+    return channels
 
 
 def _beam(protocol: Protocol, channel: int | None) -> Gate:

@@ -225,7 +225,7 @@ PIECES = [
 
 
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=8))
-@examples(250)
+@examples(400)
 def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
     text = GOOD[:start] + "".join(pieces) + GOOD[start + cut :]
     try:

@@ -1,0 +1,76 @@
+"""``rig import --map`` takes what people type: blanks, commas, or both."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from tests.cli.lab import PROTOCOLS
+
+TIMES = "Time (s),D7 (V),D9 (V)\n" + "".join(
+    f"{n * 1e-3:.3f},{5 * (100 <= n < 140)},{5 * (300 <= n < 320)}\n" for n in range(600)
+)
+TYPED = (
+    "--map 'D7 (V)=0,D9 (V)=3'",
+    "--map 'D7 (V)=0, D9 (V)=3'",
+    "--map 'D7 (V) = 0, D9 (V) = 3'",
+    "--map 'D7 (V)=0 D9 (V)=3'",
+    "--map ' D7 (V) = 0 , D9 (V) = 3 '",
+    "--map='D7 (V)=0, D9 (V)=3'",
+    "--map 'D7 (V)=0' 'D9 (V)=3'",
+    "--map 'D7 (V)=0', 'D9 (V)=3',",
+    "--map 'D7 (V)' = 0, 'D9 (V)' = 3",
+    "--map 'D7 (V)' = 0 , 'D9 (V)' = 3 ,",
+    "--map 'D7 (V)'= 0 'D9 (V)' =3",
+    "--map='D7 (V)=0' 'D9 (V)=3'",
+    "--map D7 '(V)' = 0 D9 '(V)' = 3",
+)
+
+
+@pytest.fixture
+def look(call, tmp_path):
+    (tmp_path / "scope.csv").write_text(TIMES, "utf-8")
+    known = ("--protocol", PROTOCOLS / "falling-ball.yaml", "--dry-run")
+
+    def run(typed, *, first=True):
+        words, events = shlex.split(typed), tmp_path / "scope.csv"
+        where = (events, *known, *words) if first else (*known, *words, events)
+        return call("import", *where)
+
+    return run
+
+
+@pytest.mark.parametrize("typed", TYPED)
+@pytest.mark.parametrize("first", [True, False])
+def test_pairs_are_understood_as_they_are_typed(look, typed, first):
+    done = look(typed, first=first)
+    assert done.code == 0, done.err
+    assert "input D7 (V) is the gate at channel 0\n" in done.out
+    assert "input D9 (V) is the gate at channel 3\n" in done.out
+    assert "run 1: 4 edges in 0.22 s; by channel 0: 2, 3: 2" in done.out
+
+
+def test_other_arguments_are_no_pairs(look, tmp_path):
+    done = look(f"--map 'D7 (V)=0' --session={tmp_path}/a=b.session --dark high")
+    assert done.code == 0, done.err
+    assert "inputs that are no gate: D9 (V)" in done.err
+
+
+@pytest.mark.parametrize(
+    ("typed", "message"),
+    [
+        ("--map D8=0", "--map: the file has no input 'D8'\n  hint: it has D7 (V), D9 (V)"),
+        ("--map 'D7 (V)'", "--map: 'D7 (V)' has no channel"),
+        ("--map 'D7 (V)=0, D9 (V)'", "--map: 'D9 (V)' has no channel"),
+        ("--map 'D7 (V)=7'", "--map: '7' is no gate's channel"),
+        ("--map 'D7 (V)='", "--map: 'D7 (V)' has no channel"),
+        ("--map ''", "--map: the file has no input ''"),
+        ("--map =3", "--map: the file has no input '3'"),
+        ("--map --dry-run", "rig import: argument --map: expected one argument"),
+    ],
+)
+def test_a_pair_that_is_none_is_located(look, typed, message):
+    done = look(typed)
+    assert done.code == 2
+    assert done.err.startswith(message), done.err
