@@ -338,7 +338,7 @@ def _contact(
 
 def _stop(pins: Pins, x: float, y: float) -> None:
     _title(x - 0.6, y + 3.7, "Emergency stop")
-    _contact(pins, x, y, "STOP", lambda: elm.Button(nc=True), "opens when\nstruck")
+    _contact(pins, x, y, "STOP", lambda: elm.Button(nc=True), "opens when\npressed")
     elm.Dot().at((x + 2.6, y + 0.8))
     _down(elm.Capacitor(), x + 2.6, y + 0.8, y - 0.9, "47 nF")
     _ground(x + 2.6, y - 0.9)

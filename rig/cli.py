@@ -144,7 +144,9 @@ def _parser() -> Parser:
     new.add_argument("--rods", metavar="N", help="number of rods of a chain or bars of a fence")
     new.add_argument("--length", metavar="L", help='of a chain or a fence, such as "1165 mm"')
     new.add_argument("--diameter", metavar="D", help="of a rod; for an object its length in a beam")
-    new.add_argument("--aim", choices=("separation", "coefficients"), help="what to measure")
+    new.add_argument(
+        "--aim", choices=("separation", "speed", "coefficients"), help="what to measure"
+    )
     new.add_argument(
         "--incline", metavar="A", help='of the board or the track, such as "40 deg, 60 deg"'
     )

@@ -25,7 +25,7 @@ from rig.campaign.events import (
     effect_failed,
 )
 from rig.campaign.machine import Flow, step
-from rig.campaign.plan import RunLine, next_job, rest_s, what_to_hang
+from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
 from rig.daemon.connecting import connect
 from rig.errors import DeviceError, InputError
@@ -221,7 +221,7 @@ class Campaign:
         return None
 
     def _request(self, job: Job) -> None:
-        """Ask whoever is there to hang the chains, or to end what is in the way."""
+        """Ask the operator to prepare the drop, or to remove what prevents it."""
         trouble = self.flow.trouble.replace("\n", "; ")
         unfired = trouble and job != self.flow.job  # an attempt that was armed counts
         if unfired:
@@ -232,11 +232,11 @@ class Campaign:
             self.operator.ask(f"not armed: {trouble}")
             return
         again = f", attempt {job.attempt}" if job.attempt > 1 else ""
-        what = what_to_hang(self._left[0])
+        what = describe_setup(self._left[0])
         self.operator.ask(f"run {job.run} of {len(self.plan)}{again}: {what}")
 
     def _rest_s(self) -> float:
-        """How long the chains rest; a clock once known well enough stays so."""
+        """How long everything rests before the release; a clock once known well enough stays so."""
         if rest_s(0.0, self._clock_u) > 0.0:
             clock = self.live.clock(self.session).device
             self._clock_u = None if clock is None else clock.u
@@ -262,7 +262,7 @@ class Campaign:
                     self._do(effect)
 
     def _fall(self) -> None:
-        """Let go, and stay until the drop is recorded: it took somebody minutes to hang."""
+        """Let go, and stay until the drop is recorded: preparing it took minutes."""
         with self.interrupts.held():
             try:
                 while self._effects and isinstance(self._effects[0], FireRelease | Collect | Stop):

@@ -79,9 +79,9 @@ def rest_s(settle_s: float, clock_u: float | None) -> float:
     return settle_s if known else max(settle_s, CLOCK_S)
 
 
-def what_to_hang(run: Run) -> str:
-    """Tell the operator what goes where."""
+def describe_setup(run: Run) -> str:
+    """Tell the operator what goes where before a drop."""
     if run.impact is None:
-        return f"put {run.free} where it begins, at rest"
-    free = f" · free side: {run.free}" if run.free else ""
-    return f"incline {run.incline_deg:g}° · impact side: {run.impact}{free}"
+        return f"put {run.free} at its start, at rest"
+    chains = f"impact side: {run.impact} · free side: {run.free}"
+    return f"incline {run.incline_deg:g}° · {chains if run.free else f'hang {run.impact}'}"

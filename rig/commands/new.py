@@ -31,11 +31,8 @@ if TYPE_CHECKING:
     from rig.protocol.draft import Scene
 
 _OTHER = "other"
-_AIMS = {
-    "separation": "40 deg",
-    "coefficients": "30 deg, 40 deg, 50 deg, 60 deg, 70 deg",
-}
-"""What to measure, and the inclines for that if none are given."""
+_INCLINES = {"coefficients": "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"}
+"""What is measured at several inclines, and these if none are given."""
 
 
 _DROPS = {
@@ -106,16 +103,17 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     diameter = _ask(arguments, _Question("diameter", words, thick))
     inclines = ""
     if struck:
-        aim = _ask(
-            arguments, _Question("aim", "What do you want to measure?", "separation", (*_AIMS,))
-        )
+        result = "separation" if scene == "two-chains" else "speed"
+        words, aims = "What do you want to measure?", (result, *_INCLINES)
+        aim = _ask(arguments, _Question("aim", words, result, aims))
         words = "Inclines of the board?"
-        inclines = _ask(arguments, _Question("incline", words, _AIMS[aim]))
+        inclines = _ask(arguments, _Question("incline", words, _INCLINES.get(aim, "40 deg")))
     elif scene == "track":
         words = "Incline of the track?"
         inclines = _ask(arguments, _Question("incline", words, "3 deg ± 0.1 deg"))
     drops = {"track": "1500 mm ± 1 mm", "object": "900 mm ± 1 mm", "picket-fence": "400 mm ± 2 mm"}
-    words = f"Drop height, from {_DROPS.get(scene, 'the contact point to the lowest rod')}?"
+    start = "Start" if scene == "track" else "Drop height"
+    words = f"{start}, from {_DROPS.get(scene, 'the contact point to the lowest rod')}?"
     drop = _ask(arguments, _Question("drop", words, drops.get(scene, "180 mm ± 2 mm")))
     repeats = _ask(
         arguments,

@@ -95,7 +95,7 @@ def _scene(protocol: Protocol) -> list[str]:
     if protocol.gravity == along:
         lines[-1] += ", standard gravity: only the start value of the fit"
     if surface is not None or protocol.gates is not None:
-        lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} above the {protocol.zero}")
+        lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} {protocol.drop_from}")
     if protocol.initial_speed != AT_REST:
         lines.append(f"initial speed: {format_quantity(protocol.initial_speed, 'm/s')} downward")
     if protocol.drag is not None:

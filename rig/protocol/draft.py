@@ -124,9 +124,10 @@ def _lines(draft: Draft, gates: list[str]) -> list[str]:
         "release: {channel: 0, pulse: 80 ms}",
     ]
     if not struck:
+        example = "   # a steel ball of 20 mm" if draft.scene == "object" else ""
         lines += [
             "# The fit estimates the drag of the air. If you know the terminal speed, state it:",
-            "# drag: {terminal_speed: 60 m/s ± 6 m/s}   # a steel ball of 20 mm",
+            f"# drag: {{terminal_speed: 60 m/s ± 6 m/s}}{example}",
         ]
     incline = f"incline: [{draft.inclines}], " if struck else ""
     order = ", order: ABBA" if draft.scene == "two-chains" else ""

@@ -346,8 +346,13 @@ class Protocol:
     def zero(self) -> str:
         """What drop and gates' heights are counted from, in words."""
         if self.surface is None:
-            return "datum of the gates"
+            return "zero of the heights"
         return "board" if self.contact.from_board and self.stated is None else "contact point"
+
+    @property
+    def drop_from(self) -> str:
+        """Where the drop is measured, in words."""
+        return f"above the {self.zero}" if self.track is None else "along the track"
 
     @property
     def two_chains(self) -> bool:

@@ -134,15 +134,15 @@ KEYS: tuple[Key, ...] = (
     Key("notes", _TEXT, "", "free text, kept with the session", "Chains weighed in May."),
     Key("blind", OneOf(tuple(BOOLEANS)), "false", "hide results until `rig unblind`", "true"),
     Key("gravity", reader.GRAVITY, f"{STANDARD_GRAVITY.value} ± {STANDARD_GRAVITY.u} m/s^2",
-        "local acceleration of free fall, ± its standard uncertainty; or `site`. Needed with a "
-        "surface; otherwise only the fit's first guess",
+        "local acceleration of free fall, ± its standard uncertainty; or `site`. Required with a "
+        "surface; otherwise only compared with the result",
         "9.8124 m/s^2 ± 0.0002 m/s^2"),
     Key("site", _MAP, "", "gravity from the lab's place, by WGS 84", ""),
     Key("site.latitude", reader.LATITUDE, "", "geodetic latitude", "61.19 deg", required=True),
     Key("site.height", reader.HEIGHT, "", "above sea level", "30 m", required=True),
     Key("drop", reader.DROP, "0 m",
-        "height of the lowest rod's middle above the contact point before release, ±; without a "
-        "surface above any fixed level", "180 mm ± 2 mm"),
+        "height of the lowest rod's, or object's, middle before release, ±: above the contact "
+        "point; without a surface above any fixed level", "180 mm ± 2 mm"),
     Key("initial_speed", reader.INITIAL_SPEED, "0 m/s", "downward speed at the release", "0.5 m/s"),
 
     Key("chains", _MAP, "", "one chain or two, by name", "", required=True),
@@ -225,7 +225,7 @@ KEYS: tuple[Key, ...] = (
 
     Key("gates", _MAP, "", "photogates; without them only predictions", ""),
     Key("gates.impact", ListOf(), "", "gates of the striking chain", ""),
-    Key("gates.free", ListOf(), "", "gates of the free chain", ""),
+    Key("gates.free", ListOf(), "", "gates of the free chain, or of an object", ""),
     *(
         key
         for side in ("impact", "free")
@@ -233,7 +233,7 @@ KEYS: tuple[Key, ...] = (
             Key(f"gates.{side}.{EACH}.channel", Whole(0, GATES - 1), "", "input of the board", "3",
                 required=True),
             Key(f"gates.{side}.{EACH}.height", gates.HEIGHT, "",
-                "height of the beam above the contact point", "25 mm", required=True),
+                "height of the beam above the zero of `drop`", "25 mm", required=True),
         )
     ),
     Key("gates.height_uncertainty", gates.HEIGHT_UNCERTAINTY, "0.3 mm",

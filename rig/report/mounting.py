@@ -183,7 +183,7 @@ def _side_view(
     axes.set_xlim(-2.2e3 * post, 2.2e3 * post)
     axes.set_ylim(-20, 1e3 * top)
     axes.set_xlabel("mm, uphill to the right" if _inclines(protocol) else "mm")
-    axes.set_ylabel(f"mm above the {protocol.zero}" if _inclines(protocol) else "mm")
+    axes.set_ylabel(f"mm {protocol.drop_from}" if _inclines(protocol) else "mm")
     axes.grid(visible=False)
 
 
@@ -211,18 +211,20 @@ def _zero(protocol: Protocol, gates: Gates) -> list[str]:
         return [
             "Measure all heights, of the drop and of every beam, from one level, such as the table."
         ]
-    return [
-        *_wrapped(
-            "Zero: lay a rod on the board where the lowest rod will strike. Its middle is height "
-            "0, for the drop and for every beam. Transfer this level to both posts at once, with a "
-            "water hose or a spirit level on a straight bar, and mark it. Measure each beam from "
-            f"its post's mark to ± {1e3 * gates.height_u:g} mm (height_uncertainty); the marks "
-            f"agree to ± {1e3 * gates.datum_u:g} mm (datum_uncertainty). To change the incline, "
-            "turn the board about that rod: 0 stays."
-        ),
-        f"Beams: {', '.join(_BEAMS[side] for side in gates.posts)}.",
-        "",
-    ]
+    posts, marks, agree = "both posts at once", "its post's mark", "marks agree"
+    beams = f"Beams: {', '.join(_BEAMS[side] for side in gates.posts)}."
+    if len(gates.posts) == 1:
+        posts, marks, agree, beams = "the post", "that mark", "mark is right", ""
+    zero = (
+        "Zero: lay a rod on the board where the lowest rod will strike. Its middle is height 0, "
+        f"for the drop and for every beam. Transfer this level to {posts}, with a water hose or a "
+        f"spirit level on a straight bar, and mark it. Measure each beam from {marks} to "
+        f"± {1e3 * gates.height_u:g} mm (height_uncertainty); the {agree} to "
+        f"± {1e3 * gates.datum_u:g} mm (datum_uncertainty)."
+    )
+    if len(_inclines(protocol)) > 1:
+        zero += " To change the incline, turn the board about that rod: 0 stays."
+    return [*_wrapped(zero), *filter(None, [beams]), ""]
 
 
 def _wrapped(text: str) -> list[str]:

@@ -7,10 +7,10 @@ from rig.campaign.plan import (
     CLOCK_U,
     RunLine,
     again,
+    describe_setup,
     next_job,
     rest_s,
     unjudged,
-    what_to_hang,
 )
 from rig.protocol.protocol import Run
 from rig.records import Job
@@ -37,7 +37,7 @@ def test_chains_rest_longer_while_the_clock_is_not_known():
 
 
 def test_who_stands_at_the_rig_is_told_what_goes_where():
-    """A glider on its track does not hang."""
-    assert what_to_hang(Run(1, 40.0, "A", "B")) == "incline 40° · impact side: A · free side: B"
-    assert what_to_hang(Run(1, 40.0, "A", None)) == "incline 40° · impact side: A"
-    assert what_to_hang(Run(1, 0.0, None, "glider")) == "put glider where it begins, at rest"
+    """A glider on its track does not hang, and a single chain has no sides."""
+    assert describe_setup(Run(1, 40.0, "A", "B")) == "incline 40° · impact side: A · free side: B"
+    assert describe_setup(Run(1, 40.0, "A", None)) == "incline 40° · hang A"
+    assert describe_setup(Run(1, 0.0, None, "glider")) == "put glider at its start, at rest"

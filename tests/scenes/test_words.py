@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from html import unescape
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -21,6 +22,9 @@ from rig.tui.pictures import FakeClient, screenshots, seen
 from tests.tui.lab import KEYS
 from tests.tui.screen import text_of
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 _PAIR = r"\b(?:free|impact) side|\bfree chain|skew|separation|Δz|both chains"
 _STRUCK = r"\bimpact|\bstr(?:ik|uck)|restitution|\bsurface"
 _STRUNG = r"\brods?\b|\bchains?\b|\bh[au]ng"
@@ -32,6 +36,16 @@ FOREIGN = {
     "single-chain": (_PAIR, _OTHERS),
     "inclined-uniform": (_OTHERS,),
 }
+SCENES = {
+    "object": "falling-ball",
+    "track": "glider",
+    "picket-fence": "picket-fence",
+    "one-chain": "single-chain",
+    "two-chains": "inclined-uniform",
+}
+"""What ``rig new`` drafts, and the ready scene of the same words."""
+NAMES = r"\b(?:chains|rods)(?=:)|(?m:^  hang\b)|--rods"
+"""Keys and options that are the same in every scene."""
 SIZES = ((120, 36),)
 DIALOGS = ("help", "palette", "reject", "again", "filter", "release_test", "note", "quit")
 
@@ -60,11 +74,49 @@ def assert_own_words(scene: str, where: str, text: str) -> None:
         assert met is None, f"{scene}, {where}: {text[max(0, met.start() - 80) : met.end() + 40]}"
 
 
+def text_of_svg(path: Path) -> str:
+    """What a drawing says, be it text or, where letters are curves, the comments above them."""
+    svg = path.read_text("utf-8")
+    svg = re.sub(r"<!--(.*?)-->", r"\1\n", svg, flags=re.DOTALL)
+    return unescape(re.sub(r"<(metadata|style)\b.*?</\1>|<[^>]+>", " ", svg, flags=re.DOTALL))
+
+
+@pytest.mark.parametrize("board", ["pico", "mega", "uno"])
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_draft_and_its_drawings_speak_the_words_of_their_scene(
+    scene, board, tmp_path, capsys, monkeypatch
+):
+    if board != "pico":  # what is simulated is the same
+        monkeypatch.setattr("rig.commands.new._simulate", lambda _: 0)
+    file = tmp_path / "mine.yaml"
+    assert main(["new", str(file), "--scene", scene, "--board", board, "--yes"]) in {0, 3}
+    out, err = capsys.readouterr()
+    drawings = {path.name: text_of_svg(path) for path in tmp_path.glob("*.svg")}
+    assert set(drawings) == {"mine-mounting.svg", "mine-wiring.svg"}
+    assert "gate 0" in drawings["mine-wiring.svg"]
+    assert "At each beam: channel: height in mm." in drawings["mine-mounting.svg"]
+    out = re.sub(r"\nLeft out\n.*?\n\n", "\n\n", out, flags=re.DOTALL)
+    texts = {"draft": file.read_text("utf-8"), "plan": out, "questions": err, **drawings}
+    for where, text in texts.items():
+        assert_own_words(SCENES[scene], where, re.sub(NAMES, "", text))
+
+
+@pytest.mark.parametrize("scene", FOREIGN)
+def test_plans_speak_the_words_of_their_scene(scene, capsys):
+    for command in ("check", "predict", "design"):
+        more = ("--no-search",) if command == "design" else ()
+        assert main([command, str(ready_protocol(scene)), *more]) == 0
+        out, err = capsys.readouterr()
+        out = re.sub(NAMES, "", out.partition("\nLeft out\n")[0])
+        assert_own_words(scene, command, out + err)
+
+
 def test_commands_and_page_speak_the_words_of_their_scene(recorded, tmp_path, capsys):
     scene, _, sessions = recorded
     for session in sessions:
         capsys.readouterr()
         main(["analyze", str(session), "--scatter"])
+        main(["analyze", str(session), "--budget", "1"])
         main(["report", str(session), "-o", str(tmp_path / "page.html")])
         assert_own_words(scene, "analyze", "".join(capsys.readouterr()))
         html = (tmp_path / "page.html").read_text("utf-8")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cli import main
+from rig.report.method import SOFTWARE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -39,8 +40,6 @@ _OTHERS = {
     "free-chain": ("glider",),
 }
 """Words of other scenes that strike nothing."""
-_LEFT = {"run", "report", "analyze", "analyze --budget"}
-"""Commands that still say ``hang`` and ``rod`` where they name the terms of a budget."""
 _PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous")
 _IMPACT = ("inclin", "impact", "strike", "restitution", "friction", "α", "surface", " V ")
 
@@ -193,11 +192,9 @@ class _Journey:
 
     def read(self, command: str, text: str) -> None:
         """Look for what the scene does not have in what a command says."""
-        text = text.replace(self.scene.protocol.title, "")
+        text = text.replace(self.scene.protocol.title, "").replace(SOFTWARE, "")
         text = re.sub(r"(?m)^  hang  ", "", text)  # the prior's name, as protocols have it
         for word in self.lacking:
-            if word in _STRUNG and command in _LEFT:
-                continue
             if met := re.search(word, text, re.IGNORECASE if len(word) > 3 else re.NOFLAG):
                 self.fault(command, f"speaks of {word!r}: {_around(text, met)}")
         if _NO_NUMBER.search(text):

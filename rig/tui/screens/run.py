@@ -146,8 +146,7 @@ def _card(model: Model, expected: str, *, low: bool) -> Content:
     if run.impact is not None:
         facts.append(("incline", f"{run.incline_deg:g}°"))
     expects = [("model", expected)] if expected else []
-    above = "along the track" if protocol.track else f"above the {protocol.zero}"
-    start = ("drop", f"{protocol.drop.value * 1e3:.0f} mm {above}")
+    start = ("drop", f"{protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}")
     width, between = (0, "   ") if low else (12, "\n")
     setup = Content(between).join(_fact(*fact, width) for fact in facts)
     return Content("\n").join([head, setup, *(_fact(*fact, width) for fact in (start, *expects))])
