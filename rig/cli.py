@@ -30,9 +30,9 @@ OPTIONAL = ("distributed", "mpmath")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
 
-    0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted; 1 comes from
-    `rig.__main__`, after an exception that is raised here. Results go to stdout, everything else to
-    stderr.
+    0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted; 1 if a replay differs,
+    and from `rig.__main__` after an exception that is raised here. Results go to stdout, everything
+    else to stderr.
     """
     open_streams()
     try:
@@ -450,8 +450,10 @@ def _parser() -> Parser:
         "-o", "--output", metavar="DIR", help="folder for page, CSV, JSON and picture"
     )
     _json(scenes)
-    codes = "0 done, 2 bad input, 3 a run was void, 4 device trouble, 130 interrupted"
-    parser.epilog = f"{overview(texts)}\n\nExit codes: {codes}."
+    parser.epilog = (
+        f"{overview(texts)}\n\nExit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a "
+        "run was\nvoid, 4 device trouble, 130 interrupted. rig replay: 1 the results differ."
+    )
     return parser
 
 

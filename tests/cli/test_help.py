@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 
 import pytest
 
-from rig.cli import _parser
+from rig.cli import BAD_INPUT, INTERRUPTED, _parser
 from rig.command_help import EXAMPLES, GROUPS
+from rig.commands.output import VOID
+from rig.commands.replay import DIFFERENT
+from rig.errors import DeviceError, InputError, RigError
 from tests.cli.lab import PROTOCOLS
 
 
@@ -23,6 +27,15 @@ def test_every_command_has_a_group_and_two_examples(call):
     for name in known:
         assert f"\n  {name} " in done.err
         assert len(EXAMPLES[name]) >= 2
+
+
+def test_every_exit_code_is_listed():
+    text = "Exit codes: " + _parser().format_help().partition("Exit codes: ")[2]
+    known = {kind.exit_code for kind in (RigError, InputError, DeviceError)}
+    known |= {0, BAD_INPUT, INTERRUPTED, VOID, DIFFERENT}
+    assert {int(code) for code in re.findall(r"\b\d+(?= [a-z])", text)} == known
+    assert "rig replay: 1" in text
+    assert max(map(len, text.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("line", [one for lines in EXAMPLES.values() for one in lines])
