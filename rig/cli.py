@@ -401,6 +401,7 @@ def _parser() -> Parser:
     doctor = command("doctor", "look for what is wrong with this computer, a board or a session")
     doctor.add_argument("--port", type=_port, help="also this board: device path or URL")
     doctor.add_argument("--session", metavar="FILE", help="also this session, and its disk")
+    _json(doctor)
 
     selftest = command("selftest", "have a board prove that it does what it must")
     selftest.add_argument("--port", type=_port, required=True, help="device path or URL")

@@ -120,7 +120,7 @@ def published_reasons(reasons: Iterable[Reason]) -> dict[str, list[Any]]:
 def remedies(reasons: Iterable[Reason]) -> list[str]:
     """Return what to do about some reasons, each thing once; the general advice only if alone."""
     advice = [
-        WORDINGS[reason.code].remedy.format_map(_Phrases({}, VOCABULARIES[reason.scene]))
+        WORDINGS[reason.code].remedy.format_map(_Phrases(reason.values, VOCABULARIES[reason.scene]))
         for reason in reasons
     ]
     advice = [text for text in dict.fromkeys(advice) if text]

@@ -60,6 +60,15 @@ _AGAIN = "drop again"
 _RESUME = "arm again when all is well; a rig run goes on by the same command"
 _STOP = "see that nobody is in danger and close it, then arm again"
 
+WIRING = "the release's wiring (a coil without a diode resets boards)"
+SUPPLY = "is its supply shared with the magnets?"
+_CLEAR = "clear the beam, and see that its emitter has power and its plugs sit"
+_STILL = f"{_CLEAR}; let everything come to rest"
+_RULE = (
+    "python -m rig.usb.udev | sudo tee /etc/udev/rules.d/60-chainrig.rules, then "
+    "sudo udevadm control --reload and sudo udevadm trigger"
+)
+
 WORDINGS: dict[str, Wording] = {
     # The record.
     "edges_lost": Wording(
@@ -309,6 +318,60 @@ WORDINGS: dict[str, Wording] = {
     "disarmed_stopped": Wording(
         _VOID, "emergency stop", "the device disarmed itself: the emergency stop was opened", _STOP
     ),
+    # What the doctor finds.
+    "packages_mixed": Wording(
+        _DOUBT, "packages mixed", "{packages} too: files of both are in one folder",
+        "python -m pip uninstall {names} chainrig, then install chainrig again"),
+    "port_missing": Wording(
+        _DOUBT, "no port", "there is no such port", "is the board plugged in? rig ports"),
+    "port_forbidden": Wording(
+        _DOUBT, "no permission", "not given: it belongs to the group {group}",
+        f"sudo usermod -aG {{join}} $USER and log in again, or {_RULE}"),
+    "port_of_root": Wording(
+        _DOUBT, "no permission", "not given: it belongs to the group root", _RULE),
+    "port_in_use": Wording(_DOUBT, "port in use", "{owners}", "close that program"),
+    "port_of_daemon": Wording(
+        _DOUBT, "port in use", "{owners}",
+        "let that daemon do the work: rig run and rig tui ask it"),
+    "modem_manager": Wording(
+        _DOUBT, "ModemManager", "it may speak to the board, which restarts it", _RULE),
+    "firmware_differs": Wording(
+        _DOUBT, "firmware", "{firmware}, but {shipped} comes with rig", "rig flash"),
+    "drop_held": Wording(
+        _DOUBT, "drop held", "run {run}, attempt {attempt}",
+        "continue the session it belongs to: rig run"),
+    "clock_unknown": Wording(
+        _DOUBT, "clock", "its rate cannot be determined from {pings} pings",
+        "take another cable or USB port; is the firmware for this very board? rig flash"),
+    "clock_off": Wording(
+        _DOUBT, "clock", "{ppm:+.0f} ± {U95:.0f} ppm",
+        "its resonator is broken: take another board"),
+    "no_ping": Wording(_DOUBT, "no ping", "no ping came through", "take another cable or USB port"),
+    "slow_answers": Wording(
+        _DOUBT, "round trip", "{slowest_s:.1f ms} at most",
+        "close what keeps this computer busy; no USB hub"),
+    "stop_open": Wording(
+        _DOUBT, "emergency stop", "open", "close it, or plug its cable in: it opens too"),
+    "gates_blocked": Wording(
+        _DOUBT, "gates blocked", "{gates_listed}",
+        f"{_CLEAR}; an input without a gate reads so too: leave it"),
+    "gates_flicker": Wording(_DOUBT, "gates flicker", "{gates_listed}", _STILL),
+    "gates_flicker_mains": Wording(
+        _DOUBT, "gates flicker", "{gates_listed}",
+        "keep lamps off the receivers and mains leads off the cables; shield the beams"),
+    "disk_full": Wording(
+        _DOUBT, "disk", "{free_mb:.0f} MB free in {folder}",
+        "free {needed_mb:.0f} MB there, or keep sessions elsewhere"),
+    "session_missing": Wording(
+        _DOUBT, "session missing", "not there", "check its name; rig run makes a new one"),
+    "no_session": Wording(
+        _DOUBT, "no session", "not a session: {text}", "name a file made by rig run"),
+    "session_damaged": Wording(
+        _DOUBT, "session damaged", "damaged: {text}", "rig recover {path} -o NEW.session"),
+    "board_restarts": Wording(
+        _DOUBT, "board restarted", "{text}",
+        f"{SUPPLY} Give them one of their own, and check {WIRING}"),
+    "failed": Wording(_DOUBT, "failed", "{text}", "{hint}"),
     # Words of people and of old files.
     OPERATOR: Wording(_VOID, "rejected by the operator", "{text}"),
     NOTE: Wording(_REMARK, "note", "note: {text}"),

@@ -6,7 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.output import say
+from rig.commands.output import print_json, say
 from rig.doctor import checks
 from rig.doctor.checks import Finding
 from rig.doctor.gathering import (
@@ -16,7 +16,7 @@ from rig.doctor.gathering import (
     look_at_port,
     look_at_session,
 )
-from rig.errors import DeviceError, SessionError
+from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
 from rig.usb.listing import serial_ports
 
@@ -38,10 +38,14 @@ _BOARD = (
 
 def main(arguments: Namespace) -> int:
     """Say what is well, and of what is not, what to do."""
-    troubles = 0
+    findings = []
     for finding in _findings(arguments.port, arguments.session):
-        print(finding, flush=True)
-        troubles += bool(finding.advice)
+        findings.append(finding)
+        if not arguments.json:
+            print(finding, flush=True)
+    if arguments.json:
+        print_json({"findings": [finding.json() for finding in findings]})
+    troubles = sum(bool(finding.advice) for finding in findings)
     if troubles:
         say(f"{troubles} thing{'s' * (troubles > 1)} to do")
     else:
@@ -64,7 +68,7 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     yield checks.other_packages(look_at_packages())
     yield checks.disk_room(look_at_disk(Path(session).parent if session else Path()))
     if session and not Path(session).exists():
-        yield Finding(f"session {session}", "not there", "check its name; rig run makes a new one")
+        yield checks.problem(f"session {session}", "session_missing")
     elif session:
         try:
             told = look_at_session(session)
@@ -72,7 +76,11 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
             if told.whole:
                 yield from (checks.restarts(told), checks.supply(told))
         except SessionError as error:
-            yield Finding(f"session {session}", error.message, error.hint)
+            yield _failed(f"session {session}", error)
+
+
+def _failed(name: str, error: RigError) -> Finding:
+    return checks.problem(name, "failed", text=error.message, hint=error.hint)
 
 
 def _board(url: str) -> Iterator[Finding]:
@@ -80,7 +88,7 @@ def _board(url: str) -> Iterator[Finding]:
         with closing(open_port(url)) as port:
             facts = look_at_board(port, port_clock(port))
     except DeviceError as error:
-        yield Finding("board", error.message, error.hint)
+        yield _failed("board", error)
         return
     identity = facts.identity
     yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}")

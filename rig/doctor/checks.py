@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+from collections import Counter
 from dataclasses import dataclass
 from math import tau
 from typing import TYPE_CHECKING
@@ -11,37 +12,44 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.rate import tick_rate
 from rig.link.gatewatch import listed
 from rig.link.messages import HOST_SILENCE_MS, unpack_label
-from rig.link.restarts import SUPPLY, WIRING, causes
+from rig.link.restarts import causes
+from rig.reasons import make_reason, remedies
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.doctor.facts import BoardFacts, DiskFacts, PortFacts, SessionFacts
+    from rig.reasons import Reason
 
-RULE = (
-    "python -m rig.usb.udev | sudo tee /etc/udev/rules.d/60-chainrig.rules, then "
-    "sudo udevadm control --reload and sudo udevadm trigger"
-)
 ROOM = 200 * 10**6
 """Bytes that should be free: a day of drops takes a few tens of MB, and its log as much again."""
 _MAINS_HZ = (50, 60, 100, 120)  # lamps flicker at twice the mains' frequency
 _IN_STEP = 0.8
 _ENOUGH = 10  # edges to tell a rhythm from chance
-_BEAM = "clear the beam, and see that its emitter has power and its plugs sit"
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the doctor's; with an advice it is a trouble, without one all is well."""
+    """One line of the doctor's: what is well, or a problem with its reason and an advice."""
 
     name: str
     what: str
     advice: str = ""
+    reason: Reason | None = None
+
+    def json(self) -> dict[str, object]:
+        """Return it as a member of ``findings``."""
+        codes = [self.reason.json()] if self.reason else []
+        return {"name": self.name, "what": self.what, "advice": self.advice, "reason_codes": codes}
 
     def __str__(self) -> str:
-        if self.advice:
-            return f"{self.name}: {self.what}\n  do: {self.advice}"
-        return f"{self.name}: {self.what}"
+        return f"{self.name}: {self.what}" + (f"\n  do: {self.advice}" if self.advice else "")
+
+
+def problem(name: str, code: str, **values: object) -> Finding:
+    """Make a finding of a code of `rig.wordings` and its values."""
+    reason = make_reason(code, **values)
+    return Finding(name, reason.text, "; ".join(remedies([reason])), reason)
 
 
 def other_packages(names: Sequence[str]) -> Finding:
@@ -55,26 +63,20 @@ def other_packages(names: Sequence[str]) -> Finding:
     name = "packages called rig"
     if not names:
         return Finding(name, "only this one")
-    said = ", ".join(names)
-    advice = f"python -m pip uninstall {' '.join(names)} chainrig, then install chainrig again"
-    return Finding(name, f"{said} too: files of both are in one folder", advice)
+    return problem(name, "packages_mixed", packages=", ".join(names), names=" ".join(names))
 
 
 def permission(port: PortFacts) -> Finding:
     """See that this user may read and write the port."""
     name = f"permission for {port.path}"
     if not port.exists:
-        return Finding(name, "there is no such port", "is the board plugged in? rig ports")
+        return problem(name, "port_missing")
     if port.usable:
         return Finding(name, "given")
-    group = port.group or "its group"
-    # Who joins root to reach a board can do far more than that.
-    join = (
-        ""
-        if group == "root"
-        else (f"sudo usermod -aG {port.group or 'dialout'} $USER and log in again, or ")
-    )
-    return Finding(name, f"not given: it belongs to the group {group}", f"{join}{RULE}")
+    if port.group == "root":  # who joins it to reach a board can do far more than that
+        return problem(name, "port_of_root")
+    group, join = port.group or "its group", port.group or "dialout"
+    return problem(name, "port_forbidden", group=group, join=join)
 
 
 def other_owners(port: PortFacts) -> Finding:
@@ -82,10 +84,9 @@ def other_owners(port: PortFacts) -> Finding:
     name = f"other users of {port.path}"
     if not port.owners:
         return Finding(name, "none seen")
-    said = ", ".join(f"{owner.command} (process {owner.pid})" for owner in port.owners)
+    owners = ", ".join(f"{owner.command} (process {owner.pid})" for owner in port.owners)
     daemon = any("daemon" in owner.command for owner in port.owners)
-    advice = "let that daemon do the work: rig run and rig tui ask it" if daemon else ""
-    return Finding(name, said, advice or "close that program")
+    return problem(name, "port_of_daemon" if daemon else "port_in_use", owners=owners)
 
 
 def modem_manager(port: PortFacts) -> Finding:
@@ -95,7 +96,7 @@ def modem_manager(port: PortFacts) -> Finding:
         return Finding(name, "it does not run")
     if port.left_alone:
         return Finding(name, "it is told to leave this port alone")
-    return Finding(name, "it may speak to the board, which restarts it", RULE)
+    return problem(name, "modem_manager")
 
 
 def firmware(board: BoardFacts) -> Finding:
@@ -105,7 +106,7 @@ def firmware(board: BoardFacts) -> Finding:
         return Finding("firmware", f"{has}; none for a {board.identity.board} comes with rig")
     if has == board.shipped:
         return Finding("firmware", f"{has}, as it comes with rig")
-    return Finding("firmware", f"{has}, but {board.shipped} comes with rig", "rig flash")
+    return problem("firmware", "firmware_differs", firmware=has, shipped=board.shipped)
 
 
 def held_drop(board: BoardFacts) -> Finding:
@@ -113,9 +114,7 @@ def held_drop(board: BoardFacts) -> Finding:
     if board.held is None:
         return Finding("held drop", "none")
     run, attempt = board.held
-    return Finding(
-        "held drop", f"run {run}, attempt {attempt}", "continue the session it belongs to: rig run"
-    )
+    return problem("held drop", "drop_held", run=run, attempt=attempt)
 
 
 def clock(board: BoardFacts) -> Finding:
@@ -123,33 +122,27 @@ def clock(board: BoardFacts) -> Finding:
     nominal = board.identity.tick_hz
     rate = tick_rate(board.pings, nominal)
     if not rate.n:
-        return Finding(
-            "clock",
-            f"its rate cannot be told from {len(board.pings)} pings",
-            "take another cable or USB port; is the firmware for this very board? rig flash",
-        )
+        return problem("clock", "clock_unknown", pings=len(board.pings))
     off, u = rate.hz / nominal - 1, rate.u_hz / nominal
-    said = f"{off * 1e6:+.0f} ± {2 * u * 1e6:.0f} ppm"
     if abs(off) > RESONATOR_TOLERANCE + 2 * u:
-        return Finding("clock", said, "its resonator is broken: take another board")
-    return Finding("clock", said)
+        return problem("clock", "clock_off", ppm=off * 1e6, U95=2e6 * u)
+    return Finding("clock", f"{off * 1e6:+.0f} ± {2 * u * 1e6:.0f} ppm")
 
 
 def round_trip(board: BoardFacts) -> Finding:
     """See that answers come fast enough to keep an armed board armed."""
     if not board.pings:
-        return Finding("round trip", "no ping came through", "take another cable or USB port")
-    slowest = max(ping.host_recv_ns - ping.host_send_ns for ping in board.pings) * 1e-6
-    said = f"{slowest:.1f} ms at most"
-    if slowest > HOST_SILENCE_MS / 2:
-        return Finding("round trip", said, "close what keeps this computer busy; no USB hub")
-    return Finding("round trip", said)
+        return problem("round trip", "no_ping")
+    slowest = max(ping.host_recv_ns - ping.host_send_ns for ping in board.pings) * 1e-9
+    if slowest > HOST_SILENCE_MS / 2000:
+        return problem("round trip", "slow_answers", slowest_s=slowest)
+    return Finding("round trip", f"{slowest * 1e3:.1f} ms at most")
 
 
 def emergency_stop(board: BoardFacts) -> Finding:
     """See that the emergency stop lets the board arm."""
     if board.stopped:
-        return Finding("emergency stop", "open", "close it, or plug its cable in: it opens too")
+        return problem("emergency stop", "stop_open")
     return Finding("emergency stop", "closed" if board.edges is not None else "not tried")
 
 
@@ -158,9 +151,7 @@ def stuck_gates(board: BoardFacts) -> Finding:
     stuck = board.states.stuck
     if not stuck:
         return Finding("blocked gates", "none")
-    return Finding(
-        "blocked gates", listed(stuck), f"{_BEAM}; an input without a gate reads so too: leave it"
-    )
+    return problem("blocked gates", "gates_blocked", gates_listed=listed(stuck))
 
 
 def flickering_gates(board: BoardFacts) -> Finding:
@@ -168,7 +159,7 @@ def flickering_gates(board: BoardFacts) -> Finding:
     name = "flickering gates"
     if not board.edges:
         if seen := board.states.flickering:
-            return Finding(name, listed(seen), f"{_BEAM}; let everything come to rest")
+            return problem(name, "gates_flicker", gates_listed=listed(seen))
         if board.edges is None:
             return Finding(name, f"none seen at a glance; not recorded: {board.unwatched}")
         return Finding(name, f"none within {board.watched_s:g} s")
@@ -176,19 +167,13 @@ def flickering_gates(board: BoardFacts) -> Finding:
     for edge in board.edges:
         if edge.blocked:
             rises.setdefault(edge.channel, []).append(edge.tick / board.identity.tick_hz)
-    said, mains = [], False
-    for channel, times in sorted(rises.items()):
-        hz = mains_ripple(times)
-        mains |= hz is not None
-        said.append(
-            f"gate {channel} {len(times)} times" + (f", in step with {hz} Hz" if hz else "")
-        )
-    lamp = "keep lamps off the receivers and mains leads off the cables; shield the beams"
-    return Finding(
-        name,
-        "; ".join(said) + f" within {board.watched_s:g} s",
-        lamp if mains else f"{_BEAM}; let everything come to rest",
+    ripples = {channel: mains_ripple(times) for channel, times in sorted(rises.items())}
+    gates = "; ".join(
+        f"gate {channel} {len(rises[channel])} times" + (f", in step with {hz} Hz" if hz else "")
+        for channel, hz in ripples.items()
     )
+    code = "gates_flicker_mains" if any(ripples.values()) else "gates_flicker"
+    return problem(name, code, gates_listed=f"{gates} within {board.watched_s:g} s")
 
 
 def mains_ripple(times_s: Sequence[float]) -> int | None:
@@ -216,44 +201,43 @@ def mains_ripple(times_s: Sequence[float]) -> int | None:
 
 def disk_room(facts: DiskFacts) -> Finding:
     """See that there is room for a session."""
-    said = f"{facts.free / 1e6:.0f} MB free in {facts.folder}"
+    free = facts.free / 1e6
     if facts.free < ROOM:
-        return Finding("disk", said, f"free {ROOM / 1e6:.0f} MB there, or keep sessions elsewhere")
-    return Finding("disk", said)
+        values = {"free_mb": free, "needed_mb": ROOM / 1e6}
+        return problem("disk", "disk_full", folder=facts.folder, **values)
+    return Finding("disk", f"{free:.0f} MB free in {facts.folder}")
 
 
 def session_file(facts: SessionFacts) -> Finding:
     """See that a session file is whole."""
     name = f"session {facts.path}"
     if facts.foreign:
-        return Finding(name, f"not a session: {facts.foreign}", "name a file made by rig run")
+        return problem(name, "no_session", text=facts.foreign)
     if not facts.whole:
-        return Finding(
-            name, f"damaged: {facts.first_trouble}", f"rig recover {facts.path} -o NEW.session"
-        )
+        return problem(name, "session_damaged", text=facts.first_trouble, path=facts.path)
     return Finding(name, f"whole, being written by {facts.writer}" if facts.writer else "whole")
 
 
 def restarts(facts: SessionFacts) -> Finding:
     """See that the board did not restart by itself while the session was made."""
-    told: dict[str, int] = {}
-    for one in facts.restarts:
-        why = causes(one.cause)
-        what = one.when + (f" ({why})" if why else "")
-        if one.label is not None:
-            what = "run {}, attempt {}: ".format(*unpack_label(one.label)) + what
-        told[what] = told.get(what, 0) + 1
+    counts: Counter[str] = Counter()
+    for restart in facts.restarts:
+        why = causes(restart.cause)
+        when = restart.when + (f" ({why})" if why else "")
+        if restart.label is not None:
+            when = "run {}, attempt {}: ".format(*unpack_label(restart.label)) + when
+        counts[when] += 1
     for name, mask in facts.unseen:
         why = causes(mask)
-        told[f"{name}: before it, unseen" + (f" ({why})" if why else "")] = 1
-    if not told:
+        counts[f"{name}: before it, unseen" + (f" ({why})" if why else "")] = 1
+    if not counts:
         return Finding("restarts", "none")
-    said = "; ".join(what + (f", {n} times" if n > 1 else "") for what, n in told.items())
-    return Finding("restarts", said, f"{SUPPLY} Give them one of their own, and check {WIRING}")
+    text = "; ".join(when + (f", {n} times" if n > 1 else "") for when, n in counts.items())
+    return problem("restarts", "board_restarts", text=text)
 
 
 def supply(facts: SessionFacts) -> Finding:
-    """Say how far the board's supply sank while chains fell."""
+    """Say how far the board's supply sank while something fell."""
     if facts.sunk is None:
         return Finding("supply", "not measured")
     name, at_fire, lowest = facts.sunk

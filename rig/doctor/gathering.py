@@ -167,16 +167,9 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
     if state.phase is Phase.IDLE:
         edges, unwatched, stopped = _recorded(device, ((1 << identity.gates) - 1) & ~states.stuck)
     held = unpack_label(state.label) if state.phase is Phase.HOLDING else None
+    shipped = shipped_firmware(identity.board)
     return BoardFacts(
-        identity,
-        shipped_firmware(identity.board),
-        tuple(pings),
-        held,
-        states,
-        edges,
-        WATCH_S,
-        unwatched,
-        stopped,
+        identity, shipped, tuple(pings), held, states, edges, WATCH_S, unwatched, stopped
     )
 
 

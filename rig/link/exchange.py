@@ -9,8 +9,9 @@ from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import DeviceRefusedError
-from rig.link.restarts import SUPPLY, WIRING, Restart
+from rig.link.restarts import Restart
 from rig.link.transcript import Received, Record, Transcript
+from rig.wordings import SUPPLY, WIRING
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-WIRING = "the release's wiring (a coil without a diode resets boards)"
-SUPPLY = "is its supply shared with the magnets?"
 _CAUSES = {1: "power", 2: "reset pin", 4: "brown-out", 8: "watchdog"}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from dataclasses import replace
 
 import pytest
@@ -75,6 +76,7 @@ def edges(gate, times_s):
 )
 def test_what_is_well_needs_no_advice(check, facts):
     assert check(facts).advice == ""
+    assert check(facts).json()["reason_codes"] == []
 
 
 @pytest.mark.parametrize(
@@ -163,6 +165,8 @@ def test_what_is_wrong_is_said_with_what_to_do(check, facts, says, advises):
     assert says in finding.what
     assert advises in finding.advice
     assert "\n  do: " in str(finding)
+    assert finding.json()["reason_codes"] == [finding.reason.json()]
+    assert not re.search(r"[{}]", str(finding))
 
 
 @pytest.mark.parametrize("hz", [50, 60, 100, 120])

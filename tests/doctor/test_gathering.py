@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import re
@@ -188,6 +189,18 @@ def test_a_board_at_a_terminal(doctor):
     assert f"permission for {there.path}: given" in out
     assert "flickering gates: none within 1 s" in out
     assert err == "nothing to do\n"
+
+
+def test_programs_read_codes(doctor, tmp_path):
+    code, out, err = doctor("--json", "--session", tmp_path / "none")
+    missing = json.loads(out)["findings"][-1]
+    assert (code, err) == (4, "1 thing to do\n")
+    assert missing == {
+        "name": f"session {tmp_path / 'none'}",
+        "what": "not there",
+        "advice": "check its name; rig run makes a new one",
+        "reason_codes": [{"code": "session_missing", "values": {}}],
+    }
 
 
 def test_nobody_at_a_port(doctor, terminal, monkeypatch):
