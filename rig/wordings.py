@@ -372,6 +372,20 @@ WORDINGS: dict[str, Wording] = {
         _DOUBT, "board restarted", "{text}",
         f"{SUPPLY} Give them one of their own, and check {WIRING}"),
     "failed": Wording(_DOUBT, "failed", "{text}", "{hint}"),
+    # What an import assumes of another timer's file.
+    "samples": Wording(
+        _REMARK, "samples", "sampled every {period_us:.4g} µs: an edge is known to {u_us:.3g} µs "
+        "at best; state that as priors: {{jitter: ...}} in the protocol if it is more than 2 µs"),
+    "inputs_unused": Wording(_REMARK, "not used", "inputs that are no gate: {inputs}; see --map"),
+    "columns_unused": Wording(_REMARK, "not used", "not used: {columns}"),
+    "no_passage": Wording(
+        _REMARK, "nothing passes", "{input}: nothing passes, {low:.3g} to {high:.3g}"),
+    "crossings": Wording(_REMARK, "level", "{input}: {crossings} crossings of {level:.3g}"),
+    "several_drops": Wording(
+        _REMARK, "several drops", "split into {drops} drops at pauses longer than {pause_s:g} s"),
+    "blocked_level": Wording(
+        _REMARK, "blocked level", "assumed: a {level} signal is a blocked beam, because beams are "
+        "clear at the beginning; --dark {other} reverses this"),
     # Words of people and of old files.
     OPERATOR: Wording(_VOID, "rejected by the operator", "{text}"),
     NOTE: Wording(_REMARK, "note", "note: {text}"),

@@ -16,6 +16,7 @@ from rig.files import require_file
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
+from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.edges_csv import read_edges
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from rig.protocol.protocol import Gate, Protocol
+    from rig.reasons import Reason
     from rig.records import Drop
     from rig.timers.timer_file import TimerFile
 
@@ -36,16 +38,14 @@ def main(arguments: Namespace) -> int:
     if Path(arguments.events).exists():
         require_file(arguments.events)  # and no pipe: it is read more than once
     protocol = reader.read(arguments.protocol)
-    timer: dict[str, object] = {
-        "source": "imported edges",
-        "file": Path(arguments.events).name,
-    }
+    source, events = Path(arguments.protocol).name, Path(arguments.events).name
+    timer: dict[str, object] = {"source": "imported edges", "file": events}
     if is_edge_file(arguments.events):
         drops = read_edges(arguments.events)
         said = ["the project's own format: run,channel,time_s,state"]
     else:
-        drops, channels, said = _understood(protocol, arguments)
-        timer["beams"] = sorted(set(channels.values()))
+        drops, channels, said, notes = _understood(protocol, arguments)
+        timer |= {"beams": sorted(set(channels.values())), **reasons_json(notes)}
     _fits(protocol, drops, arguments.events)
     edges = sum(len(drop.edges) for drop in drops)
     if arguments.dry_run:
@@ -58,15 +58,11 @@ def main(arguments: Namespace) -> int:
         timer["clock_u"] = _relative(arguments.clock_uncertainty)
     now_ns = SystemClock().now_ns()
     with Session.create(
-        arguments.session,
-        protocol.text,
-        Path(arguments.protocol).name,
-        simulated=arguments.simulated,
-        origin=Path(arguments.events).name,
+        arguments.session, protocol.text, source, simulated=arguments.simulated, origin=events
     ) as session:
         session.add_identity(timer, now_ns)
         for drop in drops:
-            session.add_drop(drop, host_ns=None, provenance=Path(arguments.events).name)
+            session.add_drop(drop, host_ns=None, provenance=events)
             session.add_state(drop.run, drop.attempt, RunState.RECORDED, now_ns)
     say(f"{edges} edges of {len(drops)} runs → {arguments.session}")
     return 0
@@ -74,8 +70,8 @@ def main(arguments: Namespace) -> int:
 
 def _understood(
     protocol: Protocol, arguments: Namespace
-) -> tuple[list[Drop], dict[str, int], list[str]]:
-    """Drops of another timer's file, which gate each input is, and what was supposed."""
+) -> tuple[list[Drop], dict[str, int], list[str], list[Reason]]:
+    """Drops of another timer's file, which gate each input is, and what was assumed."""
     found = read_timer_file(arguments.events, arguments.unit)
     channels = _channels(protocol, found, arguments)
     bars = max(one.chain.rods for one in protocol.chains.values())
@@ -83,17 +79,15 @@ def _understood(
     said = [found.kind, *(f"  {name}: {what}" for name, what in found.columns.items())]
     if found.period_s:
         u = found.period_s / math.sqrt(12.0)
-        found.notes.append(
-            f"sampled every {found.period_s * 1e6:.4g} µs: an edge is known to {u * 1e6:.3g} µs at "
-            "best; state that as priors: {jitter: ...} in the protocol if it is more than 2 µs"
-        )
+        period = {"period_us": found.period_s * 1e6, "u_us": u * 1e6}
+        found.notes.append(make_reason("samples", **period))
     idle = [label for label in found.labels if label not in channels]
     if idle:
-        found.notes.append(f"inputs that are no gate: {', '.join(idle)}; see --map")
+        found.notes.append(make_reason("inputs_unused", inputs=", ".join(idle)))
     for note in found.notes:
-        say(note)
+        say(note.text)
     said += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
-    return drops, channels, said
+    return drops, channels, said, found.notes
 
 
 def _told(drops: Sequence[Drop]) -> Iterator[str]:

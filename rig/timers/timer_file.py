@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.errors import InputError
+from rig.reasons import make_reason
 from rig.records import Edge
 from rig.timers.columns import columns_of
 from rig.timers.edges_csv import HEADER, TICK_HZ, drop_of
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterable, Mapping, Sequence
 
+    from rig.reasons import Reason
     from rig.records import Drop
     from rig.timers.columns import Columns
     from rig.timers.passages import Passage
@@ -64,7 +66,7 @@ class TimerFile:
     period_s
         Of samples: no edge is known better than that; `None` for stamps.
     notes
-        What was supposed, a sentence each.
+        What was assumed, a reason each.
     """
 
     kind: str
@@ -72,7 +74,7 @@ class TimerFile:
     runs: dict[int, list[Passage]] = field(default_factory=dict)
     begins: dict[str, bool] = field(default_factory=dict)
     period_s: float | None = None
-    notes: list[str] = field(default_factory=list)
+    notes: list[Reason] = field(default_factory=list)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -126,7 +128,7 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
         found = _of_table(table, unit, problems)
     _parted(found)
     if not found.runs:
-        said = "; ".join(["nothing passes in this file", *found.notes])
+        said = "; ".join(["nothing passes in this file", *map(str, found.notes)])
         problems.add_if_none(1, 1, "", said)
     problems.raise_if_any(_HINT)
     return found
@@ -173,7 +175,7 @@ def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFil
                 found.add(passages, number)
     assert columns is not None
     if columns.unused:
-        found.notes.append(f"not used: {', '.join(columns.unused)}")
+        found.notes.append(make_reason("columns_unused", columns=", ".join(columns.unused)))
     return found
 
 
@@ -233,11 +235,13 @@ def _samples(
         problems.raise_if_any(_HINT)
         crossed = volt_passages(heading, times, volts)
         if crossed is None:
-            found.notes.append(f"{heading}: nothing passes, {volts.min():.3g} to {volts.max():.3g}")
+            low, high = float(volts.min()), float(volts.max())
+            found.notes.append(make_reason("no_passage", input=heading, low=low, high=high))
             continue
         more, found.begins[heading], middle = crossed
         passages += more
-        found.notes.append(f"{heading}: {len(more)} crossings of {middle:.3g}")
+        level = {"input": heading, "level": float(middle)}
+        found.notes.append(make_reason("crossings", crossings=len(more), **level))
         found.period_s = float(np.median(steps)) if steps.size else None
     if passages:
         found.add(passages)
@@ -262,9 +266,7 @@ def _parted(found: TimerFile) -> None:
     """Part drops that stand one after the other in one recording."""
     parts = [part for run in found.runs.values() for part in parted(run)]
     if len(parts) > len(found.runs):
-        found.notes.append(
-            f"taken for {len(parts)} drops, parted by pauses of more than {PAUSE_S} s"
-        )
+        found.notes.append(make_reason("several_drops", drops=len(parts), pause_s=PAUSE_S))
         found.runs = dict(enumerate(parts, 1))
     for number, run in found.runs.items():
         span = (max(one.tick for one in run) - min(one.tick for one in run)) / TICK_HZ
@@ -276,10 +278,7 @@ def _parted(found: TimerFile) -> None:
 
 
 def drops_of(
-    found: TimerFile,
-    channels: Mapping[str, int],
-    bars: int,
-    dark: str | None = None,
+    found: TimerFile, channels: Mapping[str, int], bars: int, dark: str | None = None
 ) -> list[Drop]:
     """Turn what was understood into drops.
 
@@ -321,23 +320,18 @@ def _dark_is_high(found: TimerFile, dark: str | None) -> bool:
         return True
     if dark is None:
         if found.begins:
-            moved = {one.label for one in signals}
-            highs = [level for label, level in found.begins.items() if label in moved]
-            clear = sum(highs) * 2 > len(highs)
-        else:  # edges: the first one of a beam darkens it
+            moved = {passage.label for passage in signals}
+            starts = [high for label, high in found.begins.items() if label in moved]
+        else:  # edges: the first of a beam darkens it
             first = {
-                (number, one.label): one
+                (number, passage.label): passage.high
                 for number, run in found.runs.items()
-                for one in sorted(run, key=lambda one: -one.tick)
+                for passage in sorted(run, key=lambda passage: -passage.tick)
             }
-            clear = sum(not one.high for one in first.values() if one.high is not None) * 2 > len(
-                first
-            )
-        dark = "low" if clear else "high"
-        found.notes.append(
-            f"a {dark} signal is taken for a blocked beam, since beams are clear at the beginning "
-            f"(--dark {'high' if dark == 'low' else 'low'} says otherwise)"
-        )
+            starts = [high is False for high in first.values()]
+        levels = ("low", "high") if sum(starts) * 2 > len(starts) else ("high", "low")
+        dark = levels[0]
+        found.notes.append(make_reason("blocked_level", level=dark, other=levels[1]))
     return dark == "high"
 
 

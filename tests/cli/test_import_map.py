@@ -6,6 +6,7 @@ import shlex
 
 import pytest
 
+from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS
 
 TIMES = "Time (s),D7 (V),D9 (V)\n" + "".join(
@@ -74,3 +75,27 @@ def test_a_pair_that_is_none_is_located(look, typed, message):
     done = look(typed)
     assert done.code == 2
     assert done.err.startswith(message), done.err
+
+
+def test_what_an_import_assumes_is_in_the_session_with_codes(call, tmp_path):
+    events, path = tmp_path / "scope.csv", tmp_path / "s.session"
+    events.write_text(TIMES, "utf-8")
+    done = call(
+        *("import", events, "--protocol", PROTOCOLS / "falling-ball.yaml"),
+        *("--session", path, "--map", "D7 (V)=0"),
+    )
+    assert done.code == 0, done.err
+    with Session.open(path, readonly=True) as session:
+        ((_, timer),) = session.identities()
+    reasons = {reason["code"]: reason["values"] for reason in timer["reason_codes"]}
+    assert reasons["crossings"] == {"crossings": 2, "input": "D9 (V)", "level": 2.5}
+    assert reasons["inputs_unused"] == {"inputs": "D9 (V)"}
+    assert reasons["blocked_level"] == {"level": "high", "other": "low"}
+    assert reasons["samples"]["period_us"] == pytest.approx(1000)
+    assert len(timer["reasons"]) == len(timer["reason_codes"])
+    for sentence in timer["reasons"]:
+        assert f"{sentence}\n" in done.err
+    assert (
+        "assumed: a high signal is a blocked beam, because beams are clear at the beginning; "
+        "--dark low reverses this\n"
+    ) in done.err
