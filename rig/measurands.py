@@ -117,12 +117,12 @@ MEASURANDS: dict[str, Measurand] = {
         ),
         Measurand(
             "gravity_m_s2", "g", "g", "acceleration",
-            "acceleration of the falling chain",
+            "acceleration of the free fall",
             "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
         ),
         Measurand(
             "acceleration_m_s2", "a", "a", "acceleration",
-            "acceleration of the object down its track, friction and all",
+            "acceleration of the object down its track, friction included",
             "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
         ),
     )

@@ -78,9 +78,9 @@ def _understood(
     drops = drops_of(found, channels, bars, arguments.dark)
     said = [found.kind, *(f"  {name}: {what}" for name, what in found.columns.items())]
     if found.period_s:
-        u = found.period_s / math.sqrt(12.0)
-        period = {"period_us": found.period_s * 1e6, "u_us": u * 1e6}
-        found.notes.append(make_reason("samples", **period))
+        period_us = found.period_s * 1e6
+        u_us = period_us / math.sqrt(12.0)
+        found.notes.append(make_reason("samples", period_us=period_us, u_us=u_us))
     idle = [label for label in found.labels if label not in channels]
     if idle:
         found.notes.append(make_reason("inputs_unused", inputs=", ".join(idle)))

@@ -42,6 +42,7 @@ _MEANINGS = {
     "they agree",
     "channel": "gate",
     "height_m": "of the gate's beam",
+    "gates.csv: speed_m_s": "of the object at the gate",
     "interval_s": "since the object passed the gate before",
     "time_s": "time since the release (imported edges: since a whole second)",
     "state": "of the run; in edges.csv 1 is a blocked beam, 0 a clear one",
@@ -189,15 +190,15 @@ def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]
     described = {name: _columns(rows) for name, rows in tables.items()}
     described["edges.csv"] = ["run", "channel", "time_s", "state"]
     for name, columns in sorted(described.items()):
-        lines += ["", name]
-        lines += [f"  {column}{_describe(column)}" for column in columns]
+        lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"
 
 
-def _describe(column: str) -> str:
+def _describe(table: str, column: str) -> str:
     if column.endswith(("_u", "_U95")):
         return ""
     unit = next((unit for end, unit in _UNITS.items() if column.endswith(end)), "")
-    meaning = _meanings().get(column, "")
-    told = " ".join(filter(None, [f"[{unit}]" if unit else "", meaning]))
-    return f": {told}" if told else ""
+    meanings = _meanings()
+    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
+    words = " ".join(filter(None, [unit and f"[{unit}]", meaning]))
+    return words and f": {words}"

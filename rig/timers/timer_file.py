@@ -329,9 +329,8 @@ def _dark_is_high(found: TimerFile, dark: str | None) -> bool:
                 for passage in sorted(run, key=lambda passage: -passage.tick)
             }
             starts = [high is False for high in first.values()]
-        levels = ("low", "high") if sum(starts) * 2 > len(starts) else ("high", "low")
-        dark = levels[0]
-        found.notes.append(make_reason("blocked_level", level=dark, other=levels[1]))
+        dark, other = ("low", "high") if sum(starts) * 2 > len(starts) else ("high", "low")
+        found.notes.append(make_reason("blocked_level", level=dark, other=other))
     return dark == "high"
 
 

@@ -287,6 +287,8 @@ class _Journey:
             text = file.read_text("utf-8")
             if met := _PYTHON.search(text):
                 self.fault("export", f"{file.name} says {_around(text, met)}")
+            if file.suffix == ".txt":
+                self.read("export", text.replace(self.scene.port, ""))
         latest = {"runs.csv": found["runs"], "summary.csv": found["summary"]}
         for name, records in latest.items():
             with (place / name).open(encoding="utf-8", newline="") as file:
