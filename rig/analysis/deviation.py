@@ -17,6 +17,7 @@ import numpy as np
 from rig.analysis.components import above
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
 from rig.analysis.result import Deviation
+from rig.analysis.stretch import STRETCHES
 from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def supposed(model: DropModel) -> Supposed:
     if model.protocol.drag is None and "drag" in at:
         absent[at["drag"]] = 1.0
     if struck:
-        absent[at["strings"]] = 1.0
+        for name in ("strings", "late", *STRETCHES, "usual impulses", "usual departures"):
+            absent[at[name]] = 1.0
         alpha, block = abs(model.guesses["impact"].alpha), at["impulses"]
         bounces = model.components.bounce * alpha / above(block.stop - block.start)
         sd = at.sd[block]  # zero where impulses are known exactly: then none bounce either

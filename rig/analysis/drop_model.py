@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,14 @@ import numpy as np
 from rig.analysis.align import Pairing, split
 from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
+from rig.analysis.stretch import (
+    IMPULSE_MODES,
+    MODES,
+    STRETCHES,
+    StretchModes,
+    impulse_modes,
+    stretch_modes,
+)
 from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SideColumns, Unknowns, alone, side_columns
@@ -89,6 +98,7 @@ class DropModel:
             record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
         }
         posts = protocol.gates.posts
+        self._gate_heights = [gate.height for gate in protocol.gates.gates]
         self._post = np.array([posts.index(gate.side) for gate in protocol.gates.gates])
         self._steepest = max(slopes.values(), default=0.0)
         # A beam is off by as much for a chain of less tilted rods, which shows less.
@@ -128,6 +138,9 @@ class DropModel:
             unknowns.add(f"{role} release", "edges", ANYTHING)
             unknowns.add(f"{role} hang", "start height", components.hang)
             unknowns.add(f"{role} rods", "spacing", places)
+            if self._steepest:
+                aside = protocol.priors.off_centre * self._tilts[role] * self._steepest
+                unknowns.add(f"{role} off centre", "beam offsets", aside)
             unknowns.add(f"{role} width", "width", chain.width_u)
             if not free_only and chain.chain.rods > 1:
                 sd = components.swing * swing_sd(chain.chain, protocol)
@@ -151,7 +164,31 @@ class DropModel:
                 protocol.priors.impulse_floor,
             )
             unknowns.add("strings", "strings", pull)
+            self._add_discrepancy(unknowns, rods)
         return unknowns
+
+    def _add_discrepancy(self, unknowns: Unknowns, rods: int) -> None:
+        """Name what the equations leave out, and that is alike in all drops of a condition.
+
+        Drops of one rig leave the equations in the same way: taken for independent of each other
+        they would average away.
+        """
+        priors, components = self.protocol.priors, self.components
+        alpha = self.records["impact"].alpha
+        impulse = components.usual_impulses * math.hypot(
+            priors.impulses * alpha, priors.impulse_floor
+        )
+        unknowns.add("usual impulses", "single impulses", [impulse] * IMPULSE_MODES)
+        departure = components.usual_departures * priors.departure
+        unknowns.add("usual departures", "departures", [departure] * rods)
+        # A half of its variance is the same in all drops.
+        size = priors.stretch * math.hypot(alpha, priors.impulse_floor)
+        size *= components.stretch * self.records["impact"].chain.chain.length
+        for name in STRETCHES:
+            unknowns.add(name, "stretch", [math.sqrt(0.5) * size] * MODES)
+        # No edge tells it; where strings do not bounce, there is none.
+        bounce = components.bounce / priors.last_impulse if priors.last_impulse else 1.0
+        unknowns.add("late", "late pull", bounce * priors.late_pull)
 
     def _columns(self, role: str) -> SideColumns:
         """Leave out what the other side alone depends on."""
@@ -172,7 +209,9 @@ class DropModel:
         tight = replace(self.protocol.priors, strings=0.0)
         other.protocol = replace(self.protocol, priors=tight)
         impulse = min(_ALIKE, self.components.impulse)
-        other.components = replace(self.components, impulse=impulse, bounce=0.0, landed=0.0)
+        other.components = replace(
+            self.components, impulse=impulse, bounce=0.0, landed=0.0, stretch=0.0
+        )
         other.unknowns = other._unknowns()  # other priors, and the same paths
         return other
 
@@ -282,6 +321,7 @@ class DropModel:
             places -= x[at["impact swing"]] * self._drawn()
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
         gains += x[at["strings"]] * alone(places.size)
+        gains += impulse_modes(places.size) @ x[at["usual impulses"]]
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
@@ -309,6 +349,69 @@ class DropModel:
         record = self.records["impact"]
         return drawn(lever(record.chain.chain), self.protocol, -record.strikes)
 
+    def late_pull(self) -> tuple[float, float]:
+        """What of the last impulse may come too late for the lowest beam to show it.
+
+        Returns
+        -------
+        pull, way
+            How much faster all of it makes the top rod, m/s, and what way is left below the beam,
+            m; by the nominal fall.
+        """
+        record, hits = self.records["impact"], self._nominal.hits
+        if hits is None or hits.ratio.size < 2:
+            return 0.0, 0.0
+        lowest = min(self._gate_heights[train.gate] for train in record.trains)
+        way = min(lowest, float(np.diff(record.strikes[-2:])[0]))
+        return abs(record.alpha) * float(hits.ratio[-2] * hits.arrival[-2]), max(way, 0.0)
+
+    def stretch(self, x: Array) -> Array:
+        """Size of each mode of the stretch, m."""
+        found: Array = sum((x[self.unknowns[name]] for name in STRETCHES), np.zeros(MODES))
+        return found
+
+    def stretch_modes(self, rods: Index, levels: Array) -> StretchModes:
+        """Return the modes of the stretch at some rods; zero where one rod strikes.
+
+        When the chain is at a level is taken from the nominal fall: which functions they are is a
+        choice, and with this one the equations are linear in them.
+
+        Parameters
+        ----------
+        levels
+            Of the reference point, m.
+        """
+        nominal = self._nominal
+        last = nominal.time.size - 2
+        if last < 1:
+            nothing = np.zeros((levels.size, MODES))
+            return StretchModes(nothing, nothing)
+        return stretch_modes(nominal, rods / last, nominal.times(levels))
+
+    @cached_property
+    def _nominal(self) -> Trajectory:
+        """The fall of the chain that strikes, as the protocol has it."""
+        record, protocol = self.records["impact"], self.protocol
+        assert record.ratios is not None
+        start, gains = max(protocol.drop.value, _ABOVE), np.full(record.strikes.size, record.alpha)
+        return struck_trajectory(
+            0.0, start, protocol.gravity.value, gains, record.ratios, record.strikes,
+            self._kappa, record.air,
+        )  # fmt: skip
+
+    @cached_property
+    def _after(self) -> Array:
+        """1 for expected edges after the first strike, 0 for those before."""
+        nominal = self._nominal
+        times = nominal.times(self.expected["impact"].levels)
+        return np.where(nominal.loose(times) > 0.0, 1.0, 0.0)
+
+    @cached_property
+    def _stretched(self) -> Array:
+        """The modes of the stretch at each expected edge, shape ``(edges, MODES)``."""
+        edges = self.expected["impact"]
+        return self.stretch_modes(edges.rods, edges.levels).way
+
     def levels(self, role: str, x: Array) -> list[Array]:
         """Where the reference point should be at every expected edge of each train, m."""
         return split(self.all_levels(role, x), self.expected[role].ends)
@@ -328,11 +431,15 @@ class DropModel:
         found -= x[at[f"{role} rods"]][edges.rods]
         if "ripple" in at:
             found -= self._tilts[role] * edges.turn * x[at["ripple"]][edges.gate]
+        if f"{role} off centre" in at:
+            found -= edges.turn * x[at[f"{role} off centre"]]
         if f"{role} swing" in at:
             found += x[at[f"{role} swing"]] * edges.drawn
         if role == "impact":
             found -= edges.alone * x[at["top"]][0]
             found -= edges.landed * x[at["landed"]][0]
+            found -= self._after * x[at["usual departures"]][edges.rods]
+            found += self._stretched @ self.stretch(x)
         return found
 
     def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
@@ -445,11 +552,17 @@ class DropModel:
         ]
         if "ripple" in at:
             columns.append((at["ripple"].start + seen.gate, self._tilts[role] * seen.turn))
+        if f"{role} off centre" in at:
+            columns.append((at[f"{role} off centre"].start, seen.turn))
         if f"{role} swing" in at:
             columns.append((at[f"{role} swing"].start, -seen.drawn))
         if role == "impact":
             columns.append((at["top"].start, seen.alone.astype(np.float64)))
             columns.append((at["landed"].start, seen.landed))
+            columns.append((at["usual departures"].start + seen.rods, self._after[seen.pick]))
+            modes = -self._stretched[seen.pick].T
+            for name in STRETCHES:
+                columns += [(at[name].start + n, mode) for n, mode in enumerate(modes)]
         edges = seen.times.size
         places = np.empty((len(columns), edges), dtype=np.intp)
         values = np.empty((len(columns), edges))

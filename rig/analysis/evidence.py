@@ -3,7 +3,7 @@
 A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has determined
 γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
 largest (MacKay 1992). What was stated, S, is the scale of a half-Cauchy prior of s (Gelman 2006),
-by an EM step: one more member, whose square is the harmonic mean of S² and s². Where nothing is
+by an EM step: two more members, whose square is the harmonic mean of S² and s². Where nothing is
 determined, s stays as stated, and the less is, the nearer it stays; but what is stated much too
 large draws no scatter up that many members tell. Where several components make up one variance,
 each is multiplied by the share of Σx² that it explains (an EM step too), which keeps all of them
@@ -34,10 +34,24 @@ if TYPE_CHECKING:
 
 Size = TypeVar("Size", float, "Array")
 
-STATED_WEIGHT = 1.0
-"""Members that a stated uncertainty counts for."""
-_MEMBERS = ("gates", "rods", "beam", "hang", "swing")
+STATED_WEIGHT = 2.0
+"""Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
+_UNLIKE = ("usual_departures", "stretch")
+"""How far chains leave the equations."""
+_MEMBERS = (*_UNLIKE, "usual_impulses", "gates", "rods", "beam", "hang", "swing")
 _EDGES = ("jitter", "floor", "departure", "few")
+_DOUBTED = 2.0
+"""Times the share of the stated departures that is found is the least share of every other scale:
+once or thrice this moves no coverage by more than a point."""
+_KINDS = {
+    "beams": "gates",
+    "ripple": "beam",
+    " rods": "rods",
+    "usual stretch": "stretch",
+    "usual impulses": "usual_impulses",
+    "usual departures": "usual_departures",
+}
+"""By how the name of a block of the session's unknowns ends: which scale its members tell."""
 _BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
@@ -80,9 +94,8 @@ class Evidence:
             Estimates and variances in units of the prior uncertainties `sd`.
         """
         # Clock, gravity, drop and air are one number each: one number has no scatter to estimate.
-        kind = {"beams": "gates", "ripple": "beam"}.get(name)
-        if name.endswith(" rods"):
-            kind = "rods"
+        block = name.partition(" at ")[0]
+        kind = next((kind for end, kind in _KINDS.items() if block.endswith(end)), None)
         if kind is not None:
             self._count(kind, y[sd > 0.0], v[sd > 0.0])
 
@@ -93,6 +106,8 @@ class Evidence:
             self._count("hang", y[at[f"{role} hang"]], v[at[f"{role} hang"]])
         if "free swing" in at:  # once rods have struck, what a chain does else looks like it
             self._count("swing", y[at["free swing"]], v[at["free swing"]])
+        if "stretch" in at:
+            self._count("stretch", y[at["stretch"]], v[at["stretch"]])
         if "impulses" in at:
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
             # Back to α², for drops of different α have different units.
@@ -130,24 +145,32 @@ class Evidence:
             # Where no rod is off its chain, few are not either: the least of it explains nothing.
             self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
             new["few"] = LEAST_SHARE * self.stated.few
-        # Where rods leave their chain, a few drops that happen to be alike show nothing of strings.
-        parted = max(LEAST_SHARE, min(1.0, parted))
-        for kind, found in self._squares.items():
-            if not getattr(self.stated, kind):
-                continue  # known exactly, so that nothing scatters
-            stated = _member((getattr(self.stated, kind) / getattr(old, kind)) ** 2, 1.0)
-            weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
-            told = weight + self._determined[kind]
-            self.degrees[kind] = max(STATED_WEIGHT, told)
-            share = (weight * stated + found) / told
-            least = LEAST_SHARE * getattr(self.stated, kind)
-            new[kind] = max(getattr(old, kind) * share**0.5, least)
+        for kind in _UNLIKE:
+            self._settle(kind, LEAST_SHARE, new)
+        # Where chains leave the equations, whatever else is found may be how they do that.
+        parted = max([parted, *(new[kind] for kind in _UNLIKE if self._determined[kind] > 0.0)])
+        parted = max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
+        for kind in _MEMBERS[len(_UNLIKE) :]:
+            self._settle(kind, parted, new)
+        for name in ("jitter", "floor"):
+            new[name] = max(new[name], parted * getattr(self.stated, name))
         if self._impulses:
             size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
             kinds = np.stack([size, np.ones_like(size), alone])
             self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new, parted)
         self.components = replace(old, landed=parted, **new)
         return self
+
+    def _settle(self, kind: str, share_at_least: float, new: dict[str, float]) -> None:
+        """Estimate the scale of a kind from its members."""
+        old, beforehand = getattr(self.components, kind), getattr(self.stated, kind)
+        if not beforehand:
+            return  # known exactly, so that nothing scatters
+        weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
+        degrees = weight + self._determined[kind]
+        self.degrees[kind] = max(STATED_WEIGHT, degrees)
+        squares = weight * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
+        new[kind] = max(old * (squares / degrees) ** 0.5, share_at_least * beforehand)
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
         """Sort edges by what scatters alike: at about the same speed, with as many rods falling.

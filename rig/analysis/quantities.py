@@ -12,6 +12,7 @@ import numpy as np
 from rig.analysis.adjust import uncertainty
 from rig.analysis.deviation import deviation_alone
 from rig.analysis.result import Measured
+from rig.analysis.stretch import STRETCHES
 from rig.analysis.swing import lever
 from rig.protocol.protocol import GUESSED
 
@@ -36,6 +37,9 @@ SCALES = frozenset(
         "single impulses",
         "top rod",
         "strings",
+        "stretch",
+        "departures",
+        "late pull",
         "contact",
     }
 )
@@ -127,17 +131,51 @@ class Adjusted:
         """Whether a free chain falls beside one that strikes."""
         return {"impact", "free"} <= set(self.model.records)
 
-    @cached_property
+    @property
     def speed(self) -> Value:
         """V as the top rod passes the contact level."""
-        path = self.model.trajectory("impact", self.x)
-        return path.arrival, self.model.spread("impact", path.d_arrival)
+        return self._arrival[0]
 
-    @cached_property
+    @property
     def hit(self) -> Value:
         """When that is."""
-        path = self.model.trajectory("impact", self.x)
-        return float(path.time[-1]), self.model.spread("impact", path.d_time[-1])
+        return self._arrival[1]
+
+    @cached_property
+    def _arrival(self) -> tuple[Value, Value]:
+        """V and its moment, by the equations' path, and by what strings did besides.
+
+        The stretch has brought the top rod w ahead, at its rate w′: it arrives e = w/(V + w′)
+        earlier, and slower by what it gains in that time. A late pull acts over the way below the
+        lowest beam. Both are small, and what is of second order in them is left out.
+        """
+        model, x, at = self.model, self.x, self.model.unknowns
+        path = model.trajectory("impact", x)
+        speed, d_speed = path.arrival, model.spread("impact", path.d_arrival)
+        hit, d_hit = float(path.time[-1]), model.spread("impact", path.d_time[-1])
+        if "stretch" in at:
+            strikes = model.records["impact"].strikes
+            modes = model.stretch_modes(np.array([strikes.size - 1]), -strikes[-1:])
+            way, rate, sizes = modes.way[0], modes.rate[0], model.stretch(x)
+            fast, d_fast = speed + float(rate @ sizes), d_speed.copy()
+            early = float(way @ sizes) / fast
+            d_early = np.zeros(x.size)
+            for name in STRETCHES:
+                d_fast[at[name]] += rate
+                d_early[at[name]] = way / fast
+            d_early -= early / fast * d_fast
+            speed, d_speed = fast - path.gravity * early, d_fast - path.gravity * d_early
+            d_speed[at["gravity"]] -= early
+            hit, d_hit = hit - early, d_hit - d_early
+        if "late" in at:
+            pull, way_left = model.late_pull()
+            late = pull * float(x[at["late"]][0])
+            d_late = np.zeros(x.size)
+            d_late[at["late"]] = pull
+            hit -= 0.5 * way_left * late / speed**2
+            d_hit = d_hit - 0.5 * way_left * (d_late - 2.0 * late / speed * d_speed) / speed**2
+            speed, d_speed = speed + late, d_speed + d_late
+        return (speed, d_speed), (hit, d_hit)
 
     @cached_property
     def skew(self) -> Value:
@@ -231,7 +269,7 @@ def _fall_time(drop: Adjusted) -> Value | None:
         return None
     begin = float(drop.model.trajectory("impact", drop.x).time[0])
     duration = drop.hit[1].copy()
-    duration[drop.model.unknowns["impact release"]] = 0.0  # it moves both ends
+    duration[drop.model.unknowns["impact release"]] -= 1.0
     return drop.hit[0] - begin, duration
 
 

@@ -33,6 +33,7 @@ _DEGREES = {
     "swing": "swing",
     "single impulses": "impulse",
     "top rod": "departure",
+    "stretch": "stretch",
 }
 """Budget line → the component whose degrees of freedom it has."""
 
@@ -55,7 +56,11 @@ class Budgets:
         self.joint = joint
         size = len(joint.shared)
         self._others: dict[str, Array] = {}
+        # Those of another drop's condition count too, by what they tell of the rest.
+        self._common: dict[str, Index] = {}
         for drop in joint.drops:
+            for name, rows in _common(drop).items():
+                self._common[name] = np.union1d(self._common.get(name, rows), rows)
             place = np.ix_(drop.here, drop.here)
             for name, rows in _groups(drop).items():
                 total = self._others.setdefault(name, np.zeros((size, size)))
@@ -63,22 +68,20 @@ class Budgets:
 
     def measured(self, drop: JointDrop) -> dict[str, Measured]:
         """Everything the scene lets one measure, by its JSON name."""
-        lines = _groups(drop), _common(drop)
+        own = _groups(drop)
         return {
-            name: self._measured(drop, lines, value, gradient * drop.model.unknowns.sd)
+            name: self._measured(drop, own, value, gradient * drop.model.unknowns.sd)
             for name, (value, gradient) in measurands(drop.model, drop.x).items()
         }
 
     def gates(self, drop: JointDrop) -> tuple[GatePassage, ...]:
         """How one object passed each gate."""
-        lines, sd = (_groups(drop), _common(drop)), drop.model.unknowns.sd
+        groups, sd = _groups(drop), drop.model.unknowns.sd
         return gate_passages(
-            drop, drop.x, lambda value, slopes: self._measured(drop, lines, value, slopes * sd)
+            drop, drop.x, lambda value, slopes: self._measured(drop, groups, value, slopes * sd)
         )
 
-    def _measured(
-        self, drop: JointDrop, places: tuple[Places, Places], value: float, gradient: Array
-    ) -> Measured:
+    def _measured(self, drop: JointDrop, groups: Places, value: float, gradient: Array) -> Measured:
         """Put value and uncertainty together; `gradient` is in units of the prior uncertainties."""
         by_root = gradient[drop.own] @ drop.inverse
         h = np.zeros(len(self.joint.shared))
@@ -90,12 +93,12 @@ class Budgets:
         own = drop.inverse @ by_root - drop.gain @ common[drop.here]
         variance = float(by_root @ by_root) + float(shared @ shared)
         lines: dict[str, float] = {}
-        for name, rows in places[0].items():
+        for name, rows in groups.items():
             # The sum over all drops was made once; this drop's share is replaced by its own rows.
             here = drop.gain[rows] @ common[drop.here]
             others = float(common @ self._others[name] @ common) - float(here @ here)
             lines[name] = float(own[rows] @ own[rows]) + max(0.0, others)
-        for name, rows in places[1].items():
+        for name, rows in self._common.items():
             lines[name] = lines.get(name, 0.0) + float(common[rows] @ common[rows])
         # What no prior explains comes from the edges; rounding may leave less than nothing.
         lines["edges"] = lines.get("edges", 0.0) + max(0.0, variance - sum(lines.values()))

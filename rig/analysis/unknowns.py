@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import above
+from rig.analysis.stretch import STRETCHES, impulse_modes
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 
 if TYPE_CHECKING:
@@ -142,7 +143,8 @@ def side_columns(
     at = {name: slice(begin, end) for name, begin, end in places}
     others = ["impact " if role == "free" else "free "]
     if role == "free":
-        others += ["alpha", "impulses", "contact", "strike", "top", "strings", "landed"]
+        others += ["alpha", "impulses", "contact", "strike", "top", "strings", "landed", "late"]
+        others += [*STRETCHES, "usual impulses", "usual departures"]
     mine = np.ones(places[-1][2], dtype=np.bool_)
     for name, block in at.items():
         mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
@@ -175,6 +177,7 @@ def _path(
         found[gains, at["alpha"]] = 1.0
         found[COMMON + row, at["impulses"].start + row] = 1.0
         found[gains, at["strings"].start] = alone(rods)
+        found[gains, at["usual impulses"]] = impulse_modes(rods)
         found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
         found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
         found[-1, at["top"]] = 1.0
@@ -231,7 +234,9 @@ def _names(model: DropModel) -> dict[str, slice]:
     found = {name: at[name] for name in _RIG if name in at and name not in measured}
     for role, record in model.records.items():
         if role == "impact":
-            for name in ("contact", "strings"):
+            own = f"{record.chain.name} usual departures at {record.condition}"
+            found[own] = at["usual departures"]
+            for name in ("contact", "strings", "usual stretch", "usual impulses"):
                 found[f"{name} at {record.condition}"] = at[name]
         found |= {f"{record.chain.name} {what}": at[f"{role} {what}"] for what in _CHAIN}
     return found

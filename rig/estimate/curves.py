@@ -10,6 +10,7 @@ import numpy as np
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.fit import Fit
 from rig.analysis.free_flight import squared_after
+from rig.analysis.quantities import Adjusted
 from rig.analysis.swing import drawn, lever
 from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
@@ -99,9 +100,9 @@ def drop_curves(
 ) -> DropCurves:
     """Follow one drop from release to the top rod's hit, with bands."""
     model, x = drop.model, drop.x
-    end = model.trajectory("impact", x)
+    begin = model.trajectory("impact", x).time[0]
     heights = np.linspace(_top(model, x) - 1e-6, 0.0, POINTS)
-    times = np.linspace(0.0, float(end.time[-1] - end.time[0]), POINTS)
+    times = np.linspace(0.0, float(Adjusted(model, x).hit[0] - begin), POINTS)
     separation = None
     if "free" in model.records:
         separation = Curve(
@@ -132,8 +133,17 @@ def _squares(model: DropModel, x: Array, heights: Array) -> Array:
     path = model.trajectory("impact", x)
     level = heights - _places(model, x, "impact")[-1]
     level -= _alone(model, x, level) - _turned(model, x, "impact", level)
+    ahead, faster = _stretched(model, x, level)
+    pull, way = model.late_pull()
+    if way > 0.0:  # it comes by and by, below the lowest beam
+        late = pull * float(x[model.unknowns["late"]][0])
+        faster = faster + late * np.clip(1.0 - heights / way, 0.0, 1.0)
+    level += ahead
     leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
-    return squared_after(path.height[leg] - level, path.speed[leg], path.gravity, path.kappas(leg))
+    distance = path.height[leg] - level
+    squares = squared_after(distance, path.speed[leg], path.gravity, path.kappas(leg))
+    found: Array = squares + (2.0 * np.sqrt(np.maximum(squares, 0.0)) + faster) * faster
+    return found
 
 
 def _separations(model: DropModel, x: Array, times: Array) -> Array:
@@ -141,11 +151,20 @@ def _separations(model: DropModel, x: Array, times: Array) -> Array:
     struck, free = model.trajectory("impact", x), model.trajectory("free", x)
     level = struck.heights(struck.time[0] + times)[0]
     apart = _places(model, x, "free")[-1] - _places(model, x, "impact")[-1]
-    apart = apart - _alone(model, x, level)
+    apart = apart - _alone(model, x, level) + _stretched(model, x, level)[0]
     beside = free.heights(free.time[0] + times)[0]
     apart = apart + _turned(model, x, "impact", level) - _turned(model, x, "free", beside)
     found: Array = beside - level + apart
     return found
+
+
+def _stretched(model: DropModel, x: Array, level: Array) -> tuple[Array, Array]:
+    """How far ahead strings have pulled the top rod, and how much faster it is for that."""
+    if "stretch" not in model.unknowns:
+        return np.zeros_like(level), np.zeros_like(level)
+    top = np.full(level.shape, model.records["impact"].chain.chain.rods - 1)
+    modes, sizes = model.stretch_modes(top, level), model.stretch(x)
+    return modes.way @ sizes, modes.rate @ sizes
 
 
 def _turned(model: DropModel, x: Array, role: str, level: Array) -> Array:

@@ -166,7 +166,16 @@ def _gates(protocol: Protocol) -> list[str]:
     return lines
 
 
-_STRUCK = {"departure", "last_rods", "impulses", "impulse_floor", "last_impulse", "strings"}
+_STRUCK = {
+    "departure",
+    "last_rods",
+    "impulses",
+    "impulse_floor",
+    "last_impulse",
+    "strings",
+    "stretch",
+    "late_pull",
+}
 """Priors of a chain that strikes something."""
 
 
@@ -200,6 +209,7 @@ def _unused(protocol: Protocol) -> set[str]:
         "side": protocol.two_chains,
         "drag": protocol.drag is None,
         "beam_offset": any(one.tilt_deg for one in chains),
+        "off_centre": any(one.tilt_deg for one in chains),
         "swing": protocol.surface is not None and any(one.chain.rods > 1 for one in chains),
     } | dict.fromkeys(_STRUCK, protocol.surface is not None)
     return {name for name, is_needed in needed.items() if not is_needed}

@@ -261,6 +261,7 @@ class Priors:
     hang: float = 0.3e-3
     side: float = 0.5e-3
     beam_offset: float = 1.0e-3
+    off_centre: float = 1.0e-3
     swing: float = 0.1
     departure: float = 0.25e-3
     last_rods: float = 0.5e-3
@@ -268,6 +269,8 @@ class Priors:
     impulse_floor: float = 0.003
     last_impulse: float = 0.3
     strings: float = 0.5
+    stretch: float = 0.02
+    late_pull: float = 0.25
     drag: float = 0.05
 
 

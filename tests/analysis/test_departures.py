@@ -86,19 +86,22 @@ def crooked() -> Analysis:
     return analysis([shaken(one, seed) for seed, one in enumerate(cases(EIGHT, MILD, 5))])
 
 
-def test_how_far_rods_are_off_is_learned_and_what_falls_before_is_none_the_worse(straight, crooked):
+def test_how_far_rods_are_off_is_learned_and_no_other_scale_is_believed_smaller(straight, crooked):
     found = crooked
     assert all(run.verdict in GOOD and run.learned for run in found.runs)
     assert found.joint is not None
     components = found.joint.components
     assert components.departure == pytest.approx(DEPARTURE, rel=0.15)
-    assert components.floor < 10e-6  # free chain and first edges scatter as they did
+    # Where chains leave the equations, edges tell no other scale below what is stated.
+    assert components.floor == STATED.floor
     # Pulls that happen to be alike show nothing of strings where rods are off their chain.
     assert straight.joint is not None
     assert straight.joint.components.impulse < 0.5 * STATED.impulse
     assert components.impulse >= STATED.impulse
     for one, run, still in zip(cases(EIGHT, MILD, 5), found.runs, straight.runs, strict=True):
-        assert run.quantities["release_skew_s"].u < 3.0 * still.quantities["release_skew_s"].u
+        by_itself = one.analyze().quantities["release_skew_s"].u
+        skew = run.quantities["release_skew_s"].u
+        assert still.quantities["release_skew_s"].u < skew < by_itself
         for name in ("separation_m", "speed_m_s", "release_skew_s", "fall_time_s"):
             measured = run.quantities[name]
             assert abs(measured.value - getattr(one.truth, name)) < 2.0 * measured.expanded, name
