@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.equations import Linearization, linearize, scaled, with_kept_slopes
+from rig.analysis.equations import Linearization, linearize, scaled
 from rig.analysis.square_root import EquationRows, Root, square_root
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ DONE = 1e-3
 PATIENT = 6
 """Steps after which one back is no part of finding the way: an edge at the very moment of an impact
 has a slope on either side, and steps go to and fro over the best place, which lies between them."""
-_KEPT = 0.1  # of the step before, beyond which a step with its slopes is none
 _DAMPED = 1e-3  # λ of Levenberg and Marquardt with which shorter steps begin
 _FAINT = 1e-12  # λ that does nothing in a double's digits
 _FASTER = 10.0  # by which λ grows with each step taken back
@@ -40,7 +39,6 @@ _GAIN = 0.25  # of what the slopes promise, which a step has to bring
 _TRIED = 0.01  # of a step, after which its bend is looked at
 _BENT = 0.75  # of a step's length: what bends more is shortened
 _UNSEEN = 1.0  # standard uncertainties: where a longer step leads is looked at
-_NEAR_BY = 10.0  # standard uncertainties: so long a step slopes of an adjustment before allow
 _STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 _MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
 _NO_ROOT = Root(np.zeros((0, 0)), np.zeros(0))
@@ -64,9 +62,6 @@ class Estimate:
         Whether the steps came to an end.
     rows
         What the edges leave over, and its slopes, of each side.
-    near
-        With the slopes of all edges: what an adjustment of the same edges that begins here may
-        begin with. Nothing where they scatter more than assumed.
     """
 
     x: Array
@@ -77,7 +72,6 @@ class Estimate:
     scatter: float
     settled: bool = True
     rows: Mapping[str, EquationRows] = field(default_factory=dict, repr=False)
-    near: Linearization | None = field(default=None, repr=False)
 
     @cached_property
     def inverse(self) -> Array:
@@ -101,7 +95,7 @@ class Estimate:
     def kept(self) -> Estimate:
         """Return the same in little memory."""
         rows = {role: one.triangle() for role, one in self.rows.items()}
-        return replace(self, rows=rows, near=None)
+        return replace(self, rows=rows)
 
 
 def adjust(
@@ -111,7 +105,6 @@ def adjust(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
-    near: Linearization | None = None,
     *,
     rough: bool = False,
 ) -> Estimate:
@@ -131,8 +124,6 @@ def adjust(
         How short a step is the last, see `length`.
     steps
         How many there are at most.
-    near
-        Of the same edges about a point near by, see `Estimate`.
     rough
         Whether only the way matters, and edges are weighed as they were.
     """
@@ -140,11 +131,8 @@ def adjust(
     def about(at: Array, inflation: float) -> Linearization:
         return linearize(model, matches, at, inflation)
 
-    def again(at: Array, inflation: float, near: Linearization) -> Linearization:
-        return with_kept_slopes(model, matches, at, inflation, near, rough=rough)
-
     sd = model.unknowns.sd
-    return least_squares(about, sd, x, centre, done, steps, again, near, rough=rough)
+    return least_squares(about, sd, x, centre, done, steps, rough=rough)
 
 
 @np.errstate(all="ignore")  # a step may lead to where there is no number, and is taken back
@@ -155,8 +143,6 @@ def least_squares(
     centre: Array | None = None,
     done: float = DONE,
     steps: int = STEPS,
-    again: Callable[[Array, float, Linearization], Linearization] | None = None,
-    near: Linearization | None = None,
     *,
     rough: bool = False,
 ) -> Estimate:
@@ -171,11 +157,8 @@ def least_squares(
         Observations about a point, if they scatter so many times as assumed.
     sd
         Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
-    x, centre, done, steps, near, rough
+    x, centre, done, steps, rough
         As in `adjust`.
-    again
-        The same about a point near by, with the slopes that they had before: much quicker, and as
-        good while steps get shorter and shorter.
 
     Returns
     -------
@@ -184,25 +167,18 @@ def least_squares(
     """
     y = scaled(x, sd)
     prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
-    search = _Search(linearize, again, sd, prior)
+    search = _Search(linearize, sd, prior)
     here: _Point | None = None
-    kept, most, limit = near, _NEAR_BY, math.inf
+    limit = math.inf
     share, damping, moved = 1.0, 0.0, 0.0
     settled, ahead = False, np.zeros_like(y)
     for step in range(steps):
-        point = search.rooted(search.look(y, kept), here, limit)
-        if kept is not None and not point.size <= most:
-            kept = None  # slopes are others here: once more with these
-            continue
+        point = search.rooted(search.look(y), limit)
         if not math.isfinite(point.size):
             if here is None:
                 break
-            kept, share = None, 1.0
-            if here.kept:  # slopes of another point led here
-                y, limit = here.y, math.inf
-            else:
-                damping = damping * _FASTER or _DAMPED
-                y, limit = search.onward(here, damping)
+            share, damping = 1.0, damping * _FASTER or _DAMPED
+            y, limit = search.onward(here, damping)
             continue
         before, here = here, point
         turned, damping = ahead, damping / _SLOWER if damping > _FAINT else 0.0
@@ -214,7 +190,6 @@ def least_squares(
         y = here.y + share * ahead
         limit = search.limit(here, share * ahead)
         last, moved = moved, share * here.size
-        most = _KEPT * moved
         whole = share == 1.0 and not damping
         short = moved < done or (whole and moved**2 < done * last)
         # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
@@ -224,7 +199,6 @@ def least_squares(
         calm = seen.chi2 <= seen.size - x.size or (
             bool(step) and abs(seen.chi2 - previous) <= _STEADY * max(seen.chi2, 1.0)
         )
-        kept = seen if whole and again is not None and (rough or calm) else None
         if not (short if rough else calm):
             continue
         factor = search.scatter(here)
@@ -235,7 +209,7 @@ def least_squares(
         if factor != 1.0 and here.size <= factor:
             # They scatter more or less than assumed: weigh them so, once more from here.
             search.weigh(factor)
-            y, kept, limit, ahead, moved = here.y, None, math.inf, turned, 0.0
+            y, limit, ahead, moved = here.y, math.inf, turned, 0.0
     return (
         search.estimate(here, y, limit, settled=settled)
         if here
@@ -252,8 +226,6 @@ class _Point(NamedTuple):
         Unknowns in units of their prior uncertainties, and what was linearized there.
     loss
         What a step has to make less, priors included.
-    kept
-        Whether the slopes are those of a point before.
     root, size
         Of the information, and how long the step of Gauss and Newton is; no number where there is
         no such step.
@@ -262,7 +234,6 @@ class _Point(NamedTuple):
     y: Array
     seen: Linearization
     loss: float
-    kept: bool
     root: Root
     size: float = math.nan
 
@@ -272,7 +243,7 @@ class _Search:
 
     Parameters
     ----------
-    linearize, again, sd
+    linearize, sd
         As in `least_squares`.
     prior
         Prior means of the unknowns, in units of `sd`.
@@ -281,40 +252,23 @@ class _Search:
     def __init__(
         self,
         linearize: Callable[[Array, float], Linearization],
-        again: Callable[[Array, float, Linearization], Linearization] | None,
         sd: Array,
         prior: Array,
     ) -> None:
-        self._linearize, self._again, self._sd, self._prior = linearize, again, sd, prior
+        self._linearize, self._sd, self._prior = linearize, sd, prior
         self.inflation = 1.0
         self._steepest = np.zeros_like(sd)  # lengths of the root's columns, the largest lately
 
-    def look(self, y: Array, kept: Linearization | None = None) -> _Point:
-        """Look what observations say about a point, with the slopes of another one if kept."""
-        if kept is None or self._again is None:
-            seen = self._linearize(y * self._sd, self.inflation)
-        else:
-            seen = self._again(y * self._sd, self.inflation, kept)
-        off = y - self._prior
-        return _Point(y, seen, seen.loss + float(off @ off), kept is not None, _NO_ROOT)
+    def look(self, y: Array) -> _Point:
+        """Look what observations say about a point."""
+        seen, off = self._linearize(y * self._sd, self.inflation), y - self._prior
+        return _Point(y, seen, seen.loss + float(off @ off), _NO_ROOT)
 
-    def rooted(self, point: _Point, before: _Point | None, limit: float) -> _Point:
-        """Reduce observations and priors where the loss is within a limit.
-
-        With the same slopes as before the same root does.
-        """
+    def rooted(self, point: _Point, limit: float) -> _Point:
+        """Reduce observations and priors where the loss is within a limit."""
         if not point.loss <= limit:
             return point
-        rows, pull = point.seen.rows, point.y - self._prior
-        if before is not None and all(
-            one.slopes is before.seen.rows[role].slopes for role, one in rows.items()
-        ):
-            gradient = pull.copy()
-            for one in rows.values():
-                gradient[one.columns] += self._sd[one.columns] * (one.left @ one.slopes)
-            root = before.root.with_gradient(gradient)
-        else:
-            root = square_root([*rows.values()], self._sd, pull)
+        root = square_root([*point.seen.rows.values()], self._sd, point.y - self._prior)
         return point._replace(root=root, size=float(np.linalg.norm(root.left)))
 
     def onward(self, here: _Point, damping: float) -> tuple[Array, float]:
@@ -375,10 +329,8 @@ class _Search:
         That one is looked at where it is far, or was not reached from a better one.
         """
         far = length(y - here.y, here.root.matrix)
-        if not far <= _UNSEEN:
-            kept = here.seen if self._again is not None and here.seen.weights else None
-            if not self.look(y, kept).loss <= limit:
-                y, settled = here.y, False
+        if not far <= _UNSEEN and not self.look(y).loss <= limit:
+            y, settled = here.y, False
         moved = (y - here.y) * self._sd
         return Estimate(
             y * self._sd,
@@ -389,7 +341,6 @@ class _Search:
             self.inflation,
             settled,
             {role: rows.after(moved) for role, rows in here.seen.rows.items()},
-            here.seen if self.inflation == 1.0 else None,
         )
 
 

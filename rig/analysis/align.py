@@ -36,31 +36,6 @@ _REACH = (2.0 * (MISSED + EXTRA)) ** 0.5  # widths: what is further off is never
 _ROUNDING = 1e-9  # the way back through the table meets sums made in another order
 
 
-def align(
-    trains: Sequence[EdgeTrain],
-    levels: Sequence[Array],
-    trajectory: Trajectory,
-    scale: float,
-    clock: float = 0.0,
-) -> list[Index]:
-    """Match the edges of one side to rods.
-
-    Parameters
-    ----------
-    levels
-        For each train the height of the reference point at every expected edge, m.
-    trajectory, scale, clock
-        As in `Pairing.matched`.
-
-    Returns
-    -------
-    list of ndarray
-        As there.
-    """
-    every = np.concatenate([*levels, np.zeros(0)])
-    return Pairing.of(trains).matched(every, trajectory, scale, clock)
-
-
 @dataclass(frozen=True, slots=True)
 class Pairing:
     """The edges of one side, ready to be matched again and again.

@@ -35,14 +35,18 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
 
-def analyze_drop(
+@one_thread
+def fit_drop(
     protocol: Protocol,
     run: Run,
     drop: Drop,
     scale: TimeScale,
     components: Components | None = None,
-) -> DropResult:
-    """Find out what a drop says by itself.
+    *,
+    explain: bool = True,
+    known: MutableMapping[Job, Identified] | None = None,
+) -> tuple[DropResult, Fit | None]:
+    """Find out what a drop says by itself; keep what a joint fit begins with, too.
 
     Parameters
     ----------
@@ -56,25 +60,6 @@ def analyze_drop(
         Calibration of its ticks.
     components
         How much everything scatters; as the protocol states it if not given.
-    """
-    return fit_drop(protocol, run, drop, scale, components)[0]
-
-
-@one_thread
-def fit_drop(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components | None = None,
-    *,
-    explain: bool = True,
-    known: MutableMapping[Job, Identified] | None = None,
-) -> tuple[DropResult, Fit | None]:
-    """Like `analyze_drop`; keep what a joint fit begins with, too.
-
-    Parameters
-    ----------
     explain
         Whether to seek what else than the protocol would explain a drop that is void as it is: it
         takes many times as long as all the rest. Of others it is sought where they ask for it.
@@ -83,30 +68,15 @@ def fit_drop(
         the same with it and without.
     """
     if drop.damage:  # the file's, and no finding about chains or gates
-        why = (make_reason("record_damaged", text=drop.damage),)
-        return DropResult(run, drop.attempt, "void", why, NO_EDGES, damaged=True), None
+        damaged = (make_reason("record_damaged", text=drop.damage),)
+        return DropResult(run, drop.attempt, "void", damaged, NO_EDGES, damaged=True), None
     known = {} if known is None else known
-    return _fitted(protocol, run, drop, scale, components, known, explain=explain)
-
-
-def _fitted(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components | None,
-    known: MutableMapping[Job, Identified],
-    *,
-    explain: bool,
-) -> tuple[DropResult, Fit | None]:
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
     received = sum(part.times.size for record in records for part in record.trains)
     expected = sum(record.expected for record in records)
-    lost = 0
-    if drop.certificate is not None:
-        lost = drop.certificate.overflows
+    lost = 0 if drop.certificate is None else drop.certificate.overflows
     blank = Audit(received, 0, expected, received, lost, received)
     job, rough = Job(drop.run, drop.attempt), scale.rounded()
     one = known.get(job)
@@ -132,7 +102,7 @@ def _fitted(
     model = DropModel(protocol, records, one.begun.guesses, scale.u, components)
     if one.begun.x.size != len(model.unknowns):  # it was found out where other things were unknown
         del known[job]
-        return _fitted(protocol, run, drop, scale, components, known, explain=explain)
+        return fit_drop(protocol, run, drop, scale, components, explain=explain, known=known)
     fit = timed(model, one.begun, scale.hz / rough.hz)
     unmatched = unmatched_edges(fit)
     audit = blank.count(fit.matched, count_unexplained(unmatched))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.align import Pairing, split
+from rig.analysis.align import Pairing
 from rig.analysis.components import Components, above, stated
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.stretch import (
@@ -23,7 +23,7 @@ from rig.analysis.stretch import (
 )
 from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
-from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SideColumns, Unknowns, alone, side_columns
+from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SideColumns, Unknowns, side_columns
 from rig.predictions import air_of
 from rig.units import Quantity
 
@@ -158,12 +158,6 @@ class DropModel:
             off = math.hypot(components.departure, 0.5 * components.few)
             unknowns.add("top", "top rod", math.sqrt(2.0) * off)
             unknowns.add("landed", "contact", components.landed)
-            # In α, like impulses; the same for all drops of a condition, whatever each one found.
-            pull = math.hypot(
-                protocol.priors.strings * self.records["impact"].alpha,
-                protocol.priors.impulse_floor,
-            )
-            unknowns.add("strings", "strings", pull)
             self._add_discrepancy(unknowns, rods)
         return unknowns
 
@@ -175,12 +169,13 @@ class DropModel:
         """
         priors, components = self.protocol.priors, self.components
         alpha = self.records["impact"].alpha
-        impulse = components.usual_impulses * math.hypot(
-            priors.impulses * alpha, priors.impulse_floor
+        shares = [priors.impulses] * IMPULSE_MODES + [priors.strings]
+        impulses = components.usual_impulses * np.hypot(
+            np.multiply(shares, alpha), priors.impulse_floor
         )
-        unknowns.add("usual impulses", "single impulses", [impulse] * IMPULSE_MODES)
-        departure = components.usual_departures * priors.departure
-        unknowns.add("usual departures", "departures", [departure] * rods)
+        unknowns.add("usual impulses", "single impulses", impulses)
+        departures = [components.usual_departures * priors.departure] * rods
+        unknowns.add("usual departures", "departures", departures)
         # A half of its variance is the same in all drops.
         size = priors.stretch * math.hypot(alpha, priors.impulse_floor)
         size *= components.stretch * self.records["impact"].chain.chain.length
@@ -206,12 +201,9 @@ class DropModel:
         if "impact" not in self.records:
             return self
         other = copy(self)
-        tight = replace(self.protocol.priors, strings=0.0)
-        other.protocol = replace(self.protocol, priors=tight)
         impulse = min(_ALIKE, self.components.impulse)
-        other.components = replace(
-            self.components, impulse=impulse, bounce=0.0, landed=0.0, stretch=0.0
-        )
+        none = dict.fromkeys(("bounce", "landed", "stretch", "usual_impulses"), 0.0)
+        other.components = replace(self.components, impulse=impulse, **none)
         other.unknowns = other._unknowns()  # other priors, and the same paths
         return other
 
@@ -320,7 +312,6 @@ class DropModel:
         if "impact swing" in at:
             places -= x[at["impact swing"]] * self._drawn()
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        gains += x[at["strings"]] * alone(places.size)
         gains += impulse_modes(places.size) @ x[at["usual impulses"]]
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
@@ -367,8 +358,8 @@ class DropModel:
 
     def stretch(self, x: Array) -> Array:
         """Size of each mode of the stretch, m."""
-        found: Array = sum((x[self.unknowns[name]] for name in STRETCHES), np.zeros(MODES))
-        return found
+        own, usual = (x[self.unknowns[name]] for name in STRETCHES)
+        return own + usual
 
     def stretch_modes(self, rods: Index, levels: Array) -> StretchModes:
         """Return the modes of the stretch at some rods; zero where one rod strikes.
@@ -412,12 +403,8 @@ class DropModel:
         edges = self.expected["impact"]
         return self.stretch_modes(edges.rods, edges.levels).way
 
-    def levels(self, role: str, x: Array) -> list[Array]:
-        """Where the reference point should be at every expected edge of each train, m."""
-        return split(self.all_levels(role, x), self.expected[role].ends)
-
     def all_levels(self, role: str, x: Array) -> Array:
-        """Return `levels` of all trains in one line."""
+        """Where the reference point should be at every expected edge of all trains, m."""
         asked = x.tobytes()
         known = self._levels.get(role)
         if known is None or known[0] != asked:
@@ -489,15 +476,6 @@ class DropModel:
         found: Array = np.sqrt(variance + known.departures(loose))
         return found
 
-    def left_over(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
-        """Return the left sides of `equations` alone."""
-        seen, path = self._matched(role, matches), self.trajectory(role, x)
-        times, late, levels, loose = self._stamps(role, x, seen)
-        height, speed = path.heights(times)
-        values, sigma = height - levels + speed * late, self._sigma(seen, speed, loose)
-        self._part(seen, loose > 0.0, values, sigma)
-        return Residuals(values, sigma, speed, seen.burst == 0.0, loose)
-
     def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Array]:
         """When each edge should have been stamped, by how much later that is than it was, s.
 
@@ -536,7 +514,7 @@ class DropModel:
         second = np.flatnonzero(told)
         slopes[second] -= told[second, None] * slopes[second - 1]
         left = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
-        return Equations(left, told, slopes, local.columns, len(at))
+        return Equations(left, told, slopes, local.columns)
 
     def _fixed_slopes(self, role: str, seen: Seen) -> tuple[Index, Array]:
         """Return what of the slopes is the same wherever the chain is: flat places, and values."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rig.analysis.align import EXTRA, MISSED
+from rig.analysis.align import EXTRA, MISSED, split
 from rig.analysis.chain_records import QUICK
 from rig.analysis.later_passages import later_passages
 
@@ -91,9 +91,8 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     for role, record in model.records.items():
         path = model.trajectory(role, x)
         lowest = min(model.protocol.gates.gates[train.gate].height for train in record.trains)
-        for train, levels, match in zip(
-            record.trains, model.levels(role, x), drop.matches[role], strict=True
-        ):
+        every = split(model.all_levels(role, x), model.expected[role].ends)
+        for train, levels, match in zip(record.trains, every, drop.matches[role], strict=True):
             gate = model.protocol.gates.gates[train.gate]
             if (match < 0).any():
                 found += _absent(gate.channel, train, match, path.times(levels) / clock)

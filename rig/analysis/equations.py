@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -33,7 +33,6 @@ STRAY = 6.0
 SLOWED = 0.5
 """Share of its speed that a rod loses at most whose one end strikes: that of a uniform rod which
 turns about its middle, thrown back as fast as it came (Eq. 5 with β = 1 and ξ = ⅓)."""
-_ALIKE = 0.01  # by which the root of an edge's weight may differ and still be the same
 
 
 class Residuals(NamedTuple):
@@ -74,22 +73,12 @@ class Equations(NamedTuple):
         Derivatives by the unknowns that this side knows of, shape ``(edges, columns)``.
     columns
         Which unknowns these are; shape ``(columns,)``.
-    unknowns
-        Number of all.
     """
 
     residuals: Residuals
     told: Array
     slopes: Array
     columns: Index
-    unknowns: int
-
-    @property
-    def jacobian(self) -> Array:
-        """Derivatives by all unknowns, shape ``(edges, unknowns)``."""
-        found = np.zeros((self.slopes.shape[0], self.unknowns))
-        found[:, self.columns] = self.slopes
-        return found
 
 
 class Seen(NamedTuple):
@@ -242,21 +231,6 @@ def scaled(x: Array, sd: Array) -> Array:
     return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
 
 
-class Weights(NamedTuple):
-    """How much each edge of a side counts, shape ``(edges,)`` each.
-
-    Attributes
-    ----------
-    root
-        √W.
-    scale
-        √W/σ.
-    """
-
-    root: Array
-    scale: Array
-
-
 @dataclass(frozen=True, slots=True)
 class Linearization:
     """Observations about a point, to first order, in standard deviations.
@@ -269,15 +243,12 @@ class Linearization:
         Weighted sum of squares, and number of observations.
     loss
         Sum of Huber's losses, twice: what a step has to make less.
-    weights
-        Of each side, where they were set up from edges.
     """
 
     rows: Mapping[str, EquationRows]
     chi2: float
     size: int
     loss: float
-    weights: Mapping[str, Weights] = field(default_factory=dict)
 
 
 def plain_equations(residuals: Array, slopes: Array) -> Linearization:
@@ -308,69 +279,18 @@ def linearize(
         Standard deviations beyond which an edge does not count.
     """
     rows: dict[str, EquationRows] = {}
-    weights: dict[str, Weights] = {}
     chi2, loss, size = 0.0, 0.0, 0
     for role, match in matches.items():
-        left, _, slopes, columns, _ = model.equations(role, x, match)
-        residuals, weight = _weighed(left, inflation, cut)
-        slopes *= weight.scale[:, None]  # in place: nobody else has them
-        rows[role], weights[role] = EquationRows(slopes, residuals, columns), weight
-        chi2, loss = _added(chi2, loss, residuals, weight)
+        left, _, slopes, columns = model.equations(role, x, match)
+        sigma = left.sigma * inflation
+        residuals = left.values / sigma
+        root = np.sqrt(robust_weights(residuals, cut))
+        residuals *= root
+        slopes *= (root / sigma)[:, None]  # in place: nobody else has them
+        rows[role] = EquationRows(slopes, residuals, columns)
+        squares = residuals * residuals
+        chi2 += float(squares.sum())
+        # Huber's losses, twice: 2·4|r| − 4² beyond 4 σ.
+        loss += float(squares.sum()) + float((squares - HUBER**2)[root < 1.0].sum())
         size += residuals.size
-    return Linearization(rows, chi2, size, loss, weights)
-
-
-def with_kept_slopes(
-    model: DropModel,
-    matches: Matches,
-    x: Array,
-    inflation: float,
-    near: Linearization,
-    *,
-    rough: bool = False,
-) -> Linearization:
-    """Linearize about a point that is near another one, with its slopes.
-
-    That takes a quarter of the time: what is left over of each edge is new, where it leads is not.
-
-    Parameters
-    ----------
-    near
-        About the other point; the rest as in `linearize`.
-    rough
-        Whether edges may count as they did there.
-    """
-    rows, weights = dict(near.rows), dict(near.weights)
-    chi2, loss = 0.0, 0.0
-    for role, match in matches.items():
-        left, old, before = model.left_over(role, x, match), near.rows[role], near.weights[role]
-        residuals, weight = _weighed(left, inflation)
-        scale = before.scale
-        other = np.flatnonzero(np.abs(weight.root - before.root) > _ALIKE)
-        if other.size and not rough:
-            # Few edges count otherwise than there.
-            slopes, scale, root = old.slopes.copy(), scale.copy(), before.root.copy()
-            slopes[other] *= (weight.scale[other] / scale[other])[:, None]
-            scale[other], root[other] = weight.scale[other], weight.root[other]
-            old, weights[role] = old._replace(slopes=slopes), Weights(root, scale)
-        # So that slopes times these are the gradient.
-        pull = left.values * (scale if rough else weight.scale**2 / scale)
-        rows[role] = old._replace(left=pull)
-        chi2, loss = _added(chi2, loss, residuals, weight)
-    return replace(near, rows=rows, weights=weights, chi2=chi2, loss=loss)
-
-
-def _added(chi2: float, loss: float, residuals: Array, weight: Weights) -> tuple[float, float]:
-    """Add a side to the sum of squares and to that of losses, 2·4|r| − 4² beyond 4 σ."""
-    squares = residuals * residuals
-    own = float(squares.sum())
-    return chi2 + own, loss + own + float((squares - HUBER**2)[weight.root < 1.0].sum())
-
-
-def _weighed(left: Residuals, inflation: float, cut: float = math.inf) -> tuple[Array, Weights]:
-    """Weigh residuals in standard deviations."""
-    sigma = left.sigma * inflation
-    residuals = left.values / sigma
-    root = np.sqrt(robust_weights(residuals, cut))
-    residuals *= root
-    return residuals, Weights(root, root / sigma)
+    return Linearization(rows, chi2, size, loss)

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import Linearization
     from rig.analysis.pattern import Guess
 
     Array = NDArray[np.float64]
@@ -87,7 +86,6 @@ def settle(
     steps: int = STEPS,
     x: Array | None = None,
     done: float = CLOSE,
-    near: Linearization | None = None,
 ) -> Fit:
     """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
 
@@ -105,8 +103,6 @@ def settle(
         already to what they should.
     done
         Of a standard uncertainty: how short the last step is.
-    near
-        Of these matches, see `rig.analysis.adjust.adjust`.
     """
     begun = x is not None and matches is not None
     x = model.first() if x is None else x
@@ -115,22 +111,18 @@ def settle(
         matches = match(model, x, _COARSE)
     # Not to the end where the matches are about to change.
     estimate = adjust(
-        stiff, matches, x, done=done if begun else _NEAR, steps=steps, near=near, rough=not begun
+        stiff, matches, x, done=done if begun else _NEAR, steps=steps, rough=not begun
     )
     last = model if begun else None
     for round_ in range(rounds):
         x, before = estimate.x, matches
         matches = without_strays(model, x, match(model, x), estimate.scatter)
         now = model if round_ else stiff
-        near = None
         if _alike(matches, before):
             matches = before  # what was made for these is at hand
             if now is last:
                 break
-            near = estimate.near
-        estimate = adjust(
-            now, matches, x, done=done, steps=steps, near=near, rough=now is not model
-        )
+        estimate = adjust(now, matches, x, done=done, steps=steps, rough=now is not model)
         last = now
         if now is model and estimate.beyond(x) < max(_SAME, done):
             break

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel, prior_air
-from rig.analysis.equations import HUBER, Linearization, Weights, scaled
+from rig.analysis.equations import HUBER, scaled
 from rig.analysis.fit import ROUGHLY, Fit, count_matched, first_match, settle
 from rig.analysis.pattern import (
     AIRS,
@@ -66,8 +65,6 @@ _PAIRS = 4  # of readings, adjusted together
 _TOGETHER = 30e-3  # s: chains let go at once are not further apart, if it can be helped
 _TRIED = 12  # guesses of a side at a time
 _MOST = 20  # and all in all: what is no fall must not take for ever
-_TENSE = 4.0  # standard uncertainties off its place at which a rod may be held by a stray
-_RELAXED = 3  # rods of a side that are looked at
 _QUICK = 3  # guesses that are looked at
 _INSTANTS = 12  # at which two falls are compared
 _SAME = 1.0  # how far apart they may be, in what a vote may be off
@@ -424,29 +421,6 @@ def held_back(fit: Fit) -> float:
     return -0.5 * below**2 - math.log(below * math.sqrt(math.pi / 2.0))
 
 
-def _relaxed(fit: Fit) -> Fit:
-    """Take back edges that only rods far off their places explain, where that is likelier.
-
-    A stray near a rod that was missed is matched with it: few edges tell where that rod is, so it
-    gives way, and nothing is left over by which the edge could be told.
-    """
-    for role, record in fit.model.records.items():
-        block = fit.model.unknowns[f"{role} rods"]
-        tense = np.abs(scaled(fit.x[block], fit.model.unknowns.sd[block]))
-        for rod in np.argsort(-tense)[:_RELAXED]:
-            if tense[rod] < _TENSE:
-                break
-            matches = dict(fit.matches)
-            matches[role] = [
-                np.where(train.rods == rod, -1, match)
-                for train, match in zip(record.trains, fit.matches[role], strict=True)
-            ]
-            other = Fit(fit.model, matches, adjust(fit.model, matches, fit.x))
-            if other.matched < fit.matched and log_evidence(other) > log_evidence(fit):
-                fit = other
-    return fit
-
-
 def adjusted(fit: Fit, role: str) -> Guess:
     """Return where an adjustment has a chain begin, as a guess for a further one."""
     at, x = fit.model.unknowns, fit.x
@@ -482,7 +456,7 @@ def _together(
         if len(pair) == 1:
             # One side is all there is: the same, to the end.
             fit = pair[0].fit
-            tried.append(weighed(settle(fit.model, fit.matches, x=fit.x, near=fit.estimate.near)))
+            tried.append(weighed(settle(fit.model, fit.matches, x=fit.x)))
             continue
         begin: dict[str, Guess] = {
             role: adjusted(one.fit, role) for role, one in zip(roles, pair, strict=True)
@@ -490,29 +464,25 @@ def _together(
         matches = {role: one.fit.matches[role] for role, one in zip(roles, pair, strict=True)}
         sides = [one.fit.model for one in pair]
         model = DropModel(protocol, records, begin, clock_u, components, sides)
-        x, near = _begun(model, pair)
-        tried.append(weighed(settle(model, matches, x=x, near=near)))
+        tried.append(weighed(settle(model, matches, x=_begun(model, pair))))
     best, *rest = _best(tried)
     if not best.evidence > 0.0:
         return Identification(None, _shares(best.fit))
     odds = best.evidence - rest[0].evidence if rest else math.inf
     if len(pairs) > len(close):
         odds = min(odds, most - _likely(protocol, pairs[len(close)]))
-    fit = _relaxed(best.fit)
     other = rest[0].fit if rest else None
-    return Identification(fit, _shares(fit), odds, best.evidence, other)
+    return Identification(best.fit, _shares(best.fit), odds, best.evidence, other)
 
 
-def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, Linearization | None]:
+def _begun(model: DropModel, sides: Sequence[Reading]) -> Array:
     """Unknowns of both sides together, as far as each side has told them by itself.
 
     Each side's equations at its own estimate, one below the other: were they linear, this would be
-    the solution of all. With them goes what an adjustment may begin with.
+    the solution of all.
     """
     at = model.unknowns
-    rows: dict[str, EquationRows] = {}
-    weights: dict[str, Weights] = {}
-    edges = 0
+    rows: list[EquationRows] = []
     for side in sides:
         (role,), own, estimate = side.fit.matches, side.fit.model.unknowns, side.fit.estimate
         if role not in estimate.rows:
@@ -528,14 +498,8 @@ def _begun(model: DropModel, sides: Sequence[Reading]) -> tuple[Array, Lineariza
             places = np.append(places[columns], at["side"].start)
         else:
             places = places[columns]
-        rows[role] = EquationRows(slopes, left, places)
-        edges += estimate.edges
-        if estimate.near is not None:
-            weights |= estimate.near.weights
-    x = at.sd * square_root([*rows.values()], at.sd, np.zeros(len(at))).step()
-    if len(weights) < len(sides):
-        return x, None
-    return x, Linearization(rows, 0.0, edges, 0.0, weights)
+        rows.append(EquationRows(slopes, left, places))
+    return at.sd * square_root(rows, at.sd, np.zeros(len(at))).step()
 
 
 def weighed(fit: Fit) -> Reading:

@@ -11,7 +11,6 @@ import numpy as np
 
 from rig.analysis.adjust import adjust
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.equations import robust_weights, scaled
 from rig.analysis.joint_step import DropState, joint_step, take
 from rig.analysis.quantities import measurands
 from rig.analysis.unknowns import ANYTHING
@@ -186,13 +185,11 @@ def _drawn(fit: Fit, seed: int) -> Iterator[dict[str, float]]:
     sd = model.unknowns.sd
     # A restless drop was weighed by its own scatter, so that is what its edges are shaken by.
     scatter = _scatters(fit, fit.estimate.scatter)
-    expected = _Expected(fit, scatter)
     while True:
         moved = {role: one.draw(rng) for role, one in scatter.items()}
         centre = _stated(sd) * rng.normal(size=sd.size)
         shaken = model.shaken(moved)
-        # What is linear need not be found step by step; adjusting from there finds the rest.
-        estimate = adjust(shaken, fit.matches, at + expected.shift(moved, centre), centre)
+        estimate = adjust(shaken, fit.matches, at, centre)
         yield {name: value for name, (value, _) in measurands(shaken, estimate.x).items()}
 
 
@@ -317,12 +314,6 @@ class _Scatter(NamedTuple):
         found[self.edges] = off / self.speed
         return found
 
-    def apart(self, moved: Array) -> Array:
-        """Return by how much the independent equations' left sides change, m."""
-        off = moved[self.edges] * self.speed
-        off[1:] -= self.told[1:] * off[:-1]
-        return off
-
 
 def _scatters(drop: Fit | JointDrop, scale: float = 1.0) -> dict[str, _Scatter]:
     found = {}
@@ -337,34 +328,3 @@ def _scatters(drop: Fit | JointDrop, scale: float = 1.0) -> dict[str, _Scatter]:
             rows.told,
         )
     return found
-
-
-class _Expected:
-    """Where the unknowns of a drop go, to first order, when its edges and priors move."""
-
-    def __init__(self, fit: Fit, scatter: dict[str, _Scatter]) -> None:
-        self._estimate = estimate = fit.estimate
-        self._pulls: dict[str, tuple[_Scatter, Array]] = {}
-        for role, matches in fit.matches.items():
-            found, sigma = fit.model.equations(role, estimate.x, matches), scatter[role].sigma
-            weight = robust_weights(found.residuals.values / sigma) / sigma**2
-            pull = found.jacobian * weight[:, None]
-            self._pulls[role] = scatter[role], pull * estimate.sd
-
-    def shift(self, moved: Mapping[str, Array], centre: Array) -> Array:
-        """Return the change of the unknowns, shape ``(unknowns,)``.
-
-        Parameters
-        ----------
-        moved
-            Of each side's edges, s.
-        centre
-            Prior means of the unknowns.
-        """
-        sd = self._estimate.sd
-        vector = scaled(centre, sd)
-        for role, (scatter, pull) in self._pulls.items():
-            # A later stamp sees the chain lower.
-            vector = vector + scatter.apart(moved[role]) @ pull
-        found: Array = sd * (self._estimate.covariance @ vector)
-        return found

@@ -28,38 +28,42 @@ if TYPE_CHECKING:
     Value = tuple[float, Array]
 
 
-SCALES = frozenset(
-    {
-        "start height",
-        "side",
-        "beam offsets",
-        "swing",
-        "single impulses",
-        "top rod",
-        "strings",
-        "stretch",
-        "departures",
-        "late pull",
-        "contact",
-    }
-)
-"""Lines of the budget whose size nobody has measured, unless a joint fit finds it."""
+class BudgetLine(NamedTuple):
+    """What is known of a line of the uncertainty budget.
 
-COMMON = frozenset(
-    {
-        "clock",
-        "gravity",
-        "air",
-        "drop height",
-        "beam heights",
-        "datum",
-        "side",
-        "beam offsets",
-        "spacing",
-        "width",
-    }
-)
-"""Budget lines that are the same in every run, so that averaging does not reduce them."""
+    Attributes
+    ----------
+    common
+        Whether it is the same in every run, so that averaging does not reduce it.
+    guessed
+        Whether nobody has measured its size, unless a joint fit finds it.
+    scale
+        The component that a joint fit finds, whose degrees of freedom the line has.
+    """
+
+    common: bool = False
+    guessed: bool = False
+    scale: str = ""
+
+
+BUDGET = {
+    "edges": BudgetLine(scale="jitter"),
+    **dict.fromkeys(("clock", "gravity", "air", "drop height", "datum"), BudgetLine(common=True)),
+    "beam heights": BudgetLine(common=True, scale="gates"),
+    "side": BudgetLine(common=True, guessed=True),
+    "beam offsets": BudgetLine(common=True, guessed=True, scale="beam"),
+    "spacing": BudgetLine(common=True, scale="rods"),
+    "width": BudgetLine(common=True),
+    "start height": BudgetLine(guessed=True, scale="hang"),
+    "swing": BudgetLine(guessed=True, scale="swing"),
+    "single impulses": BudgetLine(guessed=True, scale="impulse"),
+    "top rod": BudgetLine(guessed=True, scale="departure"),
+    "departures": BudgetLine(common=True, guessed=True, scale="usual_departures"),
+    "stretch": BudgetLine(common=True, guessed=True, scale="stretch"),
+    "late pull": BudgetLine(guessed=True, scale="impulse"),
+    "contact": BudgetLine(guessed=True),
+}
+COMMON = frozenset(name for name, line in BUDGET.items() if line.common)
 
 
 def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
@@ -95,12 +99,12 @@ def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str,
     budget
         Lines whose squares add up to that of `u`.
     known
-        Degrees of freedom of lines; those of guessed scales are `GUESSED`, others infinite.
+        Degrees of freedom of lines; those of guessed lines are `GUESSED`, others infinite.
     """
     share = sum(
         (line / u) ** 4 / known.get(name, GUESSED)
         for name, line in budget.items()
-        if name in known or name in SCALES
+        if name in known or BUDGET[name].guessed
     )
     return max(1.0, 1.0 / share) if share > 0.0 else math.inf
 

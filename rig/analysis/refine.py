@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.deviation import deviation_among
 from rig.analysis.gate_passages import gate_passages
-from rig.analysis.quantities import effective_degrees, measurands
+from rig.analysis.quantities import BUDGET, effective_degrees, measurands
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
@@ -23,19 +23,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
     Places = Mapping[str, Index]
-
-_DEGREES = {
-    "edges": "jitter",
-    "beam heights": "gates",
-    "beam offsets": "beam",
-    "spacing": "rods",
-    "start height": "hang",
-    "swing": "swing",
-    "single impulses": "impulse",
-    "top rod": "departure",
-    "stretch": "stretch",
-}
-"""Budget line → the component whose degrees of freedom it has."""
 
 
 class Budgets:
@@ -59,7 +46,9 @@ class Budgets:
         # Those of another drop's condition count too, by what they tell of the rest.
         self._common: dict[str, Index] = {}
         for drop in joint.drops:
-            for name, rows in _common(drop).items():
+            common = np.full(drop.x.size, -1)
+            common[drop.common] = drop.here
+            for name, rows in _lines(drop, common).items():
                 self._common[name] = np.union1d(self._common.get(name, rows), rows)
             place = np.ix_(drop.here, drop.here)
             for name, rows in _groups(drop).items():
@@ -105,17 +94,10 @@ class Budgets:
         budget = {name: math.sqrt(line) for name, line in lines.items() if line > 0.0}
         u = math.sqrt(variance)
         found = self.joint.degrees
-        known = {line: found[kind] for line, kind in _DEGREES.items() if kind in found}
+        known = {name: found[line.scale] for name, line in BUDGET.items() if line.scale in found}
         degrees = effective_degrees(u, budget, known)
         deviation = deviation_among(self.joint, drop, gradient, degrees)
         return Measured(value, u, degrees, budget, shared, deviation)
-
-
-def _common(drop: JointDrop) -> Places:
-    """Places in the session's vector of each line of the budget."""
-    places = np.full(drop.x.size, -1)
-    places[drop.common] = drop.here
-    return _lines(drop, places)
 
 
 def _groups(drop: JointDrop) -> Places:

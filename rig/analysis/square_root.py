@@ -60,11 +60,6 @@ class Root(NamedTuple):
         """Return the step to the least sum of squares."""
         return np.asarray(np.linalg.solve(self.matrix, -self.left), dtype=np.float64)
 
-    def with_gradient(self, gradient: Array) -> Root:
-        """Return the root of the same matrix about a point of another gradient."""
-        left = np.linalg.solve(self.matrix.T, gradient)
-        return Root(self.matrix, np.asarray(left, dtype=np.float64))
-
     def turns_back(self, step: Array, last: Array) -> bool:
         """Whether a step takes back more than half of the last one."""
         before = self.matrix @ last

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.components import above
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -67,8 +69,7 @@ def stretch_modes(path: Trajectory, places: Array, times: Array) -> StretchModes
 
     def product(growing: Array, staying: Array) -> Array:
         in_time = np.stack([growing, staying], axis=1)
-        found: Array = (along[:, :, None] * in_time[:, None, :]).reshape(places.size, MODES)
-        return found
+        return (along[:, :, None] * in_time[:, None, :]).reshape(places.size, MODES)
 
     return StretchModes(
         product(_GROWTH * share, begun - fading),
@@ -77,14 +78,14 @@ def stretch_modes(path: Trajectory, places: Array, times: Array) -> StretchModes
 
 
 def impulse_modes(rods: int) -> Array:
-    """Return how impulses differ along a chain, smoothly: cosines of unit mean square together.
+    """Return how impulses differ along a chain: smoothly, and by the pull of strings at its end.
 
     Returns
     -------
     ndarray
-        Shape ``(rods, IMPULSE_MODES)``.
+        Shape ``(rods, IMPULSE_MODES + 1)``: cosines of unit mean square together, and 1/M² for M
+        rods above, 1 for the last pull.
     """
     place = (np.arange(rods) + 0.5) / rods
     waves = np.cos(math.pi * place[:, None] * np.arange(1, IMPULSE_MODES + 1))
-    found: Array = math.sqrt(2.0 / IMPULSE_MODES) * waves
-    return found
+    return np.column_stack([math.sqrt(2.0 / IMPULSE_MODES) * waves, above(rods) ** -2.0])

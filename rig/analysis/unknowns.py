@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.components import above
 from rig.analysis.stretch import STRETCHES, impulse_modes
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 
@@ -143,7 +142,7 @@ def side_columns(
     at = {name: slice(begin, end) for name, begin, end in places}
     others = ["impact " if role == "free" else "free "]
     if role == "free":
-        others += ["alpha", "impulses", "contact", "strike", "top", "strings", "landed", "late"]
+        others += ["alpha", "impulses", "contact", "strike", "top", "landed", "late"]
         others += [*STRETCHES, "usual impulses", "usual departures"]
     mine = np.ones(places[-1][2], dtype=np.bool_)
     for name, block in at.items():
@@ -176,19 +175,12 @@ def _path(
         row = np.arange(rods)
         found[gains, at["alpha"]] = 1.0
         found[COMMON + row, at["impulses"].start + row] = 1.0
-        found[gains, at["strings"].start] = alone(rods)
         found[gains, at["usual impulses"]] = impulse_modes(rods)
         found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
         found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
         found[-1, at["top"]] = 1.0
         if drawn:
             found[places, at["impact swing"].start] = -np.array(drawn)
-    return found
-
-
-def alone(rods: int) -> Array:
-    """How far each pull is on one rod alone, shape ``(rods,)``: 1/M² for M rods above."""
-    found: Array = above(rods) ** -2.0
     return found
 
 
@@ -236,7 +228,7 @@ def _names(model: DropModel) -> dict[str, slice]:
         if role == "impact":
             own = f"{record.chain.name} usual departures at {record.condition}"
             found[own] = at["usual departures"]
-            for name in ("contact", "strings", "usual stretch", "usual impulses"):
+            for name in ("contact", "usual stretch", "usual impulses"):
                 found[f"{name} at {record.condition}"] = at[name]
         found |= {f"{record.chain.name} {what}": at[f"{role} {what}"] for what in _CHAIN}
     return found

@@ -142,8 +142,7 @@ def _squares(model: DropModel, x: Array, heights: Array) -> Array:
     leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
     distance = path.height[leg] - level
     squares = squared_after(distance, path.speed[leg], path.gravity, path.kappas(leg))
-    found: Array = squares + (2.0 * np.sqrt(np.maximum(squares, 0.0)) + faster) * faster
-    return found
+    return squares + (2.0 * np.sqrt(np.maximum(squares, 0.0)) + faster) * faster
 
 
 def _separations(model: DropModel, x: Array, times: Array) -> Array:
@@ -160,8 +159,6 @@ def _separations(model: DropModel, x: Array, times: Array) -> Array:
 
 def _stretched(model: DropModel, x: Array, level: Array) -> tuple[Array, Array]:
     """How far ahead strings have pulled the top rod, and how much faster it is for that."""
-    if "stretch" not in model.unknowns:
-        return np.zeros_like(level), np.zeros_like(level)
     top = np.full(level.shape, model.records["impact"].chain.chain.rods - 1)
     modes, sizes = model.stretch_modes(top, level), model.stretch(x)
     return modes.way @ sizes, modes.rate @ sizes

@@ -23,7 +23,7 @@ from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Priors
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from rig.protocol.protocol import Drag, InclinedTrack, Protocol, RodChain
 
@@ -166,17 +166,8 @@ def _gates(protocol: Protocol) -> list[str]:
     return lines
 
 
-_STRUCK = {
-    "departure",
-    "last_rods",
-    "impulses",
-    "impulse_floor",
-    "last_impulse",
-    "strings",
-    "stretch",
-    "late_pull",
-}
-"""Priors of a chain that strikes something."""
+_EVERYWHERE = {"edge_floor", "jitter", "hang"}
+"""Priors of every scene; of those that are not named apart only what strikes something has any."""
 
 
 def _priors(protocol: Protocol) -> list[str]:
@@ -185,7 +176,7 @@ def _priors(protocol: Protocol) -> list[str]:
         return []
     from rig.protocol.priors import PRIORS  # noqa: PLC0415 - only where something is measured
 
-    usual, unused, lines = Priors(), _unused(protocol), list[str]()
+    usual, unused, lines = Priors(), _unused(protocol, PRIORS), list[str]()
     for name, row in PRIORS.items():
         if name in unused:
             continue
@@ -202,16 +193,21 @@ def _priors(protocol: Protocol) -> list[str]:
     return lines
 
 
-def _unused(protocol: Protocol) -> set[str]:
+def _unused(protocol: Protocol, priors: Iterable[str]) -> set[str]:
     """Name the priors that nothing in a scene depends on."""
     chains = protocol.chains.values()
-    needed = {
-        "side": protocol.two_chains,
-        "drag": protocol.drag is None,
-        "beam_offset": any(one.tilt_deg for one in chains),
-        "off_centre": any(one.tilt_deg for one in chains),
-        "swing": protocol.surface is not None and any(one.chain.rods > 1 for one in chains),
-    } | dict.fromkeys(_STRUCK, protocol.surface is not None)
+    struck = protocol.surface is not None
+    needed = (
+        dict.fromkeys(priors, struck)
+        | dict.fromkeys(_EVERYWHERE, True)
+        | {
+            "side": protocol.two_chains,
+            "drag": protocol.drag is None,
+            "beam_offset": any(one.tilt_deg for one in chains),
+            "off_centre": any(one.tilt_deg for one in chains),
+            "swing": struck and any(one.chain.rods > 1 for one in chains),
+        }
+    )
     return {name for name, is_needed in needed.items() if not is_needed}
 
 

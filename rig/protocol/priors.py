@@ -60,8 +60,8 @@ PRIORS: dict[str, Prior] = {
     ),
     "off_centre": Prior(
         _LENGTH,
-        "scatter of the chain's place along its beams from run to run; matters as beam_offset does",
-        "hung by hand over the middle of the posts: ±1.7 mm, uniform",
+        "the same from run to run: where a chain hangs along its beams",
+        "hung by hand: ±1.7 mm, uniform",
     ),
     "swing": Prior(
         Range(Dimension.SPEED, 0.0, 1.0, "m/s"),
@@ -100,13 +100,13 @@ PRIORS: dict[str, Prior] = {
     ),
     "stretch": Prior(
         Range(Dimension.NUMBER, 0.0, 1.0, "%"),
-        "how far strings pull the top rod ahead of its place, relative to α and the chain's length",
-        "resolved falls: up to 4 mm of 1165 mm at α 0.15, in 50 ms",
+        "pull of strings on the top rod, relative to α times the chain's length",
+        "resolved falls: 4 mm of 1165 mm at α 0.15",
     ),
     "late_pull": Prior(
         Range(Dimension.NUMBER, 0.0, 10.0, "%"),
-        "scatter of the share of the last impulse that comes below the lowest beam",
-        "a guess, from resolved falls: a string takes some ms to slacken",
+        "share of the last impulse that comes below the lowest beam",
+        "a guess, from resolved falls",
     ),
     "drag": Prior(
         Range(Dimension.NUMBER, 0.0, 10.0, "1"),

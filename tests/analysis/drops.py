@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.analysis.align import align
 from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import Components
-from rig.analysis.drop import analyze_drop
+from rig.analysis.drop import fit_drop
 from rig.analysis.drop_model import DropModel
 from rig.analysis.identify import Identification, adjusted, identify
 from rig.analysis.pattern import Guess
@@ -58,7 +57,7 @@ class Case:
     scale: TimeScale
 
     def analyze(self, components: Components = STATED) -> DropResult:
-        return analyze_drop(self.protocol, self.run, self.drop, self.scale, components)
+        return fit_drop(self.protocol, self.run, self.drop, self.scale, components)[0]
 
     def with_edges(self, edges) -> Case:
         """The same drop with other edges; they need not be in order of time."""
@@ -101,8 +100,8 @@ class Case:
         model = DropModel(self.protocol, self.records, self.guesses(), self.scale.u)
         x = model.first()
         matches = {
-            side.role: align(
-                side.trains, model.levels(side.role, x), model.trajectory(side.role, x), 2.5e-3
+            side.role: model.pairings[side.role].matched(
+                model.all_levels(side.role, x), model.trajectory(side.role, x), 2.5e-3
             )
             for side in self.records
         }

@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
-from rig.analysis.adjust import DONE, adjust, least_squares, uncertainty
-from rig.analysis.drop_model import DropModel
-from rig.analysis.equations import Equations, Residuals, linearize
+from rig.analysis.adjust import DONE, adjust, uncertainty
+from rig.analysis.equations import Equations, Residuals
 from tests.analysis.drops import SCENES, case
 from tests.examples import examples
 
@@ -42,10 +41,7 @@ class Linear:
         sigma = self.sigma[role][match]
         ones = np.ones_like(sigma)
         left = Residuals(residuals[match], sigma, ones, ones > 0.0, ones < 0.0)
-        return Equations(left, 0.0 * ones, self.jacobian[role][match], np.arange(5), 5)
-
-    def left_over(self, role: str, x, match) -> Residuals:
-        return self.equations(role, x, match).residuals
+        return Equations(left, 0.0 * ones, self.jacobian[role][match], np.arange(5))
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """All rows in standard deviations: J/σ and r(0)/σ."""
@@ -183,31 +179,3 @@ def test_a_drop_s_budget_adds_up(scene):
         squares = sum(part**2 for part in measured.budget.values())
         assert squares == pytest.approx(measured.u**2, rel=1e-9)
         assert min(measured.budget.values()) > 0.0
-
-
-@pytest.mark.parametrize("scene", ["uniform", "graded", "single"])
-def test_slopes_are_kept_while_steps_get_shorter(scene, monkeypatch):
-    """They are worked out once near the end, and lead where new ones do."""
-    model, matches = case(SCENES[scene], seed=2).model()
-    found = adjust(model, matches, model.first())
-    sd = model.unknowns.sd
-    chance = np.random.default_rng(1).normal(size=sd.size)
-    near = found.x + 0.03 * sd * (np.linalg.cholesky(found.covariance) @ chance)
-    asked = []
-    worked_out = DropModel.equations
-    monkeypatch.setattr(
-        DropModel, "equations", lambda *one: asked.append(one[1]) or worked_out(*one)
-    )
-    kept = adjust(model, matches, near)
-    assert sorted(asked) == sorted(model.records)
-    assert kept.settled
-    fresh = least_squares(lambda at, inflation: linearize(model, matches, at, inflation), sd, near)
-    assert len(asked) > 2 * len(model.records)
-    assert kept.beyond(fresh.x) < DONE
-    pulls = [
-        np.concatenate([rows.left @ rows.slopes for rows in one.rows.values()])
-        for one in (kept, fresh)
-    ]
-    np.testing.assert_allclose(*pulls, atol=1e-3 * abs(pulls[0]).max())
-    u = [np.sqrt(np.diag(one.covariance)) for one in (kept, fresh)]
-    np.testing.assert_allclose(*u, rtol=1e-3)

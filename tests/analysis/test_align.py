@@ -10,12 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.analysis.align import EXTRA, MISSED, align
+from rig.analysis.align import EXTRA, MISSED, Pairing
 from rig.analysis.chain_records import ChainRecord, EdgeTrain
 from rig.analysis.trajectory import free_trajectory
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
 from tests.examples import examples
+
+
+def align(trains, levels, trajectory, scale, clock=0.0):
+    """Match all trains of a side at once."""
+    every = np.concatenate([*levels, np.zeros(0)])
+    return Pairing.of(trains).matched(every, trajectory, scale, clock)
+
 
 GRAVITY = 9.81
 START = 0.5

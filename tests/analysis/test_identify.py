@@ -12,7 +12,6 @@ from scipy.special import log_ndtr
 
 from rig.analysis import identify
 from rig.analysis.deciding import deciding_gate
-from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import CLOSE, settle
 from rig.analysis.identify import MISSED, STRAYS
 from rig.analysis.pattern import Guess
@@ -349,14 +348,3 @@ def test_releases_are_as_likely_apart_as_a_cauchy_of_the_accepted_skew_says():
         for times in (0, 1, 3)
     ]
     assert apart == pytest.approx([0.0, -math.log(2.0), -math.log(10.0)])
-
-
-def test_slopes_are_worked_out_once_where_a_side_is_matched_at_once(monkeypatch):
-    """Alone, alone to the end, and with the other side: each begins with the slopes of the last."""
-    asked: list[str] = []
-    worked_out = DropModel.equations
-    monkeypatch.setattr(
-        DropModel, "equations", lambda *one: asked.append(one[1]) or worked_out(*one)
-    )
-    assert case(UNIFORM, Dials.quiet(), incline=40.0).identify().fit is not None
-    assert asked.count("free") == 1
