@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.components import above
+from rig.analysis.discrepancy import STRETCHES
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
 from rig.analysis.result import Deviation
-from rig.analysis.stretch import STRETCHES
 from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:

@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.align import Pairing
 from rig.analysis.components import Components, above, stated
-from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
-from rig.analysis.stretch import (
+from rig.analysis.discrepancy import (
     IMPULSE_MODES,
+    LOWEST_START,
     MODES,
     STRETCHES,
-    StretchModes,
+    Discrepancy,
     impulse_modes,
-    stretch_modes,
 )
+from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SideColumns, Unknowns, side_columns
@@ -40,11 +39,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
-
-
-_ABOVE = 1e-3
-"""Where a struck chain hangs at least, m: an adjustment of nonsense tries what is below ground."""
-
 
 _ALIKE = 0.05
 """Scatter of impulses, relative to α, with which an adjustment begins: more may lead it astray."""
@@ -85,7 +79,7 @@ class DropModel:
         self.guesses = guesses
         self.clock_u = clock_u
         self.components = components or stated(protocol)
-        made = {role: one for one in sides for role in one.records}
+        made: dict[str, DropModel] = {role: one for one in sides for role in one.records}
         self.expected: dict[str, Expected] = {
             role: made[role].expected[role] if role in made else Expected.of(record, protocol)
             for role, record in self.records.items()
@@ -94,11 +88,16 @@ class DropModel:
             role: made[role].pairings[role] if role in made else Pairing.of(record.trains)
             for role, record in self.records.items()
         }
+        self.discrepancy: Discrepancy  # where a chain strikes
+        if "impact" in made:
+            self.discrepancy = made["impact"].discrepancy
+        elif "impact" in self.records:
+            record, edges = self.records["impact"], self.expected["impact"]
+            self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
         slopes: dict[str, float] = {
             record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
         }
         posts = protocol.gates.posts
-        self._gate_heights = [gate.height for gate in protocol.gates.gates]
         self._post = np.array([posts.index(gate.side) for gate in protocol.gates.gates])
         self._steepest = max(slopes.values(), default=0.0)
         # A beam is off by as much for a chain of less tilted rods, which shows less.
@@ -162,10 +161,9 @@ class DropModel:
         return unknowns
 
     def _add_discrepancy(self, unknowns: Unknowns, rods: int) -> None:
-        """Name what the equations leave out, and that is alike in all drops of a condition.
+        """Name what the equations leave out, most of it common to the drops of a condition.
 
-        Drops of one rig leave the equations in the same way: taken for independent of each other
-        they would average away.
+        Drops of one rig leave the equations alike: taken for independent that would average away.
         """
         priors, components = self.protocol.priors, self.components
         alpha = self.records["impact"].alpha
@@ -304,7 +302,7 @@ class DropModel:
         if role == "free":
             return free_trajectory(release, start, gravity, kappa, record.air)
         assert record.ratios is not None
-        start = max(start, _ABOVE)
+        start = max(start, LOWEST_START)
         places = record.strikes + x[at["impact rods"]]
         # Results are at the stated level: where the top rod would be if others struck elsewhere.
         places[:-1] -= x[at["contact"]]
@@ -340,68 +338,10 @@ class DropModel:
         record = self.records["impact"]
         return drawn(lever(record.chain.chain), self.protocol, -record.strikes)
 
-    def late_pull(self) -> tuple[float, float]:
-        """What of the last impulse may come too late for the lowest beam to show it.
-
-        Returns
-        -------
-        pull, way
-            How much faster all of it makes the top rod, m/s, and what way is left below the beam,
-            m; by the nominal fall.
-        """
-        record, hits = self.records["impact"], self._nominal.hits
-        if hits is None or hits.ratio.size < 2:
-            return 0.0, 0.0
-        lowest = min(self._gate_heights[train.gate] for train in record.trains)
-        way = min(lowest, float(np.diff(record.strikes[-2:])[0]))
-        return abs(record.alpha) * float(hits.ratio[-2] * hits.arrival[-2]), max(way, 0.0)
-
     def stretch(self, x: Array) -> Array:
         """Size of each mode of the stretch, m."""
         own, usual = (x[self.unknowns[name]] for name in STRETCHES)
         return own + usual
-
-    def stretch_modes(self, rods: Index, levels: Array) -> StretchModes:
-        """Return the modes of the stretch at some rods; zero where one rod strikes.
-
-        When the chain is at a level is taken from the nominal fall: which functions they are is a
-        choice, and with this one the equations are linear in them.
-
-        Parameters
-        ----------
-        levels
-            Of the reference point, m.
-        """
-        nominal = self._nominal
-        last = nominal.time.size - 2
-        if last < 1:
-            nothing = np.zeros((levels.size, MODES))
-            return StretchModes(nothing, nothing)
-        return stretch_modes(nominal, rods / last, nominal.times(levels))
-
-    @cached_property
-    def _nominal(self) -> Trajectory:
-        """The fall of the chain that strikes, as the protocol has it."""
-        record, protocol = self.records["impact"], self.protocol
-        assert record.ratios is not None
-        start, gains = max(protocol.drop.value, _ABOVE), np.full(record.strikes.size, record.alpha)
-        return struck_trajectory(
-            0.0, start, protocol.gravity.value, gains, record.ratios, record.strikes,
-            self._kappa, record.air,
-        )  # fmt: skip
-
-    @cached_property
-    def _after(self) -> Array:
-        """1 for expected edges after the first strike, 0 for those before."""
-        nominal = self._nominal
-        times = nominal.times(self.expected["impact"].levels)
-        return np.where(nominal.loose(times) > 0.0, 1.0, 0.0)
-
-    @cached_property
-    def _stretched(self) -> Array:
-        """The modes of the stretch at each expected edge, shape ``(edges, MODES)``."""
-        edges = self.expected["impact"]
-        return self.stretch_modes(edges.rods, edges.levels).way
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Where the reference point should be at every expected edge of all trains, m."""
@@ -425,8 +365,8 @@ class DropModel:
         if role == "impact":
             found -= edges.alone * x[at["top"]][0]
             found -= edges.landed * x[at["landed"]][0]
-            found -= self._after * x[at["usual departures"]][edges.rods]
-            found += self._stretched @ self.stretch(x)
+            found -= self.discrepancy.struck * x[at["usual departures"]][edges.rods]
+            found += self.discrepancy.stretch @ self.stretch(x)
         return found
 
     def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
@@ -537,8 +477,9 @@ class DropModel:
         if role == "impact":
             columns.append((at["top"].start, seen.alone.astype(np.float64)))
             columns.append((at["landed"].start, seen.landed))
-            columns.append((at["usual departures"].start + seen.rods, self._after[seen.pick]))
-            modes = -self._stretched[seen.pick].T
+            struck = self.discrepancy.struck[seen.pick]
+            columns.append((at["usual departures"].start + seen.rods, struck))
+            modes = -self.discrepancy.stretch[seen.pick].T
             for name in STRETCHES:
                 columns += [(at[name].start + n, mode) for n, mode in enumerate(modes)]
         edges = seen.times.size

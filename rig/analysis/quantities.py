@@ -11,8 +11,8 @@ import numpy as np
 
 from rig.analysis.adjust import uncertainty
 from rig.analysis.deviation import deviation_alone
+from rig.analysis.discrepancy import STRETCHES
 from rig.analysis.result import Measured
-from rig.analysis.stretch import STRETCHES
 from rig.analysis.swing import lever
 from rig.protocol.protocol import GUESSED
 
@@ -60,7 +60,7 @@ BUDGET = {
     "top rod": BudgetLine(guessed=True, scale="departure"),
     "departures": BudgetLine(common=True, guessed=True, scale="usual_departures"),
     "stretch": BudgetLine(common=True, guessed=True, scale="stretch"),
-    "late pull": BudgetLine(guessed=True, scale="impulse"),
+    "late pull": BudgetLine(guessed=True, scale="bounce"),
     "contact": BudgetLine(guessed=True),
 }
 COMMON = frozenset(name for name, line in BUDGET.items() if line.common)
@@ -158,8 +158,7 @@ class Adjusted:
         speed, d_speed = path.arrival, model.spread("impact", path.d_arrival)
         hit, d_hit = float(path.time[-1]), model.spread("impact", path.d_time[-1])
         if "stretch" in at:
-            strikes = model.records["impact"].strikes
-            modes = model.stretch_modes(np.array([strikes.size - 1]), -strikes[-1:])
+            modes = model.discrepancy.top(-model.records["impact"].strikes[-1:])
             way, rate, sizes = modes.way[0], modes.rate[0], model.stretch(x)
             fast, d_fast = speed + float(rate @ sizes), d_speed.copy()
             early = float(way @ sizes) / fast
@@ -172,12 +171,12 @@ class Adjusted:
             d_speed[at["gravity"]] -= early
             hit, d_hit = hit - early, d_hit - d_early
         if "late" in at:
-            pull, way_left = model.late_pull()
+            pull, left = model.discrepancy.late_pull, model.discrepancy.late_way
             late = pull * float(x[at["late"]][0])
             d_late = np.zeros(x.size)
             d_late[at["late"]] = pull
-            hit -= 0.5 * way_left * late / speed**2
-            d_hit = d_hit - 0.5 * way_left * (d_late - 2.0 * late / speed * d_speed) / speed**2
+            hit -= 0.5 * left * late / speed**2
+            d_hit = d_hit - 0.5 * left * (d_late - 2.0 * late / speed * d_speed) / speed**2
             speed, d_speed = speed + late, d_speed + d_late
         return (speed, d_speed), (hit, d_hit)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.stretch import STRETCHES, impulse_modes
+from rig.analysis.discrepancy import STRETCHES, impulse_modes
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 
 if TYPE_CHECKING:

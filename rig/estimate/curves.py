@@ -134,9 +134,9 @@ def _squares(model: DropModel, x: Array, heights: Array) -> Array:
     level = heights - _places(model, x, "impact")[-1]
     level -= _alone(model, x, level) - _turned(model, x, "impact", level)
     ahead, faster = _stretched(model, x, level)
-    pull, way = model.late_pull()
+    way = model.discrepancy.late_way
     if way > 0.0:  # it comes by and by, below the lowest beam
-        late = pull * float(x[model.unknowns["late"]][0])
+        late = model.discrepancy.late_pull * float(x[model.unknowns["late"]][0])
         faster = faster + late * np.clip(1.0 - heights / way, 0.0, 1.0)
     level += ahead
     leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
@@ -159,8 +159,7 @@ def _separations(model: DropModel, x: Array, times: Array) -> Array:
 
 def _stretched(model: DropModel, x: Array, level: Array) -> tuple[Array, Array]:
     """How far ahead strings have pulled the top rod, and how much faster it is for that."""
-    top = np.full(level.shape, model.records["impact"].chain.chain.rods - 1)
-    modes, sizes = model.stretch_modes(top, level), model.stretch(x)
+    modes, sizes = model.discrepancy.top(level), model.stretch(x)
     return modes.way @ sizes, modes.rate @ sizes
 
 

@@ -99,7 +99,8 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     kept = np.concatenate([common, size + np.arange(rods), np.arange(len(at), size)])
     sd = np.append(at.sd, np.ones(len(EXTRA) + rods))
     rest = eliminate(blocks, sd, np.zeros(sd.size), own, kept).rest
-    path = model.trajectory("impact", x)
+    hits = model.trajectory("impact", x).hits
+    assert hits is not None
     return QuadraticForm(
         run,
         record.chain.chain,
@@ -107,7 +108,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
         here,
         rest._replace(columns=np.arange(kept.size)),
         alphas,
-        path.speed[1:] / (1.0 + alphas * record.ratios),
+        hits.arrival,
         edges,
     )
 
