@@ -46,9 +46,8 @@ class Components:
         goes with what its own string does; where M are left it counts by 1/M.
     landed
         By how much the top rod strikes too early to be seen pass: relative to the protocol's own.
-    stretch, usual_impulses, usual_departures
-        Of what strings do to a chain together, and of what of single impulses and departures is
-        the same in all drops of a condition: relative to the protocol's own.
+    stretch
+        Of what strings do to a chain together: relative to the protocol's own.
     gates, rods
         Beam heights and rod places: relative to the protocol's own uncertainties.
     swing
@@ -69,8 +68,6 @@ class Components:
     swing: float = 1.0
     landed: float = 1.0
     stretch: float = 1.0
-    usual_impulses: float = 1.0
-    usual_departures: float = 1.0
 
     def departures(self, loose: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance of how far rods are off their chain, m².

@@ -63,7 +63,7 @@ def supposed(model: DropModel) -> Supposed:
     if model.protocol.drag is None and "drag" in at:
         absent[at["drag"]] = 1.0
     if struck:
-        for name in ("late", *STRETCHES, "usual impulses", "usual departures"):
+        for name in ("late", "strings", *STRETCHES):
             absent[at[name]] = 1.0
         alpha, block = abs(model.guesses["impact"].alpha), at["impulses"]
         bounces = model.components.bounce * alpha / above(block.stop - block.start)

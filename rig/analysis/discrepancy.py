@@ -1,22 +1,20 @@
-"""What Eqs. 8 to 13 leave out, smoothly: how strings stretch a chain, and how impulses differ.
+"""What Eqs. 8 to 13 leave out, smoothly: how strings stretch a chain.
 
 The equations take strings as dead. Real ones throw rods back: 60 ms after the first strike the top
 rod of resolved falls is up to 4 mm ahead of its place, the middle of the chain still in it, alike
 from rod to rod. Taken for independent departures of so many edges it would average away, and draw
 the release along. So each drop has a few smooth modes of its own: powers of a rod's place along the
-chain, which are small but at the top, times a way that grows and one that soon stays as it is.
+chain, which are small but at the top, and the chain as a whole, times a way that grows and one that
+soon stays as it is.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.components import above
 from rig.analysis.trajectory import struck_trajectory
 
 if TYPE_CHECKING:
@@ -33,8 +31,10 @@ if TYPE_CHECKING:
 LOWEST_START = 1e-3
 """Where a struck chain hangs at least, m: an adjustment of nonsense tries what is below ground."""
 
-_POWERS = (2.0, 6.0)
-"""Of a rod's place, 0 at the bottom and 1 at the top; a single 3 covers as well."""
+_POWERS = {0.0: 0.5, 2.0: 1.0, 6.0: 1.0}
+"""Of a rod's place, 0 at the bottom and 1 at the top, and the amplitude of each: 0 for a chain that
+is late as a whole, for strings pass a pull on by and by. A quarter to all of it covers as well, and
+a single 3 beside it."""
 _GROWTH = 3.0
 """Of the lasting mode until the last strike, in amplitudes of the one that soon stays."""
 _SOON = 6.0
@@ -42,8 +42,6 @@ _SOON = 6.0
 MODES = 2 * len(_POWERS)
 STRETCHES = ("stretch", "usual stretch")
 """Blocks of unknowns: of a drop alone, and of all drops of a condition."""
-IMPULSE_MODES = 4
-"""Of impulses along a chain: those of six rods in a row are alike, of 25."""
 
 
 class StretchModes(NamedTuple):
@@ -70,8 +68,6 @@ class Discrepancy:
     ----------
     nominal
         The fall, as the protocol has it.
-    struck
-        1 for each expected edge after the first strike, 0 for those before.
     stretch
         `StretchModes.way` at each expected edge, shape ``(edges, MODES)``.
     late_pull, late_way
@@ -80,7 +76,6 @@ class Discrepancy:
     """
 
     nominal: Trajectory
-    struck: Array
     stretch: Array
     late_pull: float
     late_way: float
@@ -97,14 +92,13 @@ class Discrepancy:
         nominal = struck_trajectory(
             0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
         )
-        struck = np.where(nominal.loose(nominal.times(edges.levels)) > 0.0, 1.0, 0.0)
         stretch = stretch_modes(nominal, edges.rods, edges.levels).way
         if nominal.hits is None or strikes.size < 2:
-            return cls(nominal, struck, stretch, 0.0, 0.0)
+            return cls(nominal, stretch, 0.0, 0.0)
         pull = abs(record.alpha) * float(nominal.hits.ratio[-2] * nominal.hits.arrival[-2])
         lowest = min(protocol.gates.gates[train.gate].height for train in record.trains)
         way = max(0.0, min(lowest, float(strikes[-1] - strikes[-2])))
-        return cls(nominal, struck, stretch, pull, way)
+        return cls(nominal, stretch, pull, way)
 
     def top(self, levels: Array) -> StretchModes:
         """Return the modes at the top rod, the reference point being at some levels, m."""
@@ -132,7 +126,7 @@ def stretch_modes(nominal: Trajectory, rods: Index, levels: Array) -> StretchMod
     share = np.maximum(nominal.times(levels) - first, 0.0) / lasting
     begun = np.where(share > 0.0, 1.0, 0.0)
     fading: Array = begun * np.exp(-_SOON * share)
-    along = np.stack([(rods / last) ** power for power in _POWERS], axis=1)
+    along = np.stack([size * (rods / last) ** power for power, size in _POWERS.items()], axis=1)
 
     def product(growing: Array, staying: Array) -> Array:
         in_time = np.stack([growing, staying], axis=1)
@@ -142,20 +136,3 @@ def stretch_modes(nominal: Trajectory, rods: Index, levels: Array) -> StretchMod
         product(_GROWTH * share, begun - fading),
         product(begun * _GROWTH / lasting, fading * _SOON / lasting),
     )
-
-
-@lru_cache(maxsize=64)  # every path of an adjustment asks for the same few
-def impulse_modes(rods: int) -> Array:
-    """Return how impulses differ along a chain: smoothly, and by the pull of strings at its end.
-
-    Returns
-    -------
-    ndarray
-        Shape ``(rods, IMPULSE_MODES + 1)``: cosines of unit mean square together, and 1/M² for M
-        rods above, 1 for the last pull.
-    """
-    place = (np.arange(rods) + 0.5) / rods
-    waves = np.cos(math.pi * place[:, None] * np.arange(1, IMPULSE_MODES + 1))
-    found = np.column_stack([math.sqrt(2.0 / IMPULSE_MODES) * waves, above(rods) ** -2.0])
-    found.flags.writeable = False
-    return found

@@ -12,12 +12,10 @@ import numpy as np
 from rig.analysis.align import Pairing
 from rig.analysis.components import Components, above, stated
 from rig.analysis.discrepancy import (
-    IMPULSE_MODES,
     LOWEST_START,
     MODES,
     STRETCHES,
     Discrepancy,
-    impulse_modes,
 )
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
 from rig.analysis.swing import drawn, lever, swing_sd
@@ -157,26 +155,16 @@ class DropModel:
             off = math.hypot(components.departure, 0.5 * components.few)
             unknowns.add("top", "top rod", math.sqrt(2.0) * off)
             unknowns.add("landed", "contact", components.landed)
-            self._add_discrepancy(unknowns, rods)
+            self._add_discrepancy(unknowns)
         return unknowns
 
-    def _add_discrepancy(self, unknowns: Unknowns, rods: int) -> None:
-        """Name what the equations leave out, most of it common to the drops of a condition.
-
-        Drops of one rig leave the equations alike: taken for independent that would average away.
-        """
-        priors, components = self.protocol.priors, self.components
-        alpha = self.records["impact"].alpha
-        shares = [priors.impulses] * IMPULSE_MODES + [priors.strings]
-        impulses = components.usual_impulses * np.hypot(
-            np.multiply(shares, alpha), priors.impulse_floor
-        )
-        unknowns.add("usual impulses", "single impulses", impulses)
-        departures = [components.usual_departures * priors.departure] * rods
-        unknowns.add("usual departures", "departures", departures)
+    def _add_discrepancy(self, unknowns: Unknowns) -> None:
+        """Name what the equations leave out."""
+        priors, components, record = self.protocol.priors, self.components, self.records["impact"]
+        unknowns.add("strings", "single impulses", priors.strings * abs(record.alpha))
         # A half of its variance is the same in all drops.
-        size = priors.stretch * math.hypot(alpha, priors.impulse_floor)
-        size *= components.stretch * self.records["impact"].chain.chain.length
+        size = priors.stretch * math.hypot(record.alpha, priors.impulse_floor)
+        size *= components.stretch * record.chain.chain.length
         for name in STRETCHES:
             unknowns.add(name, "stretch", [math.sqrt(0.5) * size] * MODES)
         # No edge tells it; where strings do not bounce, there is none.
@@ -200,7 +188,7 @@ class DropModel:
             return self
         other = copy(self)
         impulse = min(_ALIKE, self.components.impulse)
-        none = dict.fromkeys(("bounce", "landed", "stretch", "usual_impulses"), 0.0)
+        none = dict.fromkeys(("bounce", "landed", "stretch"), 0.0)
         other.components = replace(self.components, impulse=impulse, **none)
         other.unknowns = other._unknowns()  # other priors, and the same paths
         return other
@@ -310,7 +298,7 @@ class DropModel:
         if "impact swing" in at:
             places -= x[at["impact swing"]] * self._drawn()
         gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        gains += impulse_modes(places.size) @ x[at["usual impulses"]]
+        gains += x[at["strings"]] / above(places.size) ** 2
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
@@ -365,7 +353,6 @@ class DropModel:
         if role == "impact":
             found -= edges.alone * x[at["top"]][0]
             found -= edges.landed * x[at["landed"]][0]
-            found -= self.discrepancy.struck * x[at["usual departures"]][edges.rods]
             found += self.discrepancy.stretch @ self.stretch(x)
         return found
 
@@ -477,8 +464,6 @@ class DropModel:
         if role == "impact":
             columns.append((at["top"].start, seen.alone.astype(np.float64)))
             columns.append((at["landed"].start, seen.landed))
-            struck = self.discrepancy.struck[seen.pick]
-            columns.append((at["usual departures"].start + seen.rods, struck))
             modes = -self.discrepancy.stretch[seen.pick].T
             for name in STRETCHES:
                 columns += [(at[name].start + n, mode) for n, mode in enumerate(modes)]

@@ -36,21 +36,14 @@ Size = TypeVar("Size", float, "Array")
 
 STATED_WEIGHT = 2.0
 """Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
-_UNLIKE = ("usual_departures", "stretch")
-"""How far chains leave the equations."""
-_MEMBERS = (*_UNLIKE, "usual_impulses", "gates", "rods", "beam", "hang", "swing")
+_LARGER = 4.0
+"""Times as many against a larger one: a few gates that seem off may be how chains fall instead."""
+_MEMBERS = ("stretch", "gates", "rods", "beam", "hang", "swing")
 _EDGES = ("jitter", "floor", "departure", "few")
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
-_KINDS = {
-    "beams": "gates",
-    "ripple": "beam",
-    " rods": "rods",
-    "usual stretch": "stretch",
-    "usual impulses": "usual_impulses",
-    "usual departures": "usual_departures",
-}
+_KINDS = {"beams": "gates", "ripple": "beam", " rods": "rods", "usual stretch": "stretch"}
 """By how the name of a block of the session's unknowns ends: which scale its members tell."""
 _BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
@@ -145,12 +138,12 @@ class Evidence:
             # Where no rod is off its chain, few are not either: the least of it explains nothing.
             self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
             new["few"] = LEAST_SHARE * self.stated.few
-        for kind in _UNLIKE:
-            self._settle(kind, LEAST_SHARE, new)
+        self._settle("stretch", LEAST_SHARE, new)
         # Where chains leave the equations, whatever else is found may be how they do that.
-        parted = max([parted, *(new[kind] for kind in _UNLIKE if self._determined[kind] > 0.0)])
+        if self._determined["stretch"] > 0.0:
+            parted = max(parted, new["stretch"])
         parted = max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
-        for kind in _MEMBERS[len(_UNLIKE) :]:
+        for kind in _MEMBERS[1:]:
             self._settle(kind, parted, new)
         for name in ("jitter", "floor"):
             new[name] = max(new[name], parted * getattr(self.stated, name))
@@ -170,7 +163,12 @@ class Evidence:
         degrees = weight + self._determined[kind]
         self.degrees[kind] = max(STATED_WEIGHT, degrees)
         squares = weight * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
-        new[kind] = max(old * (squares / degrees) ** 0.5, share_at_least * beforehand)
+        size = old * (squares / degrees) ** 0.5
+        if size > beforehand:
+            weight *= _LARGER
+            squares = weight * (beforehand / old) ** 2 + self._squares[kind]
+            size = max(beforehand, old * (squares / (weight + self._determined[kind])) ** 0.5)
+        new[kind] = max(size, share_at_least * beforehand)
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
         """Sort edges by what scatters alike: at about the same speed, with as many rods falling.

@@ -41,7 +41,7 @@ FEWEST = 4
 """Drops that a session must have for a joint fit: one block of A, B, B, A."""
 IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""
-_ROUNDS = 30  # of which few drops need many, for they tell little of the scatter
+_ROUNDS = 60  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
 _DONE = 0.02  # of a standard uncertainty
 _SHORTEST = 1e-6  # share of a step, less of which is none

@@ -169,10 +169,11 @@ def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[floa
         + chain.width_u**2 * np.outer(seen.sign, seen.sign)
         + np.outer(seen.landed, seen.landed)
     )
-    weighted = np.linalg.solve(covariance, np.column_stack([design, fallen]))
-    inverse = np.linalg.inv(design.T @ weighted[:, :2])
-    height, speed = inverse @ (design.T @ weighted[:, 2])
-    return (float(height), float(speed)), inverse.astype(np.float64, copy=False)
+    root = np.linalg.cholesky(covariance)
+    basis, triangle = np.linalg.qr(np.linalg.solve(root, design))
+    inverse = np.linalg.inv(triangle)
+    height, speed = inverse @ (basis.T @ np.linalg.solve(root, fallen))
+    return (float(height), float(speed)), np.asarray(inverse @ inverse.T, dtype=np.float64)
 
 
 def _u(covariance: Array, *slope: float) -> float:

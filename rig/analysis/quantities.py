@@ -58,7 +58,6 @@ BUDGET = {
     "swing": BudgetLine(guessed=True, scale="swing"),
     "single impulses": BudgetLine(guessed=True, scale="impulse"),
     "top rod": BudgetLine(guessed=True, scale="departure"),
-    "departures": BudgetLine(common=True, guessed=True, scale="usual_departures"),
     "stretch": BudgetLine(common=True, guessed=True, scale="stretch"),
     "late pull": BudgetLine(guessed=True, scale="bounce"),
     "contact": BudgetLine(guessed=True),

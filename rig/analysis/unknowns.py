@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.discrepancy import STRETCHES, impulse_modes
+from rig.analysis.components import above
+from rig.analysis.discrepancy import STRETCHES
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def side_columns(
     others = ["impact " if role == "free" else "free "]
     if role == "free":
         others += ["alpha", "impulses", "contact", "strike", "top", "landed", "late"]
-        others += [*STRETCHES, "usual impulses", "usual departures"]
+        others += ["strings", *STRETCHES]
     mine = np.ones(places[-1][2], dtype=np.bool_)
     for name, block in at.items():
         mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
@@ -175,7 +176,7 @@ def _path(
         row = np.arange(rods)
         found[gains, at["alpha"]] = 1.0
         found[COMMON + row, at["impulses"].start + row] = 1.0
-        found[gains, at["usual impulses"]] = impulse_modes(rods)
+        found[gains, at["strings"].start] = above(rods) ** -2.0
         found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
         found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
         found[-1, at["top"]] = 1.0
@@ -226,9 +227,7 @@ def _names(model: DropModel) -> dict[str, slice]:
     found = {name: at[name] for name in _RIG if name in at and name not in measured}
     for role, record in model.records.items():
         if role == "impact":
-            own = f"{record.chain.name} usual departures at {record.condition}"
-            found[own] = at["usual departures"]
-            for name in ("contact", "usual stretch", "usual impulses"):
+            for name in ("contact", "usual stretch", "strings"):
                 found[f"{name} at {record.condition}"] = at[name]
         found |= {f"{record.chain.name} {what}": at[f"{role} {what}"] for what in _CHAIN}
     return found

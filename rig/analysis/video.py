@@ -57,16 +57,17 @@ def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
         s and m, shape ``(frames,)``, at least 4 frames.
     """
     design = np.vander(times - times.mean(), 3)  # centred, so that squares do not drown
-    inverse = np.linalg.inv(design.T @ design)
+    basis, triangle = np.linalg.qr(design)
+    inverse = np.linalg.inv(triangle)
     places = np.column_stack([x, y])
-    solved = inverse @ design.T @ places
+    solved = inverse @ (basis.T @ places)
     left = places - design @ solved
     rates = 2.0 * solved[0]
     size = float(np.hypot(*rates))
     along = rates / size if size else np.array([0.0, 1.0])
     degrees = times.size - 3
     off = left @ along  # only what scatters the same way moves the size
-    u = 2.0 * float(np.sqrt(off @ off / degrees * inverse[0, 0]))
+    u = 2.0 * float(np.sqrt(off @ off / degrees) * np.linalg.norm(inverse[0]))
     total = float(off @ off)
     neighbours = float(off[1:] @ off[:-1]) / total if total else 0.0
     bent = times.size >= _ENOUGH and neighbours > _BENT

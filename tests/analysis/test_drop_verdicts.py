@@ -291,7 +291,7 @@ def test_what_is_known_exactly_stays_as_it_is(scene):
     result = one.analyze()
     assert result.verdict == "accepted"
     ours = {"edges", "start height", "side", "single impulses", "beam offsets", "air"}
-    ours |= {"contact", "top rod", "swing", "stretch", "departures", "late pull"}
+    ours |= {"contact", "top rod", "swing", "stretch", "late pull"}
     if scene == "fence":
         ours.add("gravity")  # what is measured, so it is never known
     for name, measured in result.quantities.items():

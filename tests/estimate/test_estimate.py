@@ -29,8 +29,9 @@ from tests.analysis.sessions import cases
 from tests.estimate.sessions import BETA, DIALS, MU, analysis, forms
 
 SURFACE = (30.0, 50.0, 70.0)
-LIKE = Priors(impulses=0.05, last_impulse=0.01, strings=0.0)
-"""What is known of impulses that are nearly alike: else a few drops tell no α to a part in ten."""
+LIKE = Priors(impulses=0.05, last_impulse=0.01, strings=0.0, stretch=0.005)
+"""What is known of impulses that are nearly alike, and of strings that hardly stretch: else a few
+drops tell no α to a part in ten."""
 
 
 @pytest.fixture(scope="module")
