@@ -420,6 +420,7 @@ def _parser() -> Parser:
         action="store_true",
         help="allow release 0 to be driven, once for 50 ms; without it no release ever is",
     )
+    _json(selftest)
 
     completion = command("completion", "print what a shell reads to complete what is typed")
     completion.add_argument("shell", choices=("bash", "zsh", "fish"), help="which shell")

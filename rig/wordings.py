@@ -29,7 +29,7 @@ class Wording:
     severity
         What it does to a verdict.
     label
-        In a few words, where several drops have it.
+        In a few words, where several drops have it; empty where no drop does.
     sentence
         With places for values, see `_Phrases`.
     remedy
@@ -40,6 +40,14 @@ class Wording:
     label: str
     sentence: str
     remedy: str = ""
+
+
+def _finding(sentence: str, remedy: str = "") -> Wording:
+    return Wording(Severity.DOUBT, "", sentence, remedy)
+
+
+def _remark(sentence: str) -> Wording:
+    return Wording(Severity.REMARK, "", sentence)
 
 
 _VOID, _DOUBT, _REMARK = Severity.VOID, Severity.DOUBT, Severity.REMARK
@@ -64,6 +72,9 @@ WIRING = "the release's wiring (a coil without a diode resets boards)"
 SUPPLY = "is its supply shared with the magnets?"
 _CLEAR = "clear the beam, and see that its emitter has power and its plugs sit"
 _STILL = f"{_CLEAR}; let everything come to rest"
+_CABLE = "take another cable or USB port"
+_FLASH = "write the firmware for this very board: rig flash"
+_LOOPBACK = "check the wire from the sync output to this gate"
 _RULE = (
     "python -m rig.usb.udev | sudo tee /etc/udev/rules.d/60-chainrig.rules, then "
     "sudo udevadm control --reload and sudo udevadm trigger"
@@ -318,73 +329,71 @@ WORDINGS: dict[str, Wording] = {
     "disarmed_stopped": Wording(
         _VOID, "emergency stop", "the device disarmed itself: the emergency stop was opened", _STOP
     ),
-    # What the doctor finds.
-    "packages_mixed": Wording(
-        _DOUBT, "packages mixed", "{packages} too: files of both are in one folder",
+    # What the doctor and the self-test find.
+    "packages_mixed": _finding(
+        "{packages} too: files of both are in one folder",
         "python -m pip uninstall {names} chainrig, then install chainrig again"),
-    "port_missing": Wording(
-        _DOUBT, "no port", "there is no such port", "is the board plugged in? rig ports"),
-    "port_forbidden": Wording(
-        _DOUBT, "no permission", "not given: it belongs to the group {group}",
+    "port_missing": _finding("there is no such port", "is the board plugged in? rig ports"),
+    "port_forbidden": _finding(
+        "not given: it belongs to the group {group}",
         f"sudo usermod -aG {{join}} $USER and log in again, or {_RULE}"),
-    "port_of_root": Wording(
-        _DOUBT, "no permission", "not given: it belongs to the group root", _RULE),
-    "port_in_use": Wording(_DOUBT, "port in use", "{owners}", "close that program"),
-    "port_of_daemon": Wording(
-        _DOUBT, "port in use", "{owners}",
-        "let that daemon do the work: rig run and rig tui ask it"),
-    "modem_manager": Wording(
-        _DOUBT, "ModemManager", "it may speak to the board, which restarts it", _RULE),
-    "firmware_differs": Wording(
-        _DOUBT, "firmware", "{firmware}, but {shipped} comes with rig", "rig flash"),
-    "drop_held": Wording(
-        _DOUBT, "drop held", "run {run}, attempt {attempt}",
+    "port_of_root": _finding("not given: it belongs to the group root", _RULE),
+    "port_in_use": _finding("{owners}", "close that program"),
+    "port_of_daemon": _finding(
+        "{owners}", "let that daemon do the work: rig run and rig tui ask it"),
+    "modem_manager": _finding("it may speak to the board, which restarts it", _RULE),
+    "firmware_differs": _finding("{firmware}, but {shipped} comes with rig", "rig flash"),
+    "drop_held": _finding(
+        "the board holds a drop (run {run}, attempt {attempt})",
         "continue the session it belongs to: rig run"),
-    "clock_unknown": Wording(
-        _DOUBT, "clock", "its rate cannot be determined from {pings} pings",
-        "take another cable or USB port; is the firmware for this very board? rig flash"),
-    "clock_off": Wording(
-        _DOUBT, "clock", "{ppm:+.0f} ± {U95:.0f} ppm",
+    "clock_unknown": _finding(
+        "the clock's rate cannot be determined from {pings} pings", f"{_CABLE}; {_FLASH}"),
+    "clock_off": _finding(
+        "the clock is off by {ppm:+.0f} ± {U95:.0f} ppm",
         "its resonator is broken: take another board"),
-    "no_ping": Wording(_DOUBT, "no ping", "no ping came through", "take another cable or USB port"),
-    "slow_answers": Wording(
-        _DOUBT, "round trip", "{slowest_s:.1f ms} at most",
-        "close what keeps this computer busy; no USB hub"),
-    "stop_open": Wording(
-        _DOUBT, "emergency stop", "open", "close it, or plug its cable in: it opens too"),
-    "gates_blocked": Wording(
-        _DOUBT, "gates blocked", "{gates_listed}",
-        f"{_CLEAR}; an input without a gate reads so too: leave it"),
-    "gates_flicker": Wording(_DOUBT, "gates flicker", "{gates_listed}", _STILL),
-    "gates_flicker_mains": Wording(
-        _DOUBT, "gates flicker", "{gates_listed}",
+    "no_ping": _finding("no ping came through", _CABLE),
+    "slow_answers": _finding(
+        "answers take up to {slowest_s:.1f ms}", "close what keeps this computer busy; no USB hub"),
+    "stop_open": _finding("open", "close it, or plug its cable in: it opens too"),
+    "gates_blocked": _finding(
+        "{gates_listed} blocked all the time",
+        f"{_CLEAR}; an input without a gate reads so too: leave it, or wire it to ground"),
+    "gates_flicker": _finding("changing while nothing moves: {gates_listed}", _STILL),
+    "gates_flicker_mains": _finding(
+        "changing while nothing moves: {gates_listed}",
         "keep lamps off the receivers and mains leads off the cables; shield the beams"),
-    "disk_full": Wording(
-        _DOUBT, "disk", "{free_mb:.0f} MB free in {folder}",
+    "disk_full": _finding(
+        "{free_mb:.0f} MB free in {folder}",
         "free {needed_mb:.0f} MB there, or keep sessions elsewhere"),
-    "session_missing": Wording(
-        _DOUBT, "session missing", "not there", "check its name; rig run makes a new one"),
-    "no_session": Wording(
-        _DOUBT, "no session", "not a session: {text}", "name a file made by rig run"),
-    "session_damaged": Wording(
-        _DOUBT, "session damaged", "damaged: {text}", "rig recover {path} -o NEW.session"),
-    "board_restarts": Wording(
-        _DOUBT, "board restarted", "{text}",
-        f"{SUPPLY} Give them one of their own, and check {WIRING}"),
-    "failed": Wording(_DOUBT, "failed", "{text}", "{hint}"),
+    "session_missing": _finding("not there", "check its name; rig run makes a new one"),
+    "no_session": _finding("not a session: {text}", "name a file made by rig run"),
+    "session_damaged": _finding("damaged: {text}", "rig recover {path} -o NEW.session"),
+    "board_restarts": _finding(
+        "{text}", f"{SUPPLY} Give them one of their own, and check {WIRING}"),
+    "failed": _finding("{text}", "{hint}"),
+    "no_answer": _finding("no answer to {request}", f"{_CABLE}; {_FLASH}"),
+    "wrong_answer": _finding("{request} should give {expected}, but gives {answer}", _FLASH),
+    "invalid_message": _finding("the board sent an invalid message: {text}", _FLASH),
+    "fire_withheld": _finding("FIRE was not sent, because a release may be armed", _FLASH),
+    "sync_blocked": _finding("gate {gate} is not clear before FIRE", _LOOPBACK),
+    "sync_edges": _finding(
+        "FIRE made {events} events at gate {gate} instead of one edge", _LOOPBACK),
+    "sync_late": _finding("{latency}: more than the board's own {ticks} ticks", _FLASH),
+    "computer_busy": _finding(
+        "this computer was too busy to ask the board every {interval_s:.0f ms}",
+        "close what keeps it busy, then rig selftest again"),
+    "check_needs": _finding("it needs {needed}"),
     # What an import assumes of another timer's file.
-    "samples": Wording(
-        _REMARK, "samples", "sampled every {period_us:.4g} µs: an edge is known to {u_us:.3g} µs "
+    "samples": _remark(
+        "sampled every {period_us:.4g} µs: an edge is known to {u_us:.3g} µs "
         "at best; state that as priors: {{jitter: ...}} in the protocol if it is more than 2 µs"),
-    "inputs_unused": Wording(_REMARK, "not used", "inputs that are no gate: {inputs}; see --map"),
-    "columns_unused": Wording(_REMARK, "not used", "not used: {columns}"),
-    "no_passage": Wording(
-        _REMARK, "nothing passes", "{input}: nothing passes, {low:.3g} to {high:.3g}"),
-    "crossings": Wording(_REMARK, "level", "{input}: {crossings} crossings of {level:.3g}"),
-    "several_drops": Wording(
-        _REMARK, "several drops", "split into {drops} drops at pauses longer than {pause_s:g} s"),
-    "blocked_level": Wording(
-        _REMARK, "blocked level", "assumed: a {level} signal is a blocked beam, because beams are "
+    "inputs_unused": _remark("inputs that are no gate: {inputs}; see --map"),
+    "columns_unused": _remark("not used: {columns}"),
+    "no_passage": _remark("{input}: nothing passes, {low:.3g} to {high:.3g}"),
+    "crossings": _remark("{input}: {crossings} crossings of {level:.3g}"),
+    "several_drops": _remark("split into {drops} drops at pauses longer than {pause_s:g} s"),
+    "blocked_level": _remark(
+        "assumed: a {level} signal is a blocked beam, because beams are "
         "clear at the beginning; --dark {other} reverses this"),
     # Words of people and of old files.
     OPERATOR: Wording(_VOID, "rejected by the operator", "{text}"),

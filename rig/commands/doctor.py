@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from rig.commands.output import print_json, say
 from rig.doctor import checks
-from rig.doctor.checks import Finding
 from rig.doctor.gathering import (
     look_at_board,
     look_at_disk,
@@ -18,6 +17,7 @@ from rig.doctor.gathering import (
 )
 from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
+from rig.selftest.findings import Finding
 from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:

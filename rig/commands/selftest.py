@@ -5,27 +5,35 @@ from __future__ import annotations
 from contextlib import closing
 from typing import TYPE_CHECKING
 
-from rig.commands.output import say
+from rig.commands.output import print_json, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
+from rig.reasons import remedies
 from rig.selftest.board import SelftestOptions
+from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
-from rig.selftest.verdicts import Verdict
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:
-    """Make all checks, one line each."""
+    """Make all checks, one line each, then say what to do about those that failed."""
     options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release)
     if options.release:
         say("release 0 will be driven once: keep clear of it")
+    findings = []
     with closing(open_port(arguments.port)) as port:
-        failed = 0
-        for outcome in selftest(port, port_clock(port), options):
-            print(outcome, flush=True)
-            failed += outcome.verdict is Verdict.FAILED
-    if failed:
-        say(f"{failed} checks failed" if failed > 1 else "1 check failed")
-    return DeviceError.exit_code if failed else 0
+        for finding in selftest(port, port_clock(port), options):
+            findings.append(finding)
+            if not arguments.json:
+                words = finding.name, finding.verdict, finding.what
+                print(": ".join(filter(None, words)), flush=True)
+    if arguments.json:
+        print_json({"checks": [finding.json() for finding in findings]})
+    failures = sum(finding.verdict is Verdict.FAILED for finding in findings)
+    for advice in remedies(finding.reason for finding in findings if finding.reason):
+        say(f"do: {advice}")
+    if failures:
+        say(f"{failures} checks failed" if failures > 1 else "1 check failed")
+    return DeviceError.exit_code if failures else 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cmath
 from collections import Counter
-from dataclasses import dataclass
 from math import tau
 from typing import TYPE_CHECKING
 
@@ -13,13 +12,13 @@ from rig.clock.rate import tick_rate
 from rig.link.gatewatch import listed
 from rig.link.messages import HOST_SILENCE_MS, unpack_label
 from rig.link.restarts import causes
-from rig.reasons import make_reason, remedies
+from rig.reasons import make_reason
+from rig.selftest.findings import Finding, explain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.doctor.facts import BoardFacts, DiskFacts, PortFacts, SessionFacts
-    from rig.reasons import Reason
 
 ROOM = 200 * 10**6
 """Bytes that should be free: a day of drops takes a few tens of MB, and its log as much again."""
@@ -28,28 +27,9 @@ _IN_STEP = 0.8
 _ENOUGH = 10  # edges to tell a rhythm from chance
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One line of the doctor's: what is well, or a problem with its reason and an advice."""
-
-    name: str
-    what: str
-    advice: str = ""
-    reason: Reason | None = None
-
-    def json(self) -> dict[str, object]:
-        """Return it as a member of ``findings``."""
-        codes = [self.reason.json()] if self.reason else []
-        return {"name": self.name, "what": self.what, "advice": self.advice, "reason_codes": codes}
-
-    def __str__(self) -> str:
-        return f"{self.name}: {self.what}" + (f"\n  do: {self.advice}" if self.advice else "")
-
-
 def problem(name: str, code: str, **values: object) -> Finding:
     """Make a finding of a code of `rig.wordings` and its values."""
-    reason = make_reason(code, **values)
-    return Finding(name, reason.text, "; ".join(remedies([reason])), reason)
+    return explain(name, make_reason(code, **values))
 
 
 def other_packages(names: Sequence[str]) -> Finding:

@@ -11,8 +11,8 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import watch_gates
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
+from rig.selftest.findings import CheckFailedError, NotPossibleError, insist_refusal, wrong_answer
 from rig.selftest.line import Heard, RawLine
-from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -121,7 +121,7 @@ class BoardUnderTest:
         if isinstance(message, wire.Arm) and message.release and not self.options.release:
             self._may_release = True
         if isinstance(message, wire.Fire) and self._may_release:
-            raise CheckFailedError("a release may be armed: FIRE was not sent")
+            raise CheckFailedError("fire_withheld")
         return self.ask_raw(code, payload, type(message).__name__, seq)
 
     def ask_raw(self, code: int, payload: bytes, name: str, seq: int | None = None) -> wire.Message:
@@ -132,28 +132,33 @@ class BoardUnderTest:
             heard = self.wait(_ANSWER_S, lambda heard: heard.ack == seq)
             if heard is not None:
                 return heard.message
-        raise CheckFailedError(f"no answer to {name}")
+        raise CheckFailedError("no_answer", request=name)
 
-    def answer(self, message: wire.HostMessage, kind: type[Answer]) -> Answer:
+    def answer(
+        self, message: wire.HostMessage, kind: type[Answer], seq: int | None = None
+    ) -> Answer:
         """Ask, and insist on one kind of answer."""
-        answer = self.ask(message)
+        answer = self.ask(message, seq)
         if not isinstance(answer, kind):
-            raise CheckFailedError(f"{type(message).__name__} is answered with {answer}")
+            raise wrong_answer(type(message).__name__, kind.__name__, answer)
         return answer
 
-    def refused(
+    def refuse(
         self, message: wire.HostMessage, reason: RefusalReason, detail: int | None = None
     ) -> wire.Refused:
         """Ask, and insist on being refused."""
-        return insist_refused(self.ask(message), type(message).__name__, reason, detail)
+        return insist_refusal(type(message).__name__, self.ask(message), reason, detail)
 
     def wait(self, seconds: float, wanted: Callable[[Heard], bool]) -> Heard | None:
         """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
-        for heard in self.line.listen(seconds):
-            if wanted(heard):
-                return heard
-            if heard.ack == 0:
-                self._unasked.append(heard)
+        try:
+            for heard in self.line.listen(seconds):
+                if wanted(heard):
+                    return heard
+                if heard.ack == 0:
+                    self._unasked.append(heard)
+        except wire.MessageError as error:
+            raise CheckFailedError("invalid_message", text=str(error)) from error
         return None
 
     def unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Heard | None:
@@ -178,9 +183,9 @@ class BoardUnderTest:
 
     def arm(self, **changes: int) -> int:
         """Arm without a release; give the token."""
-        return self.armed_by(self.ask(self.order(**changes)))
+        return self.read_token(self.ask(self.order(**changes)))
 
-    def armed_by(self, answer: wire.Message) -> int:
+    def read_token(self, answer: wire.Message) -> int:
         """Take the token from an answer to ARM.
 
         Raises
@@ -192,10 +197,10 @@ class BoardUnderTest:
             case wire.Armed(token=token):
                 return token
             case wire.Refused(reason=RefusalReason.STOPPED):
-                raise NotPossibleError("the emergency stop is open: close it")
-            case wire.Refused(reason=RefusalReason.COOLING):
-                raise NotPossibleError("the release is still cooling: wait a few seconds")
-        raise CheckFailedError(f"Arm is answered with {answer}")
+                raise NotPossibleError("refused_stopped")
+            case wire.Refused(reason=RefusalReason.COOLING, detail=rest_ms):
+                raise NotPossibleError("refused_cooling", rest_s=rest_ms / 1000)
+        raise wrong_answer("Arm", "Armed", answer)
 
     def fire(self, token: int) -> wire.Fired:
         """Fire what was armed."""
@@ -203,9 +208,11 @@ class BoardUnderTest:
 
     def drop(self, **changes: int) -> Recorded:
         """Arm, fire, and take what the board sends until its certificate."""
-        return self.ending(self.fire(self.arm(**changes)), changes.get("record_ms", RECORD_MS))
+        return self.collect_drop(
+            self.fire(self.arm(**changes)), changes.get("record_ms", RECORD_MS)
+        )
 
-    def ending(self, fired: wire.Fired, record_ms: int = 0) -> Recorded:
+    def collect_drop(self, fired: wire.Fired, record_ms: int = 0) -> Recorded:
         """Take what the board sends of a drop, up to its certificate."""
         events: list[wire.Event] = []
         deadline = self.clock.now_ns() + round((record_ms / 1000 + _END_S) * 1e9)
@@ -216,18 +223,24 @@ class BoardUnderTest:
                     events += more
                 case wire.DropCertificate() as certificate:
                     return Recorded(fired, tuple(events), certificate)
-        raise CheckFailedError("no certificate came after the recording")
+        raise CheckFailedError("no_certificate")
 
     def acknowledge(self, recorded: Recorded) -> None:
         """Let the board forget a drop."""
-        seen = recorded.certificate
-        self.answer(wire.Acknowledge(seen.label, seen.crc32), wire.Done)
+        certificate = recorded.certificate
+        self.answer(wire.Acknowledge(certificate.label, certificate.crc32), wire.Done)
 
     # -- rest
 
     def phase(self) -> Phase:
         """Ask what the board is doing."""
         return self.answer(wire.Status(), wire.State).phase
+
+    def insist_phase(self, phase: Phase, event: str) -> None:
+        """Insist on what the board is doing after an event."""
+        actual = self.phase()
+        if actual is not phase:
+            raise wrong_answer(f"Status after {event}", phase.name, actual.name)
 
     def settle(self) -> None:
         """Bring the board back to IDLE; somebody else's drop is left as it is.
@@ -241,11 +254,11 @@ class BoardUnderTest:
         self._unasked.clear()
         for _ in range(4):
             state = self.answer(wire.Status(), wire.State)
-            mine = unpack_label(state.label)[0] == TEST_RUN
+            own = unpack_label(state.label)[0] == TEST_RUN
             if state.phase is Phase.IDLE:
                 self._may_release = False
                 return
-            if state.phase is not Phase.ARMED and not mine:
+            if state.phase is not Phase.ARMED and not own:
                 self.foreign = state.label
                 return
             if state.phase is Phase.HOLDING:
@@ -254,7 +267,7 @@ class BoardUnderTest:
             else:
                 self.answer(wire.Abort(), wire.Done)
                 self.wait(_ANSWER_S, lambda h: isinstance(h.message, wire.DropCertificate))
-        raise CheckFailedError("the board does not come to rest")
+        raise wrong_answer("Abort", "an idle board", state.phase.name)
 
     def need_idle(self) -> None:
         """Refuse to go on before a board that holds somebody's drop.
@@ -266,9 +279,7 @@ class BoardUnderTest:
         """
         if self.foreign:
             run, attempt = unpack_label(self.foreign)
-            raise NotPossibleError(
-                f"the board holds a drop (run {run}, attempt {attempt}): continue its session first"
-            )
+            raise NotPossibleError("drop_held", run=run, attempt=attempt)
 
     # -- gates
 
@@ -288,33 +299,14 @@ class BoardUnderTest:
         NotPossibleError
             There is none.
         """
-        seen, identity = self.gates(), self.known()
-        restless = seen.stuck | seen.flickering
+        states, identity = self.gates(), self.known_identity()
+        restless = states.stuck | states.flickering
         for gate in reversed(range(identity.gates)):
             if not restless >> gate & 1 and gate != self.options.loopback:
                 return 1 << gate
-        raise NotPossibleError("no gate is clear and steady")
+        raise NotPossibleError("check_needs", needed="a gate that is clear and steady")
 
-    def known(self) -> wire.Identity:
+    def known_identity(self) -> wire.Identity:
         """Who the board is."""
         assert self.identity is not None, "the handshake comes first"
         return self.identity
-
-
-def insist_refused(
-    answer: wire.Message, what: str, reason: RefusalReason, detail: int | None = None
-) -> wire.Refused:
-    """Give an answer that is the right refusal.
-
-    Raises
-    ------
-    CheckFailedError
-        It is something else.
-    """
-    if not isinstance(answer, wire.Refused) or answer.reason is not reason:
-        raise CheckFailedError(f"{what} should be refused with {reason.name}, but: {answer}")
-    if detail is not None and answer.detail != detail:
-        raise CheckFailedError(
-            f"{what}: {reason.name} should have detail {detail}, but has {answer.detail}"
-        )
-    return answer

@@ -9,23 +9,22 @@ from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import listed
 from rig.link.messages import PROTOCOL_VERSION, RefusalReason
-from rig.selftest.board import insist_refused
+from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, insist_refusal
 from rig.selftest.requests import UNKNOWN_CODES, wrong_lengths
-from rig.selftest.verdicts import CheckFailedError, NotPossibleError
 
 if TYPE_CHECKING:
     from rig.selftest.board import BoardUnderTest
 
 
-def handshake(board: BoardUnderTest) -> str:
+def identify(board: BoardUnderTest) -> str:
     """See that the board introduces itself, sensibly and twice alike."""
     board.line.port.write(DELIMITER)
     board.unasked(BOOT_WAIT_S, wire.Boot)
     identity = board.answer(wire.Identify(), wire.Identity)
     board.identity = identity
-    odd = [
-        what
-        for what, wrong in (
+    faults = [
+        fault
+        for fault, present in (
             ("no name", not (identity.board and identity.firmware)),
             ("no id", not any(identity.unique_id)),
             ("no gates", not identity.gates),
@@ -34,23 +33,23 @@ def handshake(board: BoardUnderTest) -> str:
             ("an impossible tick rate", identity.tick_hz < 1_000_000),
             ("hardly any memory", identity.capacity < 100),
         )
-        if wrong
+        if present
     ]
-    if odd:
-        raise CheckFailedError(f"its IDENTITY has {', '.join(odd)}")
-    if board.answer(wire.Identify(), wire.Identity) != identity:
-        raise CheckFailedError("asked twice, it gives two different IDENTITYs")
+    if faults:
+        values = {"expected": "a complete identity", "answer": ", ".join(faults)}
+        raise CheckFailedError("wrong_answer", request="Identify", **values)
+    insist("a second Identify", board.answer(wire.Identify(), wire.Identity), identity)
     return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
 
 
-def another_version(board: BoardUnderTest) -> str:
+def ask_other_versions(board: BoardUnderTest) -> str:
     """See that clients of other versions are turned away."""
     for version in (0, PROTOCOL_VERSION + 1):
-        board.refused(wire.Identify(version), RefusalReason.VERSION, PROTOCOL_VERSION)
+        board.refuse(wire.Identify(version), RefusalReason.VERSION, PROTOCOL_VERSION)
     return ""
 
 
-def every_message(board: BoardUnderTest) -> str:
+def ask_every_message(board: BoardUnderTest) -> str:
     """See that each request gets its own kind of answer; those about drops have their own tests."""
     board.answer(wire.Ping(), wire.Pong)
     board.answer(wire.Status(), wire.State)
@@ -60,50 +59,43 @@ def every_message(board: BoardUnderTest) -> str:
     return ""
 
 
-def unknown_messages(board: BoardUnderTest) -> str:
+def send_unknown_messages(board: BoardUnderTest) -> str:
     """See that types that are no requests are refused."""
     for code in UNKNOWN_CODES:
-        what = f"type 0x{code:02X}"
-        answer = board.ask_raw(code, b"", what)
-        insist_refused(answer, what, RefusalReason.UNKNOWN_MESSAGE, code)
+        request = f"type 0x{code:02X}"
+        answer = board.ask_raw(code, b"", request)
+        insist_refusal(request, answer, RefusalReason.UNKNOWN_MESSAGE, code)
     return ""
 
 
-def other_lengths(board: BoardUnderTest) -> str:
+def send_other_lengths(board: BoardUnderTest) -> str:
     """See that a request that is too long or too short is refused."""
     for code, payload in wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
-        what = f"{wire.TABLE[code].__name__} of {len(payload)} bytes"
-        insist_refused(board.ask_raw(code, payload, what), what, RefusalReason.BAD_PARAMETER, 0)
+        request = f"{wire.TABLE[code].__name__} of {len(payload)} bytes"
+        answer = board.ask_raw(code, payload, request)
+        insist_refusal(request, answer, RefusalReason.BAD_PARAMETER, 0)
     return ""
 
 
-def gates_now(board: BoardUnderTest) -> str:
+def look_at_gates(board: BoardUnderTest) -> str:
     """See that every gate is clear and keeps still."""
-    seen, count = board.gates(), board.known().gates
-    faults = [
-        f"{listed(mask)} {what}"
-        for mask, what in (
-            (seen.stuck, "blocked all the time"),
-            (seen.flickering, "changing with nothing moving"),
-        )
-        if mask
-    ]
-    if faults:
-        raise CheckFailedError(
-            f"{'; '.join(faults)}: clear the beam, check its wires, and wire unused gates to ground"
-        )
-    return f"{count} gates clear"
+    states = board.gates()
+    if states.stuck:
+        raise CheckFailedError("gates_blocked", gates_listed=listed(states.stuck))
+    if states.flickering:
+        raise CheckFailedError("gates_flicker", gates_listed=listed(states.flickering))
+    return f"{board.known_identity().gates} gates clear"
 
 
-def a_blocked_gate(board: BoardUnderTest) -> str:
+def arm_blocked_gate(board: BoardUnderTest) -> str:
     """See that a gate that is blocked forbids arming."""
     board.need_idle()
     stuck = board.gates().stuck
     if not stuck:
-        raise NotPossibleError("no gate is blocked; block one by hand to see this")
+        raise NotPossibleError("check_needs", needed="a gate that is blocked by hand")
     gate = stuck & -stuck
     answer = board.ask(board.order(gates=gate))
     if answer == wire.Refused(RefusalReason.STOPPED, 0):
-        board.armed_by(answer)
-    insist_refused(answer, "Arm", RefusalReason.GATE_BLOCKED, gate)
+        board.read_token(answer)
+    insist_refusal("Arm", answer, RefusalReason.GATE_BLOCKED, gate)
     return listed(gate)

@@ -6,16 +6,17 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
-from rig.link.messages import MessageError
+from rig.reasons import make_reason
 from rig.selftest import arming, drops, greeting, line_checks
 from rig.selftest.board import BoardUnderTest
-from rig.selftest.verdicts import CheckFailedError, CheckResult, NotPossibleError, Verdict
+from rig.selftest.findings import CheckEndedError, Finding, NotPossibleError, Verdict, explain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rig.clock.host import Clock
     from rig.link.port import Port
+    from rig.reasons import Reason
     from rig.selftest.board import SelftestOptions
 
 
@@ -27,47 +28,47 @@ class Check(NamedTuple):
     idle: bool = True
 
 
-def _needs(what: str) -> Callable[[BoardUnderTest], str]:
-    def never(_stage: BoardUnderTest) -> str:
-        raise NotPossibleError(what)
+def _needs(needed: str) -> Callable[[BoardUnderTest], str]:
+    def refuse(_board: BoardUnderTest) -> str:
+        raise NotPossibleError("check_needs", needed=needed)
 
-    return never
+    return refuse
 
 
 CHECKS = (
-    Check("handshake", greeting.handshake, idle=False),
-    Check("VERSION", greeting.another_version, idle=False),
-    Check("every message", greeting.every_message, idle=False),
-    Check("UNKNOWN_MESSAGE", greeting.unknown_messages, idle=False),
-    Check("BAD_PARAMETER by length", greeting.other_lengths, idle=False),
-    Check("round trips", line_checks.round_trips, idle=False),
-    Check("gates", greeting.gates_now, idle=False),
-    Check("GATE_BLOCKED", greeting.a_blocked_gate),
+    Check("handshake", greeting.identify, idle=False),
+    Check("VERSION", greeting.ask_other_versions, idle=False),
+    Check("every message", greeting.ask_every_message, idle=False),
+    Check("UNKNOWN_MESSAGE", greeting.send_unknown_messages, idle=False),
+    Check("BAD_PARAMETER by length", greeting.send_other_lengths, idle=False),
+    Check("round trips", line_checks.measure_round_trips, idle=False),
+    Check("gates", greeting.look_at_gates, idle=False),
+    Check("GATE_BLOCKED", greeting.arm_blocked_gate),
     Check("NOT_ARMED", arming.fire_unarmed),
-    Check("NO_SUCH_DROP", arming.no_drop),
-    Check("BAD_PARAMETER", arming.bad_orders),
+    Check("NO_SUCH_DROP", arming.read_no_drop),
+    Check("BAD_PARAMETER", arming.send_bad_orders),
     Check("ARM and ABORT", arming.arm_and_abort),
-    Check("WRONG_TOKEN", arming.wrong_tokens),
-    Check("arming times out", line_checks.arming_times_out),
-    Check("a silent host disarms", line_checks.a_silent_host),
-    Check("repeated frames", line_checks.repeats),
-    Check("frames without seq", line_checks.without_seq, idle=False),
-    Check("junk on the line", line_checks.junk),
-    Check("certificate", drops.certificate),
-    Check("BUSY", drops.busy),
+    Check("WRONG_TOKEN", arming.send_wrong_tokens),
+    Check("arming times out", line_checks.let_arming_time_out),
+    Check("a silent host disarms", line_checks.stay_silent),
+    Check("repeated frames", line_checks.repeat_requests),
+    Check("frames without seq", line_checks.send_without_seq, idle=False),
+    Check("junk on the line", line_checks.send_junk),
+    Check("certificate", drops.compare_certificate),
+    Check("BUSY", drops.ask_while_recording),
     Check("ABORT of a recording", drops.abort_a_recording),
-    Check("HOLDING_A_DROP", drops.holding),
-    Check("reading again", drops.reading_again),
-    Check("ACKNOWLEDGE and WRONG_CRC", drops.acknowledging),
-    Check("sync output to gate", drops.sync_edges),
-    Check("COOLING", drops.cooling),
-    Check("GATE_UNSTEADY", _needs("it needs a hand in a beam")),
-    Check("STOPPED", _needs("it needs a hand at the emergency stop")),
-    Check("NOT_KEPT", _needs("it needs more edges than the memory holds")),
+    Check("HOLDING_A_DROP", drops.arm_while_holding),
+    Check("reading again", drops.read_again),
+    Check("ACKNOWLEDGE and WRONG_CRC", drops.acknowledge_drop),
+    Check("sync output to gate", drops.measure_sync_edges),
+    Check("COOLING", drops.arm_while_cooling),
+    Check("GATE_UNSTEADY", _needs("a hand in a beam")),
+    Check("STOPPED", _needs("a hand at the emergency stop")),
+    Check("NOT_KEPT", _needs("more edges than the memory holds")),
 )
 
 
-def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[CheckResult]:
+def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Finding]:
     """Make every check, one after the other.
 
     Parameters
@@ -79,7 +80,7 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Che
 
     Yields
     ------
-    CheckResult
+    Finding
         As soon as it is known. When the board is silent the rest is not possible.
 
     Raises
@@ -88,46 +89,42 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Che
         The connection broke.
     """
     board = BoardUnderTest(port, clock, options)
-    silent = ""
+    lost: Reason | None = None
     try:
         for check in CHECKS:
-            if silent:
-                yield CheckResult(check.name, Verdict.NOT_POSSIBLE, silent)
+            if lost is not None:
+                yield explain(check.name, lost, Verdict.NOT_POSSIBLE)
                 continue
-            outcome = _made(check, board)
-            yield outcome
-            if outcome.verdict is Verdict.FAILED:
-                silent = _lost(board)
+            finding = _make_check(check, board)
+            yield finding
+            if finding.verdict is Verdict.FAILED:
+                lost = _why_lost(board)
     except OSError as error:
         raise DeviceError(
             f"the connection broke: {error}", "check the cable, then start again"
         ) from error
     finally:
-        with suppress(CheckFailedError, MessageError, OSError):
+        with suppress(CheckEndedError, OSError):
             board.settle()
 
 
-def _made(check: Check, board: BoardUnderTest) -> CheckResult:
+def _make_check(check: Check, board: BoardUnderTest) -> Finding:
     try:
         if board.identity is not None:
             board.settle()
         if check.idle:
             board.need_idle()
-        return CheckResult(check.name, Verdict.OK, check.make(board))
-    except CheckFailedError as failed:
-        return CheckResult(check.name, Verdict.FAILED, str(failed))
-    except NotPossibleError as why:
-        return CheckResult(check.name, Verdict.NOT_POSSIBLE, str(why))
-    except MessageError as error:
-        return CheckResult(check.name, Verdict.FAILED, f"it sent what is no message: {error}")
+        return Finding(check.name, check.make(board))
+    except CheckEndedError as end:
+        return explain(check.name, end.reason, end.verdict)
 
 
-def _lost(board: BoardUnderTest) -> str:
+def _why_lost(board: BoardUnderTest) -> Reason | None:
     """Say why no more checks can be made, if so."""
     if board.identity is None:
-        return "nobody has introduced themselves"
+        return make_reason("no_identity")
     try:
         board.settle()
-    except (CheckFailedError, MessageError) as error:
-        return str(error)
-    return ""
+    except CheckEndedError as failure:
+        return failure.reason
+    return None

@@ -197,6 +197,7 @@ def test_programs_read_codes(doctor, tmp_path):
     assert (code, err) == (4, "1 thing to do\n")
     assert missing == {
         "name": f"session {tmp_path / 'none'}",
+        "verdict": "failed",
         "what": "not there",
         "advice": "check its name; rig run makes a new one",
         "reason_codes": [{"code": "session_missing", "values": {}}],

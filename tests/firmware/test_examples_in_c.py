@@ -58,7 +58,7 @@ def test_the_device_passes_the_selftest(built, capsys):
     failed = [line for line in out.splitlines() if ": failed" in line]
     # How fast a busy computer is says nothing of the device.
     assert [line for line in failed if not line.startswith("round trips: ")] == []
-    assert "handshake: ok (an example in C, example 1" in out
+    assert "handshake: ok: an example in C, example 1" in out
     assert "repeated frames: ok" in out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rig.selftest.board import SelftestOptions
+from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
 from sim.board import VirtualBoard
 from sim.serial_port import SimulatedSerial
@@ -32,10 +33,13 @@ class LoopedBoard(VirtualBoard):
 
 
 def outcomes(port, loopback=GATE, drops=5, release=True):
-    """Test a board; give its outcomes by the name of the check."""
-    found = list(selftest(port, port.clock, SelftestOptions(loopback, drops, release)))
-    assert len({outcome.name for outcome in found}) == len(found)
-    return {outcome.name: outcome for outcome in found}
+    """Test a board; give its findings by the name of the check."""
+    findings = list(selftest(port, port.clock, SelftestOptions(loopback, drops, release)))
+    assert len({finding.name for finding in findings}) == len(findings)
+    for finding in findings:
+        assert (finding.reason is None) is (finding.verdict is Verdict.OK)
+        assert finding.reason is None or finding.what == finding.reason.text
+    return {finding.name: finding for finding in findings}
 
 
 def port_of(board, **line):

@@ -11,12 +11,12 @@ from sim.recording import Recording
 from tests.selftest.benches import GATE, LoopedBoard, Wire
 
 BROKEN = {}
-"""A controller or a board, and the name of the check, by what is wrong."""
+"""A controller or a board, the name of the check and its code, by what is wrong."""
 
 
-def caught_by(check):
+def caught_by(check, code="wrong_answer"):
     def remember(kind):
-        BROKEN[kind.__name__] = kind, check
+        BROKEN[kind.__name__] = kind, check, code
         return kind
 
     return remember
@@ -37,7 +37,7 @@ def also(answer, when):
 # -- greeting
 
 
-@caught_by("handshake")
+@caught_by("handshake", "no_answer")
 class Silent(LoopedBoard):
     def _listen(self):
         self._inbox.popleft()
@@ -77,13 +77,13 @@ class AnyLength(Microcontroller):
 # -- time
 
 
-@caught_by("round trips")
+@caught_by("round trips", "slow_answers")
 class Slow(LoopedBoard):
     def receive(self, start_ns, data):
         super().receive(start_ns + 150_000_000, data)
 
 
-@caught_by("round trips")
+@caught_by("round trips", "clock_off")
 class FastClock(LoopedBoard):
     def __init__(self, *args, **kwargs):
         super().__init__(*args, ppm=20_000, **kwargs)
@@ -202,14 +202,14 @@ class AlwaysReads(Microcontroller):
 # -- gates
 
 
-@caught_by("gates")
+@caught_by("gates", "gates_blocked")
 class StuckGate(Microcontroller):
     def _status(self):
         self.gates |= 1 << 6
         return super()._status()
 
 
-@caught_by("gates")
+@caught_by("gates", "gates_flicker")
 class FlickeringGate(Microcontroller):
     def _status(self):
         self.gates ^= 1 << 6
@@ -260,7 +260,7 @@ class AnswersSeqZero(LoopedBoard):
         super()._listen()
 
 
-@caught_by("junk on the line")
+@caught_by("junk on the line", "no_answer")
 class Sensitive(LoopedBoard):
     def _listen(self):
         if self._decoder.bad:
@@ -292,7 +292,7 @@ class NeverBusy(
     pass
 
 
-@caught_by("ABORT of a recording")
+@caught_by("ABORT of a recording", "no_certificate")
 class RecordsOn(Microcontroller):
     def _abort(self):
         end_ns = self.end_ns
@@ -358,20 +358,20 @@ class NeverCools(Microcontroller):
 # -- the wire
 
 
-@caught_by("sync output to gate")
+@caught_by("sync output to gate", "sync_late")
 class LateStamps(LoopedBoard):
     def __init__(self, lab, *args, **kwargs):
         super().__init__(Wire(late_s=20e-6), *args, **kwargs)
 
 
-@caught_by("sync output to gate")
+@caught_by("sync output to gate", "sync_edges")
 class BouncingOutput(LoopedBoard):
     def __init__(self, lab, *args, **kwargs):
         super().__init__(lab, *args, **kwargs)
         self.lab.changes = [(0.0, GATE, True), (0.001, GATE, False), (0.002, GATE, True)]
 
 
-@caught_by("sync output to gate")
+@caught_by("sync output to gate", "sync_blocked")
 class WireToSupply(Microcontroller):
     def _status(self):
         self.gates |= 1 << GATE

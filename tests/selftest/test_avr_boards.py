@@ -7,7 +7,7 @@ import re
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
-from rig.selftest.verdicts import Verdict
+from rig.selftest.findings import Verdict
 from rig_emulator.board import EmulatedBoard
 from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import BOARDS
@@ -32,7 +32,7 @@ def test_a_board_passes_with_its_wire(name):
     board.loop_back(GATE)
     found = tried(board, drops=8)
     assert [str(o) for o in found.values() if o.verdict is Verdict.FAILED] == []
-    said = found["sync output to gate"].why
+    said = found["sync output to gate"].what
     latency, scatter = re.match(r"8 drops, latency (\S+) µs, scatter (\S+) µs", said).groups()
     assert 0.3 < float(latency) < 1.0  # the stamp of FIRE is 8 or 9 cycles ahead of its pins
     assert float(scatter) < 0.3

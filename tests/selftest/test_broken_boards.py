@@ -9,9 +9,9 @@ from rig.link import messages as wire
 from rig.link.frames import Frame, encode
 from rig.link.messages import RefusalReason
 from rig.selftest.board import SelftestOptions
+from rig.selftest.findings import Verdict
 from rig.selftest.requests import BAD_ORDERS
 from rig.selftest.run import CHECKS, selftest
-from rig.selftest.verdicts import Verdict
 from sim.board import VirtualBoard
 from sim.controller import Microcontroller
 from tests.selftest.benches import LoopedBoard, Wire, outcomes, port_of
@@ -30,14 +30,14 @@ def board_of(kind, monkeypatch):
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_board_is_found_out(name, monkeypatch):
-    kind, check = BROKEN[name]
+    kind, check, code = BROKEN[name]
     found = outcomes(port_of(board_of(kind, monkeypatch)))
     assert found[check].verdict is Verdict.FAILED, {n: str(o) for n, o in found.items()}
-    assert found[check].why
+    assert found[check].reason.code == code
 
 
 def test_each_check_has_a_board_that_fails_it():
-    assert {check for _, check in BROKEN.values()} == {c.name for c in CHECKS} - HANDS
+    assert {check for _, check, _ in BROKEN.values()} == {c.name for c in CHECKS} - HANDS
 
 
 @pytest.mark.parametrize("bad", BAD_ORDERS, ids=str)
@@ -55,7 +55,9 @@ def test_each_bad_order_that_is_accepted_is_found_out(bad, monkeypatch):
     found = outcomes(port_of(board_of(Lax, monkeypatch)))
     assert found["BAD_PARAMETER"].verdict is Verdict.FAILED
     ((name, value),) = bad.items()
-    assert f"Arm with {name} {value} should be refused" in found["BAD_PARAMETER"].why
+    assert found["BAD_PARAMETER"].what == (
+        f"Arm with {name} {value} should give Refused(BAD_PARAMETER), but gives Armed(token=1)"
+    )
 
 
 def test_what_a_board_accepts_wrongly_is_not_fired(monkeypatch):
@@ -98,7 +100,7 @@ def test_a_board_that_falls_silent_ends_the_test(monkeypatch):
     assert found["UNKNOWN_MESSAGE"].verdict is Verdict.FAILED
     later = list(found.values())[list(found).index("UNKNOWN_MESSAGE") + 1 :]
     assert {o.verdict for o in later} == {Verdict.NOT_POSSIBLE}
-    assert {o.why for o in later} == {"no answer to Status"}
+    assert {o.what for o in later} == {"no answer to Status"}
 
 
 def test_what_is_no_message_is_a_failure(monkeypatch):
@@ -110,7 +112,11 @@ def test_what_is_no_message_is_a_failure(monkeypatch):
 
     found = outcomes(port_of(Mumbles(Wire())))
     assert found["every message"].verdict is Verdict.FAILED
-    assert "what is no message: unknown message code 0xF0" in found["every message"].why
+    reason = found["every message"].reason
+    assert (reason.code, reason.values) == (
+        "invalid_message",
+        {"text": "unknown message code 0xF0"},
+    )
     assert found["junk on the line"].verdict is Verdict.OK
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from rig.cli import main
@@ -9,8 +11,8 @@ from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
+from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS
-from rig.selftest.verdicts import Verdict
 from tests.firmware.core_board import CoreBoard
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import GATE, LoopedBoard, Wire, outcomes, port_of
@@ -58,7 +60,7 @@ def test_a_busy_computer_blames_no_board(monkeypatch):
     monkeypatch.setattr("rig.selftest.line_checks._ASK_S", 0.3)
     found = outcomes(port_of(LoopedBoard(Wire())))
     assert failed(found) == []
-    assert "too busy" in found["arming times out"].why
+    assert "too busy" in found["arming times out"].what
 
 
 def test_a_computer_that_is_busy_for_a_moment_blames_no_board():
@@ -71,7 +73,7 @@ def test_a_computer_that_is_busy_for_a_moment_blames_no_board():
 
     found = outcomes(port_of(HeldUp(Wire())))
     assert failed(found) == []
-    assert found["round trips"].why.endswith("this computer was too busy for 1 of 60")
+    assert found["round trips"].what == ("this computer was too busy to ask the board every 125 ms")
 
 
 def test_without_leave_no_release_is_driven():
@@ -79,7 +81,7 @@ def test_without_leave_no_release_is_driven():
     found = outcomes(port_of(board), release=False)
     assert failed(found) == []
     assert board.driven == 0
-    assert "--release" in found["COOLING"].why
+    assert "--release" in found["COOLING"].what
 
 
 @pytest.mark.parametrize("streams", [False, True])
@@ -89,14 +91,14 @@ def test_the_core_passes(streams):
 
 def test_the_latency_is_measured():
     found = outcomes(port_of(LoopedBoard(Wire(late_s=2e-6))))
-    assert found["sync output to gate"].why.startswith("5 drops, latency +2.000 µs, scatter 0.000")
+    assert found["sync output to gate"].what.startswith("5 drops, latency +2.000 µs, scatter 0.000")
 
 
 def test_what_is_not_wired_is_not_possible_and_no_failure(rig):
     code, lines, err = rig("--port", FENCE)
     assert code == 0, lines
     assert len(lines) == len(CHECKS)
-    assert lines[0].startswith("handshake: ok (virtual, sim, id ")
+    assert lines[0].startswith("handshake: ok: virtual, sim, id ")
     assert any(line.startswith("sync output to gate: not possible here: ") for line in lines)
     assert not any(": failed" in line for line in lines)
     assert err == ""
@@ -106,9 +108,25 @@ def test_a_wire_that_is_not_there_fails(rig):
     code, lines, err = rig("--port", FENCE, "--loopback", "2", "--drops", "1")
     assert code == 4
     assert [line for line in lines if ": failed" in line] == [
-        "sync output to gate: failed: FIRE made no edge at gate 2: is the wire in place?"
+        "sync output to gate: failed: FIRE made 0 events at gate 2 instead of one edge"
     ]
-    assert err == "1 check failed\n"
+    assert err == "do: check the wire from the sync output to this gate\n1 check failed\n"
+
+
+def test_json_lists_each_check_with_its_codes(rig):
+    code, lines, _ = rig("--port", FENCE, "--loopback", "2", "--drops", "1", "--json")
+    assert code == 4
+    listed = {entry.pop("name"): entry for entry in json.loads("\n".join(lines))["checks"]}
+    assert list(listed) == [check.name for check in CHECKS]
+    assert listed["VERSION"] == {"verdict": "ok", "what": "", "advice": "", "reason_codes": []}
+    assert listed["sync output to gate"]["verdict"] == "failed"
+    assert listed["sync output to gate"]["reason_codes"] == [
+        {"code": "sync_edges", "values": {"gate": 2, "events": 0}}
+    ]
+    assert listed["STOPPED"]["verdict"] == "not_possible"
+    assert listed["STOPPED"]["reason_codes"] == [
+        {"code": "check_needs", "values": {"needed": "a hand at the emergency stop"}}
+    ]
 
 
 def test_behind_a_terminal_in_real_time(rig):
@@ -127,7 +145,8 @@ def test_a_drop_of_a_session_is_left_alone():
     drop = device.collect(label)
     found = outcomes(port)
     assert failed(found) == []
-    assert found["BUSY"].why.startswith("the board holds a drop (run 7, attempt 2)")
+    assert found["BUSY"].what == "the board holds a drop (run 7, attempt 2)"
+    assert found["BUSY"].reason.values == {"run": 7, "attempt": 2}
     assert found["every message"].verdict is Verdict.NOT_POSSIBLE
     assert found["VERSION"].verdict is Verdict.OK
     again = Device(port, port.clock)
@@ -154,4 +173,5 @@ def test_an_open_stop_makes_arming_impossible():
     board.stop(True)
     found = outcomes(port_of(board))
     assert failed(found) == []
-    assert found["ARM and ABORT"].why == "the emergency stop is open: close it"
+    assert found["ARM and ABORT"].what == "the emergency stop is open"
+    assert found["ARM and ABORT"].reason.code == "refused_stopped"

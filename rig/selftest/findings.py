@@ -1,0 +1,97 @@
+"""How a check of the self-test or the doctor can end."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from rig.link import messages as wire
+from rig.reasons import make_reason, remedies
+
+if TYPE_CHECKING:
+    from rig.link.messages import RefusalReason
+    from rig.reasons import Reason
+
+
+_ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
+
+
+class Verdict(StrEnum):
+    """The three ends of a check, in the words that are shown."""
+
+    OK = "ok"
+    FAILED = "failed"
+    NOT_POSSIBLE = "not possible here"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a check found, in words, and where all is not well the reason."""
+
+    name: str
+    what: str = ""
+    verdict: Verdict = Verdict.OK
+    reason: Reason | None = None
+
+    @property
+    def advice(self) -> str:
+        """What to do about it; empty where all is well."""
+        return "; ".join(remedies([self.reason])) if self.reason else ""
+
+    def json(self) -> dict[str, object]:
+        """Return it as JSON has it."""
+        verdict, codes = self.verdict.name.lower(), [self.reason.json()] if self.reason else []
+        words = {"name": self.name, "verdict": verdict, "what": self.what, "advice": self.advice}
+        return {**words, "reason_codes": codes}
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.what}" + (f"\n  do: {self.advice}" if self.advice else "")
+
+
+def explain(name: str, reason: Reason, verdict: Verdict = Verdict.FAILED) -> Finding:
+    """Return what a check found where all is not well."""
+    return Finding(name, reason.text, verdict, reason)
+
+
+class CheckEndedError(Exception):
+    """A check ended with a reason, a code of `rig.wordings` with its values."""
+
+    verdict = Verdict.FAILED
+
+    def __init__(self, code: str, **values: object) -> None:
+        self.reason = make_reason(code, **values)
+        super().__init__(self.reason.text)
+
+
+class CheckFailedError(CheckEndedError):
+    """The board did not do what it must."""
+
+
+class NotPossibleError(CheckEndedError):
+    """The check needs something that is not here."""
+
+    verdict = Verdict.NOT_POSSIBLE
+
+
+def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedError:
+    """Return the failure of a board that gave another answer than expected."""
+    wanted, given = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
+    return CheckFailedError("wrong_answer", request=request, expected=wanted, answer=given)
+
+
+def insist(request: str, answer: object, expected: object) -> None:
+    """Let a check fail unless a request had the expected answer."""
+    if answer != expected:
+        raise wrong_answer(request, expected, answer)
+
+
+def insist_refusal(
+    request: str, answer: wire.Message, reason: RefusalReason, detail: int | None = None
+) -> wire.Refused:
+    """Return an answer that is the right refusal, of any detail where none is given."""
+    if not isinstance(answer, wire.Refused):
+        raise wrong_answer(request, f"Refused({reason.name})", answer)
+    insist(request, answer, wire.Refused(reason, answer.detail if detail is None else detail))
+    return answer

@@ -1,0 +1,73 @@
+"""Every code that is raised stands in the one table, and every code of the table is raised."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from rig.link.messages import DisarmReason, RefusalReason
+from rig.reasons import make_reason
+from rig.wordings import WORDINGS
+
+RIG = Path(__file__).parents[1] / "rig"
+RAISERS = {"make_reason": 0, "plain_reason": 1, "problem": 1, "CheckFailedError": 0,
+           "NotPossibleError": 0}  # fmt: skip
+"""Functions that take a code, and which of their arguments it is."""
+REFUSED = {f"refused_{reason.name.lower()}" for reason in RefusalReason}
+DISARMED = {f"disarmed_{reason.name.lower()}" for reason in DisarmReason}
+
+
+def trees():
+    for path in RIG.rglob("*.py"):
+        if path.name not in {"wordings.py", "reasons.py"}:
+            yield path, ast.parse(path.read_text("utf-8"))
+
+
+def texts(tree):
+    return {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
+
+
+def raised_codes():
+    """Codes that calls name, with the file that does."""
+    for path, tree in trees():
+        for call in ast.walk(tree):
+            if not isinstance(call, ast.Call):
+                continue
+            name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+            at = RAISERS.get(name)
+            if path.parent.name != "timers" and at is not None and len(call.args) > at:
+                for text in texts(call.args[at]):
+                    yield path, text
+
+
+def test_each_raised_code_is_in_the_table():
+    missing = {(path.name, code) for path, code in raised_codes() if code not in WORDINGS}
+    assert not missing
+    assert set(WORDINGS) >= REFUSED | DISARMED
+
+
+def test_each_code_of_the_table_is_raised():
+    somewhere = set().union(*(texts(tree) for _, tree in trees()))
+    somewhere |= {"operator", "note", "sentence"} | REFUSED | DISARMED
+    assert set(WORDINGS) <= somewhere
+
+
+@pytest.mark.parametrize("code", WORDINGS)
+def test_a_code_has_a_plain_sentence(code):
+    wording = WORDINGS[code]
+    assert wording.sentence
+    assert not wording.sentence.endswith(".")
+    assert not re.search(r"\bshall\b|\blest\b|\bas well may\b", wording.sentence + wording.remedy)
+
+
+def test_a_reason_has_its_values_in_its_sentence():
+    reason = make_reason("wrong_answer", request="Arm", expected="Armed", answer="Done()")
+    assert reason.text == "Arm should give Armed, but gives Done()"
+    assert reason.json()["values"] == {"request": "Arm", "expected": "Armed", "answer": "Done()"}
