@@ -136,7 +136,8 @@ def summarize_reasons(reasons: Sequence[Reason]) -> str:
 def _label(reason: Reason) -> str:
     """Return a reason's label, with what tells it from others of its code."""
     words = ", ".join(value for value in reason.values.values() if isinstance(value, str))
-    return WORDINGS[reason.code].label + (f" ({words})" if words else "")
+    label = WORDINGS[reason.code].label or reason.code.replace("_", " ")
+    return label + (f" ({words})" if words else "")
 
 
 class _Number(float):
