@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -35,7 +35,8 @@ class RigError(Exception):
 class Problem:
     """One fault of an input file, at its place (lines and columns count from 1).
 
-    `excerpt` is what a message shows below: the line itself and a caret, or nothing.
+    `excerpt` is what a message shows below: the line itself and a caret, or nothing. `reason` is
+    the `rig.reasons.Reason` of the message, where it has one.
     """
 
     file: str
@@ -44,6 +45,7 @@ class Problem:
     key: str
     message: str
     excerpt: str = ""
+    reason: Any = field(default=None, compare=False)
 
     def __str__(self) -> str:
         key = f" {self.key}:" if self.key else ""
@@ -51,9 +53,11 @@ class Problem:
 
 
 class InputError(RigError):
-    """Bad input: one located line a problem, exit code 2."""
+    """Bad input: one located line a problem, or one `reason` for all of it; exit code 2."""
 
     exit_code = 2
+
+    reason: Any = None
 
     def __init__(self, message: str = "", hint: str = "", *, problems: Iterable[Problem] = ()):
         self.problems = tuple(sorted(problems))

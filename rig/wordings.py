@@ -319,11 +319,63 @@ WORDINGS: dict[str, Wording] = {
         "this computer was too busy to ask the board every {interval_s:.0f ms}",
         "close what keeps it busy, then rig selftest again"),
     "check_needs": _doubt("it needs {needed}"),
+    # What is wrong with a timer's file, beside its line and column.
+    "not_accepted": _doubt("{text!r:.40} is not {accepted}"),
+    "backwards": _doubt("{text} is before the time above it"),
+    "before_last": _doubt(
+        "{text} is before {last}, the last time of channel {channel} in run {run}"),
+    "too_long": _doubt(
+        "{recording} would last {lasting_s:.0f} s; at most {limit_s:g} s are accepted",
+        "is the unit of time right? passages of several drops are split at pauses"),
+    "too_large": _doubt(
+        "{size_mb:.0f} MB is more than {limit_mb:.0f} MB",
+        "is it the right file? otherwise split it by runs"),
+    "no_edges": _doubt("no edges in this file"),
+    "nothing_passes": _doubt("nothing passes in this file{notes}"),
+    "unreadable": _doubt("cannot read this file: {text}"),
+    "not_csv": _doubt("not CSV: {text}"),
+    "not_text": _doubt(
+        "this is no text: a spreadsheet, or a program's own format?", "export it as text or CSV"),
+    "open_quote": _doubt("a quoted value runs over the end of its line"),
+    "wrong_header": _doubt("the header must be {header}"),
+    "wrong_width": _doubt("{values} values where there must be {needed}: {header}"),
+    "no_heading": _doubt(
+        "{columns} columns without a heading, so it is not clear which are times",
+        "write a heading, such as time (s),channel,state"),
+    "no_time_column": _doubt("no column of this heading is a time"),
+    "too_many_columns": _doubt("{columns} columns; at most {limit} are read"),
+    "ambiguous": _doubt(
+        "{column!r:.40} may be {readings}", "name it channel, run or state, or leave it out"),
+    "unit_missing": _doubt(
+        "whole numbers without a unit: seconds, or counts of a clock?", "say --unit ms or us"),
+    "durations": _doubt(
+        "{numbers} are durations, or something else, and not the times of passages",
+        "import the times themselves, as the timer counted them"),
+    "regular_samples": _doubt(
+        "samples at regular times, as from video or a sensor ({columns})",
+        "import the times at which gates change, or samples of gates in volts; if these are "
+        "passages nevertheless, leave the other columns out"),
+    "no_rate": _doubt("samples without {lacks}"),
+    "no_track": _doubt("no columns t, x and y"),
+    "few_frames": _doubt(
+        "{frames} frames one after the other; at least {needed} are needed",
+        "track one object over one fall, each frame once"),
+    "inputs_unclear": _doubt(
+        "the file's inputs {inputs} are not the gates' channels {channels}",
+        "say which is which: --map '{pairs}'"),
+    "which_gate": _doubt(
+        "the file does not say which gate its times are of", "--channel N says which: {channels}"),
+    "no_gates": _doubt("the scene has no gates", "add the gates that the edges come from"),
+    "run_unplanned": _doubt(
+        "run {run} is not in the plan of {protocol}, which has {planned} runs",
+        "raise plan.repeats, or number the runs as the plan does"),
+    "no_session_file": _doubt("no file is named", "--session FILE, or --dry-run to look first"),
     # What an import assumes of another timer's file.
     "samples": _remark(
         "sampled every {period_us:.4g} µs: an edge is known to {u_us:.3g} µs at best; state that "
         "as priors: {{jitter: ...}} in the protocol if it is more than 2 µs"),
     "inputs_unused": _remark("inputs that are no gate: {inputs}; see --map"),
+    "channels_unused": _remark("edges of channels {channels} are kept but belong to no gate"),
     "columns_unused": _remark("not used: {columns}"),
     "no_passage": _remark("{input}: nothing passes, {low:.3g} to {high:.3g}"),
     "crossings": _remark("{input}: {crossings} crossings of {level:.3g}"),

@@ -14,7 +14,8 @@ from rig.wordings import WORDINGS
 
 RIG = Path(__file__).parents[1] / "rig"
 RAISERS = {"make_reason": 0, "plain_reason": 1, "problem": 1, "CheckFailedError": 0,
-           "NotPossibleError": 0}  # fmt: skip
+           "NotPossibleError": 0, "problems.add": 3, "_problems.add": 3, "place.add": 1,
+           "problems.refuse": 2}  # fmt: skip
 """Functions that take a code, and which of their arguments it is."""
 REFUSED = {f"refused_{reason.name.lower()}" for reason in RefusalReason}
 DISARMED = {f"disarmed_{reason.name.lower()}" for reason in DisarmReason}
@@ -40,9 +41,9 @@ def raised_codes():
         for call in ast.walk(tree):
             if not isinstance(call, ast.Call):
                 continue
-            name = getattr(call.func, "attr", getattr(call.func, "id", ""))
-            at = RAISERS.get(name)
-            if path.parent.name != "timers" and at is not None and len(call.args) > at:
+            names = re.findall(r"\w+", ast.unparse(call.func))
+            at = RAISERS.get(names[-1], RAISERS.get(".".join(names[-2:])))
+            if at is not None and len(call.args) > at:
                 for text in texts(call.args[at]):
                     yield path, text
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from rig.clock.host import SystemClock
 from rig.commands.output import say
-from rig.errors import InputError
 from rig.files import require_file
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
@@ -20,6 +19,7 @@ from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.edges_csv import read_edges
+from rig.timers.problems import refusal
 from rig.timers.timer_file import drops_of, is_edge_file, label_number, read_timer_file
 from rig.units import Dimension, UnitError, parse
 
@@ -52,7 +52,7 @@ def main(arguments: Namespace) -> int:
         print("\n".join([*said, *_told(drops)]))
         return 0
     if arguments.session is None:
-        raise InputError("no session is named", "--session FILE, or --dry-run to look first")
+        raise refusal("--session", "no_session_file")
     timer["sha256"] = hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest()
     if arguments.clock_uncertainty is not None:
         timer["clock_u"] = _relative(arguments.clock_uncertainty)
@@ -113,12 +113,9 @@ def _channels(protocol: Protocol, found: TimerFile, arguments: Namespace) -> dic
     # As many inputs as gates, and not all of the same number: counted from 1, perhaps.
     shifted = len(labels) == len(gates) and len(channels) < len(labels)
     if not channels or shifted or len(set(channels.values())) < len(channels):
-        meant = [f"{one}={n}" for one, n in zip(labels, gates, strict=False)]
-        raise InputError(
-            f"{arguments.events}: its inputs {', '.join(labels)} are not the gates' channels "
-            f"{', '.join(map(str, gates))}",
-            f"say which is which: --map {','.join(meant)!r}",
-        )
+        pairs = ",".join(f"{label}={n}" for label, n in zip(labels, gates, strict=False))
+        values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
+        raise refusal(arguments.events, "inputs_unclear", **values, pairs=pairs)
     return channels
 
 
@@ -127,15 +124,11 @@ def _read_pairs(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[
     pairs = re.findall(r"\s*([^=]+?)\s*(?:=\s*([^\s,=]*)[\s,]*|$)", text) or [(text, "")]
     for label, channel in pairs:
         if label not in labels:
-            raise InputError(
-                f"--map: the file has no input {label!r}", f"it has {', '.join(labels)}"
-            )
+            accepted = f"an input of the file: {', '.join(labels)}"
+            raise refusal("--map", "not_accepted", text=label, accepted=accepted)
         if not channel.isdecimal() or int(channel) not in gates:
-            wrong = f"{channel!r} is no gate's channel" if channel else f"{label!r} has no channel"
-            raise InputError(
-                f"--map: {wrong}",
-                f"the protocol's gates are at {', '.join(map(str, gates))}",
-            )
+            accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
+            raise refusal("--map", "not_accepted", text=f"{label}={channel}", accepted=accepted)
         channels[label] = int(channel)
     return channels
 
@@ -146,45 +139,35 @@ def _beam(protocol: Protocol, channel: int | None) -> Gate:
     named = [gate for gate in gates if channel is None or gate.channel == channel]
     if len(named) == 1:
         return named[0]
-    known = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
-    wrong = "the file does not say which gate its times are of"
-    if channel is not None:
-        wrong = f"there is no gate at channel {channel}"
-    raise InputError(
-        f"{protocol.source}: {wrong}",
-        f"say which with --channel N: {known}" if known else "add the gate they are of",
-    )
+    channels = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
+    if channel is None:
+        raise refusal(protocol.source, "which_gate", channels=channels)
+    accepted = f"a gate's channel: {channels}"
+    raise refusal("--channel", "not_accepted", text=str(channel), accepted=accepted)
 
 
 def _relative(text: str) -> float:
     try:
         value = parse(text, Dimension.NUMBER).value
-    except UnitError as error:
-        raise InputError(f"--clock-uncertainty: {error}") from None
+    except UnitError:
+        value = math.nan
     if not 0.0 <= value < 0.1:
-        raise InputError(
-            f"--clock-uncertainty: {text} is out of range", "0 to 10 % is accepted, as in 50 ppm"
-        )
+        accepted = "a share from 0 to 10 %, as in 50 ppm"
+        raise refusal("--clock-uncertainty", "not_accepted", text=text, accepted=accepted)
     return value
 
 
 def _fits(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
     if protocol.gates is None:
-        raise InputError(
-            f"{protocol.source} has no gates, so edges cannot belong to it",
-            "add the gates the edges come from",
-        )
+        raise refusal(protocol.source, "no_gates")
     check_measurable(protocol)
     planned = len(runs(protocol))
     strangers = sorted({drop.run for drop in drops if drop.run > planned})
     if strangers:
-        raise InputError(
-            f"{source}: run {strangers[0]} is not in the plan of {protocol.source}, which has "
-            f"{planned} runs",
-            "raise plan.repeats, or number the runs as the plan does",
-        )
+        values = {"run": strangers[0], "protocol": protocol.source, "planned": planned}
+        raise refusal(source, "run_unplanned", **values)
     used = protocol.gates.mask
     idle = sorted({e.channel for drop in drops for e in drop.edges if not used >> e.channel & 1})
     if idle:
-        say(f"edges of channels {', '.join(map(str, idle))} are kept but belong to no gate")
+        say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

@@ -263,25 +263,22 @@ def _by_heading(
     _one_clock(found, heading, block, separator)
     if not (found.times or found.levels or found.volts):
         if durations:
-            problems.add(
-                heading.line, durations[0].column, "",
-                f"{durations[0].text!r:.40} are durations: wanted are the times of passages",
-            )  # fmt: skip
+            cell = durations[0]
+            problems.add(heading.line, cell.column, "", "durations", numbers=repr(cell.text))
         else:
-            problems.add(
-                heading.line, heading.cells[0].column, "", "no column of this heading is a time"
-            )
+            problems.add(heading.line, heading.cells[0].column, "", "no_time_column")
     return found
 
 
 def _check_unused(line: int, cell: TableCell, here: Sequence[str], problems: ProblemList) -> None:
     """Leave nothing out that may say what an edge is of."""
     if not _DERIVED.search(cell.text) and _few_whole(here):
-        problems.add(
-            line, cell.column, cell.text,
-            f"{cell.text!r:.40} might say which gate or run a row is of, or its state; name it "
-            "channel, run or state, or leave it out",
-        )  # fmt: skip
+        _refuse_to_guess(line, cell, "the gate or the run of a row, or its state", problems)
+
+
+def _refuse_to_guess(line: int, cell: TableCell, readings: str, problems: ProblemList) -> None:
+    values = {"column": cell.text, "readings": readings}
+    problems.add(line, cell.column, cell.text, "ambiguous", **values)
 
 
 def _check_gate(
@@ -292,10 +289,7 @@ def _check_gate(
     stated = found.edge is not None or any(one.state is not None for one in found.times)
     if n is not None and not stated and set(values[n]) <= {"0", "1"}:
         cell = heading.cells[n]
-        problems.add(
-            heading.line, cell.column, cell.text,
-            f"{cell.text!r:.40} may be a gate's number or its state; name it channel or state",
-        )  # fmt: skip
+        _refuse_to_guess(heading.line, cell, "a gate's number or its state", problems)
 
 
 def _kind(text: str, here: Sequence[str]) -> str:
@@ -418,9 +412,8 @@ def _power(
         if unit in UNITS:
             return UNITS[unit]
         if match[1]:
-            problems.add(
-                heading.line, cell.column, "time", f"{unit!r} is no unit of time: s, ms, µs or ns"
-            )
+            accepted = "a unit of time: s, ms, µs or ns"
+            problems.reject(heading.line, cell.column, "time", unit, accepted)
             return 0
     if text.lower() in {"micros", "millis"}:
         return UNITS[text.lower()]
@@ -440,10 +433,7 @@ def _bare(here: Sequence[str], line: int, column: int, problems: ProblemList) ->
     if here and all(re.fullmatch(r"[+-]?[0-9]+", text) for text in here):
         span = abs(int(here[-1]) - int(here[0]))
         if span > 100:
-            problems.add(
-                line, column, "time",
-                "whole numbers without a unit: seconds, or counts of a clock? say --unit ms or us",
-            )  # fmt: skip
+            problems.add(line, column, "time", "unit_missing")
     return 0
 
 
@@ -459,7 +449,7 @@ def _by_values(
     first = block.rows[0]
     if block.headings and not all(len(row.cells) == 1 for row in block.headings):
         last = block.headings[-1]
-        problems.add(last.line, last.cells[0].column, "", "no column of this heading is a time")
+        problems.add(last.line, last.cells[0].column, "", "no_time_column")
         return found
     rest = [n for n, here in enumerate(values) if not _counts(here) or len(values) == 1]
     times = [n for n in rest if not _levels(values[n]) and _rises(values[n], separator)]
@@ -476,11 +466,8 @@ def _by_values(
         if len(values) == 2 and len(times) == 1 and not gates:
             states = others  # faults in it are said where they are read
         else:
-            problems.add(
-                first.line, first.cells[min(2, len(first.cells) - 1)].column, "",
-                f"{len(first.cells)} columns without a heading, and it cannot be told which are "
-                "times; write one, such as time (s),channel,state",
-            )  # fmt: skip
+            cell = first.cells[min(2, len(first.cells) - 1)]
+            problems.add(first.line, cell.column, "", "no_heading", columns=len(first.cells))
             return found
     (at,) = times
     power = UNITS[unit] if unit else _bare(values[at], first.line, first.cells[at].column, problems)

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import GATES
-from rig.errors import InputError
 from rig.files import read_input
 from rig.records import Drop, Edge
-from rig.timers.problems import Lines, ProblemList
+from rig.timers.problems import Lines, ProblemList, refusal
 
 if TYPE_CHECKING:
     import os
@@ -59,21 +58,31 @@ def read_edges(path: str | os.PathLike[str]) -> list[Drop]:
     """
     problems = ProblemList(str(path))
     table = _Table(problems)
+    # Wrong bytes inside comments harm nobody; inside values they are reported as such.
+    text = read_content(path, problems).decode("utf-8-sig", "replace")
+    for place, record in _records(Lines(io.StringIO(text, newline="")), problems):
+        table.add(place, record)
+    problems.raise_if_any()
+    if not table.runs:
+        problems.refuse(1, 1, "no_edges")
+    return [drop_of(run, edges) for run, edges in sorted(table.runs.items())]
+
+
+def read_content(path: str | os.PathLike[str], problems: ProblemList) -> bytes:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, or is far too large.
+    """
     try:
         size = Path(path).stat().st_size
         if size > MAX_BYTES:
-            problems.add(1, 1, "", f"{size / 1e6:.0f} MB is more than {MAX_BYTES / 1e6:.0f} MB")
-            problems.raise_if_any("is it the right file? otherwise split it by runs")
-        # Wrong bytes inside comments harm nobody; inside values they are reported as such.
-        text = read_input(path).decode("utf-8-sig", "replace")
-        for place, record in _records(Lines(io.StringIO(text, newline="")), problems):
-            table.add(place, record)
+            problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
+        return read_input(path)
     except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
-    if not table.runs:
-        problems.add_if_none(1, 1, "", "no edges in this file")
-    problems.raise_if_any()
-    return [drop_of(run, edges) for run, edges in sorted(table.runs.items())]
+        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
 
 
 def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
@@ -116,24 +125,22 @@ class _Table:
         self._span: dict[int, tuple[int, int]] = {}
 
     def add(self, place: _Place, record: list[str]) -> None:
-        run = place.whole(record, 0, 1, None, "runs count from 1")
-        channel = place.whole(record, 1, 0, GATES - 1, f"channels are 0 to {GATES - 1}")
+        run = place.whole(record, 0, range(1, 10**9), "a run: a whole number from 1")
+        channel = place.whole(record, 1, range(GATES), f"a channel: 0 to {GATES - 1}")
         time = place.time(record, 2)
-        state = place.whole(record, 3, 0, 1, "1 is blocked, 0 is clear")
+        state = place.whole(record, 3, range(2), "a state: 1 is blocked, 0 is clear")
         if run is None or channel is None or time is None or state is None:
             return
         before = self._last.get((run, channel), time)
         if time < before:
-            place.problem(
-                2,
-                f"{record[2]} is before {_seconds(before, Fraction(TICK_HZ))}, the last time of "
-                f"channel {channel} in run {run}",
-            )
+            last = _seconds(before, Fraction(TICK_HZ))
+            place.add(2, "before_last", text=record[2], last=last, channel=channel, run=run)
             return
         low, high = self._span.get(run, (time, time))
         low, high = min(low, time), max(high, time)
         if high - low > MAX_SPAN_S * TICK_HZ:
-            place.problem(2, f"run {run} would last more than an hour; times are in seconds")
+            lasting = (high - low) / TICK_HZ
+            place.add(2, "too_long", recording=f"run {run}", lasting_s=lasting, limit_s=MAX_SPAN_S)
             return
         self._last[run, channel] = time
         self._span[run] = low, high
@@ -147,33 +154,29 @@ class _Place:
         self._lines = lines
         self._problems = problems
 
-    def problem(self, field: int, message: str) -> None:
+    def add(self, field: int, code: str, **values: object) -> None:
         """Note a fault of one value."""
         lines = self._lines
-        self._problems.add(lines.number, lines.column(field), HEADER[field], message)
+        self._problems.add(lines.number, lines.column(field), HEADER[field], code, **values)
 
-    def whole(
-        self, record: list[str], field: int, least: int, most: int | None, rule: str
-    ) -> int | None:
+    def reject(self, field: int, text: str, accepted: str) -> None:
+        """Note a value that is not what is accepted there."""
+        self.add(field, "not_accepted", text=text, accepted=accepted)
+
+    def whole(self, record: list[str], field: int, limits: range, accepted: str) -> int | None:
         """Read a whole number within limits."""
         text = record[field]
-        if not _WHOLE.fullmatch(text):
-            self.problem(field, f"{text!r:.40} is not a whole number; {rule}")
+        if not _WHOLE.fullmatch(text) or int(text) not in limits:
+            self.reject(field, text, accepted)
             return None
-        value = int(text)
-        if value < least or (most is not None and value > most):
-            self.problem(field, f"{text} is out of range; {rule}")
-            return None
-        return value
+        return int(text)
 
     def time(self, record: list[str], field: int) -> int | None:
         """Read a time in seconds as picoseconds, ties to even."""
         text = record[field]
         ticks = picoseconds(text)
-        if ticks is None:
-            self.problem(field, f"{text!r:.40} is not a time in seconds")
-        elif abs(ticks) >= 10**12 * TICK_HZ:
-            self.problem(field, f"{text:.40} s is absurd")
+        if ticks is None or abs(ticks) >= 10**12 * TICK_HZ:
+            self.reject(field, text, "a time of a drop in seconds")
             return None
         return ticks
 
@@ -208,19 +211,18 @@ def _records(lines: Lines, problems: ProblemList) -> Iterator[tuple[_Place, list
         except StopIteration:
             return
         except csv.Error as error:
-            problems.add(lines.number, 1, "", f"not CSV: {error}")
+            problems.add(lines.number, 1, "", "not_csv", text=str(error))
             record = []
         if lines.consumed > 1:
-            problems.add(lines.number, 1, "", "a quoted value runs over the end of its line")
+            problems.add(lines.number, 1, "", "open_quote")
         elif not headed and record:
             if tuple(value.lower() for value in record) != HEADER:
-                problems.add(lines.number, 1, "", f"the header must be {expected}")
+                problems.add(lines.number, 1, "", "wrong_header", header=expected)
                 return  # the values of a file of another kind would only make noise
             headed = True
         elif record and len(record) != len(HEADER):
-            problems.add(
-                lines.number, 1, "", f"{len(record)} values where there must be 4: {expected}"
-            )
+            values = {"values": len(record), "needed": len(HEADER), "header": expected}
+            problems.add(lines.number, 1, "", "wrong_width", **values)
         elif record:
             yield place, record
 

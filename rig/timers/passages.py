@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 MAX_SPAN_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
-_MAX_RECORDING_S = 86400
+_DAY_S = 86400
 PAUSE_S = 3
 """Drops that stand one after the other are parted by more than this."""
 _DATE = re.compile(
@@ -101,7 +101,7 @@ class PassageRows:
             return
         time = moment(cell.text, self._separator, column.power)
         if time is None or abs(time) >= 10**12 * TICK_HZ:
-            self._fault(row, cell, "time", f"{cell.text!r:.40} is not a time a drop can have")
+            self._refuse(row, cell, "time", "a time that a drop can have")
             return
         blocked, high = column.blocked, None
         if column.state is not None:
@@ -110,28 +110,27 @@ class PassageRows:
                 return  # another input's row
             blocked = _said(state.text, BLOCKED, CLEAR)
             if blocked is None:
-                self._fault(
-                    row, state, "state",
-                    f"{state.text!r:.40} is no state: 1 or blocked, 0 or unblocked",
-                )  # fmt: skip
+                self._refuse(row, state, "state", "a state: 1 or blocked, 0 or unblocked")
                 return
         elif self._columns.edge is not None:
             edge = row.cell(self._columns.edge)
             high = _said(edge.text, RISING, FALLING)
             if high is None:
-                self._fault(row, edge, "edge", f"{edge.text!r:.40} is no edge: rising or falling")
+                self._refuse(row, edge, "edge", "an edge: rising or falling")
                 return
         run = self._runs.setdefault(key, _Run())
         if column.state is not None and column.label and not self._changes(run, label, blocked):
             return
         before = run.last.get(label, time)
-        if run.passages and time - run.passages[0].tick > _MAX_RECORDING_S * TICK_HZ:
-            self._fault(row, cell, "time", "a recording would last more than a day")
+        lasting_s = (time - run.passages[0].tick) / TICK_HZ if run.passages else 0.0
+        if lasting_s > _DAY_S:
+            values = {"recording": "the recording", "lasting_s": lasting_s, "limit_s": _DAY_S}
+            self._problems.add(row.line, cell.column, "time", "too_long", **values)
             return
         self._rows += 1
         if time < before:
             self._backwards += 1
-            self._fault(row, cell, "time", f"{cell.text} is before the time above it")
+            self._problems.add(row.line, cell.column, "time", "backwards", text=cell.text)
             return
         run.last[label] = time
         run.passages.append(Passage(time, label, blocked, high))
@@ -157,12 +156,12 @@ class PassageRows:
             return 0
         cell = row.cell(at)
         if not cell.text.isdecimal() or len(cell.text) > 6:
-            self._fault(row, cell, key, f"{cell.text!r:.40} is not a whole number")
+            self._refuse(row, cell, key, "a whole number")
             return 0
         return int(cell.text)
 
-    def _fault(self, row: Row, cell: TableCell, key: str, message: str) -> None:
-        self._problems.add(row.line, cell.column, key, message)
+    def _refuse(self, row: Row, cell: TableCell, key: str, accepted: str) -> None:
+        self._problems.reject(row.line, cell.column, key, cell.text, accepted)
 
 
 def moment(text: str, separator: str, power: int) -> int | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from rig.errors import InputError, Problem
+from rig.reasons import make_reason, remedies
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -61,27 +62,50 @@ class Lines:
         return start + len(rest) - len(rest.lstrip()) + 1
 
 
-class ProblemList:
-    """Faults of one file; beyond the first `MAX_PROBLEMS` they are only counted."""
+def refusal(place: str, code: str, /, **values: object) -> InputError:
+    """Return the refusal of an option or of a whole file, with the remedy of its code."""
+    reason = make_reason(code, **values)
+    error = InputError(f"{place}: {reason.text}", *remedies([reason]))
+    error.reason = reason
+    return error
 
-    def __init__(self, file: str) -> None:
+
+class ProblemList:
+    """Faults of one file; beyond the first `MAX_PROBLEMS` they are only counted.
+
+    Parameters
+    ----------
+    file
+        Its name.
+    hint
+        What to do about faults whose codes have no remedy of their own.
+    """
+
+    def __init__(self, file: str, hint: str = "") -> None:
         self.file = file
+        self._hint = hint
         self._problems: list[Problem] = []
         self._more = 0
 
-    def add(self, line: int, column: int, key: str, message: str) -> None:
-        """Note a fault."""
-        if len(self._problems) < MAX_PROBLEMS:
-            self._problems.append(Problem(self.file, line, column, key, message))
-        else:
+    def add(self, line: int, column: int, key: str, code: str, /, **values: object) -> None:
+        """Note a fault: its place, a code of `rig.wordings` and the values of its sentence."""
+        if len(self._problems) == MAX_PROBLEMS:
             self._more += 1
+            return
+        reason = make_reason(code, **values)
+        self._problems.append(Problem(self.file, line, column, key, reason.text, reason=reason))
 
-    def add_if_none(self, line: int, column: int, key: str, message: str) -> None:
-        """Note a fault that only matters where there is no other."""
-        if not self._problems:
-            self.add(line, column, key, message)
+    def reject(self, line: int, column: int, key: str, text: str, accepted: str) -> None:
+        """Note a value that is not what is accepted there."""
+        self.add(line, column, key, "not_accepted", text=text, accepted=accepted)
 
-    def raise_if_any(self, hint: str = "") -> None:
+    def refuse(self, line: int, column: int, code: str, /, **values: object) -> NoReturn:
+        """Raise a fault for which the rest of the file is not read, with those before it."""
+        self.add(line, column, "", code, **values)
+        self.raise_if_any()
+        raise AssertionError
+
+    def raise_if_any(self) -> None:
         """Raise what was noted.
 
         Raises
@@ -94,4 +118,5 @@ class ProblemList:
         message = "\n".join(map(str, self._problems))
         if self._more:
             message += f"\n{self.file}: and {self._more} more problems"
-        raise InputError(message, hint, problems=self._problems)
+        hint = "; ".join(remedies(problem.reason for problem in self._problems))
+        raise InputError(message, hint or self._hint, problems=self._problems)

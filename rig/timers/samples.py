@@ -77,7 +77,7 @@ def level_passages(
             if level in NO_LEVEL or not level:
                 continue
             if level not in RISING | FALLING:
-                problems.add(row.line, cell.column, label, f"{cell.text!r:.40} is no level: 0, 1")
+                problems.reject(row.line, cell.column, label, cell.text, "a level: 0 or 1")
                 continue
             high = level in RISING
             if high is not now.get(label, begins.setdefault(label, high)):
@@ -169,9 +169,9 @@ def sample_times(
         cell = row.cell(column.at)
         time = moment(cell.text, separator, column.power)
         if time is None:
-            problems.add(row.line, cell.column, "time", f"{cell.text!r:.40} is not a time")
+            problems.reject(row.line, cell.column, "time", cell.text, "a time")
             time = found[-1] if found else 0
         elif found and time < found[-1]:
-            problems.add(row.line, cell.column, "time", f"{cell.text} is before the time above it")
+            problems.add(row.line, cell.column, "time", "backwards", text=cell.text)
         found.append(time)
     return found

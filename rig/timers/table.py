@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.errors import InputError
-from rig.files import read_input
-from rig.timers.edges_csv import MAX_BYTES
+from rig.timers.edges_csv import read_content
+from rig.timers.problems import ProblemList
 
 if TYPE_CHECKING:
     import os
@@ -99,23 +97,12 @@ def lines_of(path: str | os.PathLike[str]) -> list[str]:
     InputError
         A file that cannot be read, is far too large, or is not text.
     """
-    try:
-        size = Path(path).stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(
-                f"{path}:1:1: {size / 1e6:.0f} MB is more than {MAX_BYTES / 1e6:.0f} MB",
-                "is it the right file?",
-            )
-        content = read_input(path)
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    problems = ProblemList(str(path))
+    content = read_content(path, problems)
     if content[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return content.decode("utf-16", errors="replace").splitlines()
     if b"\0" in content[:4096]:
-        raise InputError(
-            f"{path}:1:1: this is no text: a spreadsheet, or a program's own format?",
-            "export it as text or CSV",
-        )
+        problems.refuse(1, 1, "not_text")
     try:
         return content.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.errors import InputError
 from rig.reasons import make_reason
 from rig.records import Edge
 from rig.timers.columns import columns_of
@@ -111,26 +110,24 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     InputError
         Every fault of the file at its line and column.
     """
-    problems = ProblemList(str(path))
+    problems = ProblemList(str(path), _HINT)
     lines = lines_of(path)
     if is_vcd(lines):
         passages, begins, scale = read_vcd(lines, problems)
-        problems.raise_if_any(_HINT)
+        problems.raise_if_any()
         found = TimerFile("a value change dump", begins=begins, period_s=scale / TICK_HZ)
         if passages:
             found.add(passages)
     else:
         table = read_table(lines)
         if not table.blocks:
-            said = "no row of numbers: times are wanted, with or without states"
-            problems.add(1, 1, "", said if any(map(str.strip, lines)) else "no edges in this file")
-            problems.raise_if_any(_HINT)
+            problems.refuse(1, 1, "no_edges")
         found = _of_table(table, unit, problems)
-    _parted(found)
+    _parted(found, problems)
+    problems.raise_if_any()
     if not found.runs:
-        said = "; ".join(["nothing passes in this file", *map(str, found.notes)])
-        problems.add_if_none(1, 1, "", said)
-    problems.raise_if_any(_HINT)
+        notes = "".join(f"; {note}" for note in found.notes)
+        problems.refuse(1, 1, "nothing_passes", notes=notes)
     return found
 
 
@@ -145,12 +142,11 @@ def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFil
         above = block
         width = len(block.rows[0].cells)
         if width > MAX_COLUMNS:
-            too_many = f"{width} columns; at most {MAX_COLUMNS} are read"
-            problems.add(block.rows[0].line, 1, "", too_many)
-            return found
+            line = block.rows[0].line
+            problems.refuse(line, 1, "too_many_columns", columns=width, limit=MAX_COLUMNS)
         _named_inputs(block, table)
         columns = columns_of(block, table.separator, unit, problems)
-        problems.raise_if_any(_HINT)
+        problems.raise_if_any()
         found.columns |= columns.said
         if columns.levels or columns.volts:
             _samples(found, block, columns, table, problems)
@@ -159,18 +155,11 @@ def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFil
             for row in block.rows:
                 rows.add(row)
             if rows.up_and_down:
-                raise InputError(
-                    f"{problems.file}:{block.rows[0].line}:1: these numbers go up and down: they "
-                    "are durations, or something else, and not the times of passages",
-                    "import the times themselves, as the timer counted them",
-                )
+                numbers = "these numbers go up and down: they"
+                problems.refuse(block.rows[0].line, 1, "durations", numbers=numbers)
             if columns.derived and _sampled(rows.runs(), columns):
-                raise InputError(
-                    f"{problems.file}:{block.rows[0].line}:1: samples at regular times, as from "
-                    f"video or a sensor ({', '.join(columns.unused)}): wanted are the times at "
-                    "which gates change, or samples of gates in volts",
-                    "if these are passages nevertheless, leave the other columns out",
-                )
+                unused = ", ".join(columns.unused)
+                problems.refuse(block.rows[0].line, 1, "regular_samples", columns=unused)
             for number, passages in rows.runs():
                 found.add(passages, number)
     assert columns is not None
@@ -218,12 +207,9 @@ def _samples(
     """Find the passages in samples."""
     rate = sample_rate_hz(table.remarks)
     if not columns.times and rate is None:
-        problems.add(
-            block.rows[0].line, 1, "time", "samples without a column of times and without a rate"
-        )
-        return
+        problems.refuse(block.rows[0].line, 1, "no_rate", lacks="a column of times or a rate")
     times = sample_times(block.rows, columns, table.separator, rate, problems)
-    problems.raise_if_any(_HINT)
+    problems.raise_if_any()
     steps = np.diff(np.array(times, dtype=float)) / TICK_HZ
     passages: list[Passage] = []
     if columns.levels:
@@ -232,7 +218,7 @@ def _samples(
         found.period_s = None if rate is None else 1.0 / rate
     for at, heading in columns.volts.items():
         volts = _volts(block, at, table.separator, problems)
-        problems.raise_if_any(_HINT)
+        problems.raise_if_any()
         crossed = volt_passages(heading, times, volts)
         if crossed is None:
             low, high = float(volts.min()), float(volts.max())
@@ -254,15 +240,13 @@ def _volts(
     for n, row in enumerate(block.rows):
         cell = row.cell(at)
         if not is_number(cell.text, separator):
-            problems.add(
-                row.line, cell.column, "volts", f"{cell.text!r:.40} is not a number of volts"
-            )
+            problems.reject(row.line, cell.column, "volts", cell.text, "a number of volts")
             continue
         values[n] = float(pointed(cell.text, separator))
     return values
 
 
-def _parted(found: TimerFile) -> None:
+def _parted(found: TimerFile, problems: ProblemList) -> None:
     """Part drops that stand one after the other in one recording."""
     parts = [part for run in found.runs.values() for part in parted(run)]
     if len(parts) > len(found.runs):
@@ -271,10 +255,8 @@ def _parted(found: TimerFile) -> None:
     for number, run in found.runs.items():
         span = (max(one.tick for one in run) - min(one.tick for one in run)) / TICK_HZ
         if span > MAX_SPAN_S:
-            raise InputError(
-                f"run {number} would last {span:.0f} s without a pause of {PAUSE_S} s",
-                "are these passages of something that falls, and is the unit of time right?",
-            )
+            values = {"recording": f"run {number}", "lasting_s": span, "limit_s": MAX_SPAN_S}
+            problems.refuse(1, 1, "too_long", **values)
 
 
 def drops_of(

@@ -46,7 +46,8 @@ def read_vcd(
                     match = _SCALE.search(text)
                     unit = int(match[1]) * _PS[match[2]] if match else 0
                     if not unit:
-                        problems.add(number, 1, "$timescale", f"{text[10:].strip()!r} is no unit")
+                        scale = text[10:].strip()
+                        problems.reject(number, 1, "$timescale", scale, "a unit of time")
                         return [], {}, 0
                 text, skipping = "", False
             elif word in {"$date", "$version", "$timescale", "$comment", "$scope", "$var",
@@ -57,7 +58,7 @@ def read_vcd(
             elif word[0] == "#" and word[1:].isdecimal():
                 at = int(word[1:]) * unit
                 if at < time:
-                    problems.add(number, 1, "time", f"{word} is before the time above it")
+                    problems.add(number, 1, "time", "backwards", text=word)
                 time = at
             elif word[0] in "01" and word[1:] in names:
                 name, high = names[word[1:]], word[0] == "1"
@@ -66,7 +67,7 @@ def read_vcd(
                 first.setdefault(name, high)
                 now[name] = high
     if not unit:
-        problems.add(1, 1, "$timescale", "a value change dump without a time scale")
+        problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
     return found, first, unit
 
 

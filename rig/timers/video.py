@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.errors import InputError
 from rig.timers.problems import ProblemList
 from rig.timers.table import is_number, lines_of, pointed, read_table
 
@@ -46,12 +45,12 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
     InputError
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
-    problems = ProblemList(str(path))
+    problems = ProblemList(str(path), _HINT)
     table = read_table(lines_of(path))
     block = next(iter(table.blocks), None)
     heading = None if block is None else next(filter(_named, reversed(block.headings)), None)
     if block is None or heading is None:
-        raise InputError(f"{path}:1:1: no columns t, x and y", _HINT)
+        problems.refuse(1, 1, "no_track")
     at = {name: _column(heading, name) for name in _NAMES}
     scales = {name: _scale(heading, n, problems) for name, n in at.items()}
     frames: list[list[float]] = []
@@ -61,18 +60,15 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
             continue
         for name, cell in cells.items():
             if not is_number(cell.text, table.separator):
-                problems.add(row.line, cell.column, name, f"{cell.text!r:.40} is not a number")
+                problems.reject(row.line, cell.column, name, cell.text, "a number")
                 break
         else:
             frames.append([scales[name] * float(pointed(cell.text, table.separator))
                            for name, cell in cells.items()])  # fmt: skip
-    problems.raise_if_any(_HINT)
+    problems.raise_if_any()
     found = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)
     if found.times.size < FEWEST or not np.all(np.diff(found.times) > 0):
-        raise InputError(
-            f"{path}: {found.times.size} frames one after the other; at least {FEWEST} are wanted",
-            "track one object over one fall, each frame once",
-        )
+        problems.refuse(1, 1, "few_frames", frames=found.times.size, needed=FEWEST)
     return found
 
 
@@ -92,8 +88,7 @@ def _scale(heading: Row, at: int, problems: ProblemList) -> float:
     if match[1] not in _SCALES or (match[1] in {"s", "ms"}) is not cell.text[0].lower().startswith(
         "t"
     ):
-        problems.add(
-            heading.line, cell.column, cell.text, f"{match[1]!r} is no unit: s, ms; m, cm, mm"
-        )
+        accepted = "a unit of this column: s, ms; m, cm, mm"
+        problems.reject(heading.line, cell.column, cell.text, match[1], accepted)
         return 1.0
     return _SCALES[match[1]]

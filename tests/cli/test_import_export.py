@@ -221,14 +221,14 @@ def test_a_file_of_another_kind_is_refused_in_one_line(bring, tmp_path, text, me
 
 def test_what_is_missing_is_named(bring, tmp_path):
     (line,) = refused(bring(events=tmp_path / "none.csv"), tmp_path)
-    assert line == f"cannot read {tmp_path / 'none.csv'}: No such file or directory"
+    assert line == f"{tmp_path / 'none.csv'}: cannot read this file: No such file or directory"
     (line, *_) = refused(bring(protocol=tmp_path / "none.yaml"), tmp_path)
     assert line == f"{tmp_path / 'none.yaml'}: there is no such file"
 
 
 def test_a_protocol_without_gates_has_no_edges(bring, tmp_path):
     line, _ = refused(bring(protocol=PROTOCOLS / "bead-chain.yaml"), tmp_path)
-    assert line.endswith("bead-chain.yaml has no gates, so edges cannot belong to it")
+    assert line.endswith("bead-chain.yaml: the scene has no gates")
 
 
 @pytest.mark.parametrize("u", ["nan", "-1 ppm", "50", "3 mm", ""])

@@ -61,13 +61,16 @@ def test_other_arguments_are_no_pairs(look, tmp_path):
 @pytest.mark.parametrize(
     ("typed", "message"),
     [
-        ("--map D8=0", "--map: the file has no input 'D8'\n  hint: it has D7 (V), D9 (V)"),
-        ("--map 'D7 (V)'", "--map: 'D7 (V)' has no channel"),
-        ("--map 'D7 (V)=0, D9 (V)'", "--map: 'D9 (V)' has no channel"),
-        ("--map 'D7 (V)=7'", "--map: '7' is no gate's channel"),
-        ("--map 'D7 (V)='", "--map: 'D7 (V)' has no channel"),
-        ("--map ''", "--map: the file has no input ''"),
-        ("--map =3", "--map: the file has no input '3'"),
+        ("--map D8=0", "--map: 'D8' is not an input of the file: D7 (V), D9 (V)\n"),
+        ("--map 'D7 (V)'", "--map: 'D7 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, "),
+        (
+            "--map 'D7 (V)=0, D9 (V)'",
+            "--map: 'D9 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, ",
+        ),
+        ("--map 'D7 (V)=7'", "--map: 'D7 (V)=7' is not INPUT=CHANNEL with a gate's channel: 0, "),
+        ("--map 'D7 (V)='", "--map: 'D7 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, "),
+        ("--map ''", "--map: '' is not an input of the file: "),
+        ("--map =3", "--map: '3' is not an input of the file: "),
         ("--map --dry-run", "rig import: argument --map: expected one argument"),
     ],
 )

@@ -25,6 +25,8 @@ def faults(tmp_path: Path, content: str | bytes) -> list[tuple[int, int, str]]:
     with pytest.raises(InputError) as caught:
         read(tmp_path, content)
     assert caught.value.exit_code == 2
+    for problem in caught.value.problems:
+        assert problem.message == problem.reason.text
     return [(problem.line, problem.column, problem.key) for problem in caught.value.problems]
 
 
@@ -111,6 +113,20 @@ def test_all_faults_at_once(tmp_path: Path) -> None:
         (2, 10, "state"),
         (4, 7, "state"),
     ]
+
+
+def test_a_fault_has_a_code_with_values(tmp_path: Path) -> None:
+    path = tmp_path / "events.csv"
+    path.write_text(HEADER + "1,3,0.2,1\n1,3,0.1,1\n1,99,0.1,1\n")
+    with pytest.raises(InputError) as caught:
+        read_edges(path)
+    early, channel = caught.value.problems
+    assert early.reason.json() == {
+        "code": "before_last",
+        "values": {"text": "0.1", "last": "0.2", "channel": 3, "run": 1},
+    }
+    assert str(channel) == f"{path}:4:3: channel: '99' is not a channel: 0 to 15"
+    assert channel.reason.code == "not_accepted"
 
 
 def test_many_faults_are_counted(tmp_path: Path) -> None:

@@ -90,7 +90,9 @@ def faults(tmp_path: Path, content: str) -> list[tuple[int, int, str]]:
     with pytest.raises(InputError) as caught:
         read(tmp_path, content)
     assert caught.value.exit_code == 2
-    return [(one.line, one.column, one.key) for one in caught.value.problems]
+    for problem in caught.value.problems:
+        assert problem.message == problem.reason.text
+    return [(problem.line, problem.column, problem.key) for problem in caught.value.problems]
 
 
 @pytest.mark.parametrize(
@@ -309,26 +311,28 @@ def test_old_windows_writes_micro_in_one_byte(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"),
+    ("text", "code", "reason"),
     [
-        ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "samples at regular times"),
-        ("1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n", "they are durations"),
-        ("Time,Gate\n0.1,1\n0.2,0\n0.3,1\n", "a gate's number or its state"),
-        ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "are durations"),
-        ("time\n1204\n2406\n9000\n", "say --unit"),
+        ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "regular_samples",
+         "samples at regular times"),
+        ("1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n", "durations", "they are durations"),
+        ("Time,Gate\n0.1,1\n0.2,0\n0.3,1\n", "ambiguous", "a gate's number or its state"),
+        ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "durations", "are durations"),
+        ("time\n1204\n2406\n9000\n", "unit_missing", "say --unit"),
         ("Time (s),colour,state\n" + "".join(f"0.{n},{n % 3},1\n" for n in range(1, 9)),
-         "'colour' might say"),
+         "ambiguous", "'colour' may be the gate or the run"),
         ("Time (s),Volt\n" + "".join(f"{n},{n % 2 * 1e-3 + n % 7 * 1e-3}\n" for n in range(40)),
-         "nothing passes"),
-        ("time (s)\n" + "".join(f"{n}\n" for n in range(0, 300, 2)), "without a pause"),
-        ("D0,D1\n0,1\n1,1\n0,1\n", "without a column of times"),
-        ("$timescale 3 moons $end\n", "is no unit"),
-        ("PK\x03\x04\0\0", "this is no text"),
+         "nothing_passes", "nothing passes"),
+        ("time (s)\n" + "".join(f"{n}\n" for n in range(0, 300, 2)), "too_long", "split at pauses"),
+        ("D0,D1\n0,1\n1,1\n0,1\n", "no_rate", "without a column of times"),
+        ("$timescale 3 moons $end\n", "not_accepted", "'3 moons' is not a unit of time"),
+        ("PK\x03\x04\0\0", "not_text", "this is no text"),
     ],
 )  # fmt: skip
-def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, reason):
+def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, reason):
     with pytest.raises(InputError) as caught:
         read(tmp_path, text)
+    assert code in {problem.reason.code for problem in caught.value.problems}
     assert reason in str(caught.value)
     assert caught.value.hint
 

@@ -51,7 +51,7 @@ def test_frames_of_something_else_than_a_fall_are_noticed():
         ("run,channel,time_s,state\n1,0,0.1,1\n", "no columns t, x and y"),
         ("t,x,y\n0,1,2\n", "1 frames"),
         ("t,x,y\n0,1,2\n0.1,a,2\n", ":3:5: x: 'a' is not a number"),
-        ("t (s),x (px),y (px)\n0,1,2\n0.1,1,2\n", "'px' is no unit"),
+        ("t (s),x (px),y (px)\n0,1,2\n0.1,1,2\n", "'px' is not a unit of this column"),
     ],
 )
 def test_other_files_are_refused_with_their_reason(tmp_path, text, said):
