@@ -77,8 +77,8 @@ def read_record(record: object) -> Reason:
     """
     match record:
         case {"code": str(code), "values": dict(values), "text": str(text), "scene": str(scene)}:
-            known = code in WORDINGS and scene in VOCABULARIES
-            return Reason(code, values, text, scene) if known else plain_reason(text)
+            is_known = code in WORDINGS and scene in VOCABULARIES
+            return Reason(code, values, text, scene) if is_known else plain_reason(text)
     raise TypeError(f"{record!r:.40} is no reason")
 
 
@@ -163,9 +163,9 @@ class _Phrases(dict[str, Any]):
         return getattr(self.words, name) if phrase is None else phrase(self)
 
 
-def _gate(found: Mapping[str, Any], words: Vocabulary) -> str:
-    side = f"{found['side']} side, " if words.two_sides else ""
-    return f"the gate on channel {found['channel']} ({side}{found['height_m'] * 1e3:g} mm)"
+def _gate(gate: Mapping[str, Any], words: Vocabulary) -> str:
+    side = f"{gate['side']} side, " if words.two_sides else ""
+    return f"the gate on channel {gate['channel']} ({side}{gate['height_m'] * 1e3:g} mm)"
 
 
 def _inputs(channels: Sequence[int]) -> str:
@@ -193,7 +193,7 @@ def _each_part(phrases: _Phrases) -> str:
     return f"every {words.part} of {_chain(phrases)}"
 
 
-def _measured(phrases: _Phrases, name: str) -> str:
+def _format_measured(phrases: _Phrases, name: str) -> str:
     speed = phrases.get(f"{name}_m_s")
     value, unit = (phrases[f"{name}_m"], "mm") if speed is None else (speed, "m/s")
     return format_quantity(Quantity(float(value), float(phrases[f"{name}_U95"])), unit)
@@ -206,8 +206,8 @@ _PHRASES: dict[str, Callable[[_Phrases], str]] = {
     "inputs": lambda p: _inputs(p["channels"]),
     "are": lambda p: "are" if len(p["channels"]) > 1 else "is",
     "on_side": _side,
-    "alone": lambda p: _measured(p, "alone"),
-    "whole": lambda p: _measured(p, "whole"),
+    "alone": lambda p: _format_measured(p, "alone"),
+    "whole": lambda p: _format_measured(p, "whole"),
     "chain": _chain,
     "each_part": _each_part,
     "size": lambda p: f"{abs(p['size_m']) * 1e3:.1f} ± {max(p['U95_m'] * 1e3, _LEAST_MM):.1f} mm",

@@ -55,9 +55,9 @@ def main(arguments: Namespace) -> int:
 
 def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     # Without a name no port is opened: that would restart the board behind it.
-    named = [url] if url and "://" not in url else []
+    paths = [url] if url and "://" not in url else []
     free = True
-    for path in named or [port.path for port in serial_ports() if port.candidate and not url]:
+    for path in paths or [port.path for port in serial_ports() if port.candidate and not url]:
         facts = look_at_port(path)
         free = facts.usable and not facts.owners
         yield from (check(facts) for check in _PORT)
@@ -71,15 +71,15 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
         yield checks.problem(f"session {session}", "session_missing")
     elif session:
         try:
-            told = look_at_session(session)
-            yield checks.session_file(told)
-            if told.whole:
-                yield from (checks.restarts(told), checks.supply(told))
+            file = look_at_session(session)
+            yield checks.session_file(file)
+            if file.whole:
+                yield from (checks.restarts(file), checks.supply(file))
         except SessionError as error:
-            yield _failed(f"session {session}", error)
+            yield _failure(f"session {session}", error)
 
 
-def _failed(name: str, error: RigError) -> Finding:
+def _failure(name: str, error: RigError) -> Finding:
     return checks.problem(name, "failed", text=error.message, hint=error.hint)
 
 
@@ -88,7 +88,7 @@ def _board(url: str) -> Iterator[Finding]:
         with closing(open_port(url)) as port:
             facts = look_at_board(port, port_clock(port))
     except DeviceError as error:
-        yield _failed("board", error)
+        yield _failure("board", error)
         return
     identity = facts.identity
     yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}")

@@ -42,20 +42,20 @@ def main(arguments: Namespace) -> int:
     timer: dict[str, object] = {"source": "imported edges", "file": events}
     if is_edge_file(arguments.events):
         drops = read_edges(arguments.events)
-        said = ["the project's own format: run,channel,time_s,state"]
+        lines = ["the project's own format: run,channel,time_s,state"]
     else:
-        drops, channels, said, notes = _understood(protocol, arguments)
+        drops, channels, lines, notes = _read_timer_file(protocol, arguments)
         timer |= {"beams": sorted(set(channels.values())), **reasons_json(notes)}
-    _fits(protocol, drops, arguments.events)
+    _check_plan(protocol, drops, arguments.events)
     edges = sum(len(drop.edges) for drop in drops)
     if arguments.dry_run:
-        print("\n".join([*said, *_told(drops)]))
+        print("\n".join([*lines, *_describe_drops(drops)]))
         return 0
     if arguments.session is None:
         raise refusal("--session", "no_session_file")
     timer["sha256"] = hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest()
     if arguments.clock_uncertainty is not None:
-        timer["clock_u"] = _relative(arguments.clock_uncertainty)
+        timer["clock_u"] = _read_share(arguments.clock_uncertainty)
     now_ns = SystemClock().now_ns()
     with Session.create(
         arguments.session, protocol.text, source, simulated=arguments.simulated, origin=events
@@ -68,52 +68,52 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _understood(
+def _read_timer_file(
     protocol: Protocol, arguments: Namespace
 ) -> tuple[list[Drop], dict[str, int], list[str], list[Reason]]:
     """Drops of another timer's file, which gate each input is, and what was assumed."""
-    found = read_timer_file(arguments.events, arguments.unit)
-    channels = _channels(protocol, found, arguments)
-    bars = max(one.chain.rods for one in protocol.chains.values())
-    drops = drops_of(found, channels, bars, arguments.dark)
-    said = [found.kind, *(f"  {name}: {what}" for name, what in found.columns.items())]
-    if found.period_s:
-        period_us = found.period_s * 1e6
+    file = read_timer_file(arguments.events, arguments.unit)
+    channels = _match_inputs(protocol, file, arguments)
+    bars = max(side.chain.rods for side in protocol.chains.values())
+    drops = drops_of(file, channels, bars, arguments.dark)
+    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
+    if file.period_s:
+        period_us = file.period_s * 1e6
         u_us = period_us / math.sqrt(12.0)
-        found.notes.append(make_reason("samples", period_us=period_us, u_us=u_us))
-    idle = [label for label in found.labels if label not in channels]
+        file.notes.append(make_reason("samples", period_us=period_us, u_us=u_us))
+    idle = [label for label in file.labels if label not in channels]
     if idle:
-        found.notes.append(make_reason("inputs_unused", inputs=", ".join(idle)))
-    for note in found.notes:
+        file.notes.append(make_reason("inputs_unused", inputs=", ".join(idle)))
+    for note in file.notes:
         say(note.text)
-    said += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
-    return drops, channels, said, found.notes
+    lines += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
+    return drops, channels, lines, file.notes
 
 
-def _told(drops: Sequence[Drop]) -> Iterator[str]:
+def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
     """Describe what would be imported, a line a run."""
     for drop in drops:
         by_channel = Counter(edge.channel for edge in drop.edges)
-        each = ", ".join(f"{channel}: {n}" for channel, n in sorted(by_channel.items()))
+        counts = ", ".join(f"{channel}: {n}" for channel, n in sorted(by_channel.items()))
         span = (drop.edges[-1].tick - drop.edges[0].tick) / drop.tick_hz
-        yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {each}"
+        yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {counts}"
 
 
-def _channels(protocol: Protocol, found: TimerFile, arguments: Namespace) -> dict[str, int]:
+def _match_inputs(protocol: Protocol, file: TimerFile, arguments: Namespace) -> dict[str, int]:
     """Which gate each of the file's inputs is."""
     gates = [gate.channel for gate in protocol.gates.gates] if protocol.gates else []
-    labels = found.labels
+    labels = file.labels
     if not labels:
-        return {"": _beam(protocol, arguments.channel).channel}
+        return {"": _find_gate(protocol, arguments.channel).channel}
     if arguments.map is not None:
         return _read_pairs(arguments.map, labels, gates)
     if len(labels) == 1 and (arguments.channel is not None or len(gates) == 1):
-        return {labels[0]: _beam(protocol, arguments.channel).channel}
-    channels = {one: n for one in labels if (n := label_number(one)) in gates and n is not None}
+        return {labels[0]: _find_gate(protocol, arguments.channel).channel}
+    channels = {name: n for name in labels if (n := label_number(name)) in gates and n is not None}
     # As many inputs as gates, and not all of the same number: counted from 1, perhaps.
     shifted = len(labels) == len(gates) and len(channels) < len(labels)
     if not channels or shifted or len(set(channels.values())) < len(channels):
-        pairs = ",".join(f"{label}={n}" for label, n in zip(labels, gates, strict=False))
+        pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
         values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
         raise refusal(arguments.events, "inputs_unclear", **values, pairs=pairs)
     return channels
@@ -133,12 +133,12 @@ def _read_pairs(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[
     return channels
 
 
-def _beam(protocol: Protocol, channel: int | None) -> Gate:
+def _find_gate(protocol: Protocol, channel: int | None) -> Gate:
     """Which gate the beam of a file was that has only one."""
     gates = protocol.gates.gates if protocol.gates else ()
-    named = [gate for gate in gates if channel is None or gate.channel == channel]
-    if len(named) == 1:
-        return named[0]
+    candidates = [gate for gate in gates if channel is None or gate.channel == channel]
+    if len(candidates) == 1:
+        return candidates[0]
     channels = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
     if channel is None:
         raise refusal(protocol.source, "which_gate", channels=channels)
@@ -146,7 +146,7 @@ def _beam(protocol: Protocol, channel: int | None) -> Gate:
     raise refusal("--channel", "not_accepted", text=str(channel), accepted=accepted)
 
 
-def _relative(text: str) -> float:
+def _read_share(text: str) -> float:
     try:
         value = parse(text, Dimension.NUMBER).value
     except UnitError:
@@ -157,7 +157,7 @@ def _relative(text: str) -> float:
     return value
 
 
-def _fits(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
+def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
     if protocol.gates is None:
         raise refusal(protocol.source, "no_gates")

@@ -80,10 +80,10 @@ def look_at_disk(folder: Path) -> DiskFacts:
 
 def look_at_session(path: str) -> SessionFacts:
     """Gather what is whole of a session file."""
-    found = examine(path)
-    trouble = next(iter(found.troubles), "")
-    facts = SessionFacts(path, found.whole, found.foreign, found.snapshot.writer, trouble)
-    return _look_at_drops(facts) if found.whole else facts
+    file = examine(path)
+    trouble = next(iter(file.troubles), "")
+    facts = SessionFacts(path, file.whole, file.foreign, file.snapshot.writer, trouble)
+    return _look_at_drops(facts) if file.whole else facts
 
 
 def _look_at_drops(facts: SessionFacts) -> SessionFacts:
@@ -96,11 +96,11 @@ def _look_at_drops(facts: SessionFacts) -> SessionFacts:
             for record in transcript.feed(direction, host_ns, data)
             if isinstance(record, Restart)
         )
-        told = [(f"run {d.run}, attempt {d.attempt}", d.certificate) for d in session.drops()]
-    unseen = tuple((name, c.restarts) for name, c in told if c and c.restarts)
+        drops = [(f"run {d.run}, attempt {d.attempt}", d.certificate) for d in session.drops()]
+    unseen = tuple((name, c.restarts) for name, c in drops if c and c.restarts)
     dips = [
         (c.lowest_mv / c.supply_mv, name, c.supply_mv / 1e3, c.lowest_mv / 1e3)
-        for name, c in told
+        for name, c in drops
         if c and c.supply_mv and c.lowest_mv
     ]
     return replace(facts, restarts=restarts, unseen=unseen, sunk=min(dips)[1:] if dips else None)
@@ -126,8 +126,8 @@ def _owners(place: Path, proc: Path) -> Iterator[Owner]:
         with suppress(OSError):
             if any(_points_to(handle, place) for handle in (folder / "fd").iterdir()):
                 words = (folder / "cmdline").read_bytes().split(b"\0")
-                said = b" ".join(words).decode("utf-8", "replace").strip()
-                yield Owner(int(folder.name), said or name)
+                command = b" ".join(words).decode("utf-8", "replace").strip()
+                yield Owner(int(folder.name), command or name)
 
 
 def _points_to(handle: Path, place: Path) -> bool:
@@ -165,7 +165,8 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
     states = watch_gates(lambda: device.status().gates, clock, _GLANCE_S)
     edges, unwatched, stopped = None, "it holds a drop", False
     if state.phase is Phase.IDLE:
-        edges, unwatched, stopped = _recorded(device, ((1 << identity.gates) - 1) & ~states.stuck)
+        clear = ((1 << identity.gates) - 1) & ~states.stuck
+        edges, unwatched, stopped = _record_gates(device, clear)
     held = unpack_label(state.label) if state.phase is Phase.HOLDING else None
     shipped = shipped_firmware(identity.board)
     return BoardFacts(
@@ -173,7 +174,7 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
     )
 
 
-def _recorded(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str, bool]:
+def _record_gates(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str, bool]:
     """Record the gates for a while with all releases off; else say why not, and if it is stopped.
 
     A board fires only when all its gates are clear and keep still. One that flickers with the

@@ -53,7 +53,7 @@ class SelftestOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class RecordedDrop:
     """A drop as the board sent it of its own accord."""
 
     fired: wire.Fired
@@ -109,7 +109,7 @@ class BoardUnderTest:
         self._seq = self._seq % 255 + 1
         return self._seq
 
-    def ask(self, message: wire.HostMessage, seq: int | None = None) -> wire.Message:
+    def ask(self, message: wire.HostMessage, seq: int = 0) -> wire.Message:
         """Send a request, a few times if need be, and give its answer.
 
         Raises
@@ -124,9 +124,9 @@ class BoardUnderTest:
             raise CheckFailedError("fire_withheld")
         return self.ask_raw(code, payload, type(message).__name__, seq)
 
-    def ask_raw(self, code: int, payload: bytes, name: str, seq: int | None = None) -> wire.Message:
+    def ask_raw(self, code: int, payload: bytes, name: str, seq: int = 0) -> wire.Message:
         """Send any frame as a request, and give its answer; as `ask`."""
-        seq = self.next_seq() if seq is None else seq
+        seq = seq or self.next_seq()
         for _ in range(_TRIES):
             self.line.send(code, payload, seq)
             heard = self.wait(_ANSWER_S, lambda heard: heard.ack == seq)
@@ -134,9 +134,7 @@ class BoardUnderTest:
                 return heard.message
         raise CheckFailedError("no_answer", request=name)
 
-    def answer(
-        self, message: wire.HostMessage, kind: type[Answer], seq: int | None = None
-    ) -> Answer:
+    def answer(self, message: wire.HostMessage, kind: type[Answer], seq: int = 0) -> Answer:
         """Ask, and insist on one kind of answer."""
         answer = self.ask(message, seq)
         if not isinstance(answer, kind):
@@ -149,11 +147,11 @@ class BoardUnderTest:
         """Ask, and insist on being refused."""
         return insist_refusal(type(message).__name__, self.ask(message), reason, detail)
 
-    def wait(self, seconds: float, wanted: Callable[[Heard], bool]) -> Heard | None:
+    def wait(self, seconds: float, accepts: Callable[[Heard], bool]) -> Heard | None:
         """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
         try:
             for heard in self.line.listen(seconds):
-                if wanted(heard):
+                if accepts(heard):
                     return heard
                 if heard.ack == 0:
                     self._unasked.append(heard)
@@ -161,7 +159,7 @@ class BoardUnderTest:
             raise CheckFailedError("invalid_message", text=str(error)) from error
         return None
 
-    def unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Heard | None:
+    def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Heard | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
         while self._unasked:
             heard = self._unasked.popleft()
@@ -206,26 +204,26 @@ class BoardUnderTest:
         """Fire what was armed."""
         return self.answer(wire.Fire(token), wire.Fired)
 
-    def drop(self, **changes: int) -> Recorded:
+    def drop(self, **changes: int) -> RecordedDrop:
         """Arm, fire, and take what the board sends until its certificate."""
         return self.collect_drop(
             self.fire(self.arm(**changes)), changes.get("record_ms", RECORD_MS)
         )
 
-    def collect_drop(self, fired: wire.Fired, record_ms: int = 0) -> Recorded:
+    def collect_drop(self, fired: wire.Fired, record_ms: int = 0) -> RecordedDrop:
         """Take what the board sends of a drop, up to its certificate."""
         events: list[wire.Event] = []
         deadline = self.clock.now_ns() + round((record_ms / 1000 + _END_S) * 1e9)
-        while (left := deadline - self.clock.now_ns()) > 0:
-            heard = self.unasked(left * 1e-9, wire.EventsFrame, wire.DropCertificate)
+        while (left_ns := deadline - self.clock.now_ns()) > 0:
+            heard = self.wait_unasked(left_ns * 1e-9, wire.EventsFrame, wire.DropCertificate)
             match heard and heard.message:
-                case wire.EventsFrame(events=more):
-                    events += more
+                case wire.EventsFrame(events=more_events):
+                    events += more_events
                 case wire.DropCertificate() as certificate:
-                    return Recorded(fired, tuple(events), certificate)
+                    return RecordedDrop(fired, tuple(events), certificate)
         raise CheckFailedError("no_certificate")
 
-    def acknowledge(self, recorded: Recorded) -> None:
+    def acknowledge(self, recorded: RecordedDrop) -> None:
         """Let the board forget a drop."""
         certificate = recorded.certificate
         self.answer(wire.Acknowledge(certificate.label, certificate.crc32), wire.Done)

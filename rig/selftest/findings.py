@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from rig.link.messages import RefusalReason
     from rig.reasons import Reason
 
-
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
 
 
@@ -77,8 +76,9 @@ class NotPossibleError(CheckEndedError):
 
 def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedError:
     """Return the failure of a board that gave another answer than expected."""
-    wanted, given = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
-    return CheckFailedError("wrong_answer", request=request, expected=wanted, answer=given)
+    texts = {"expected": str(expected), "answer": str(answer)}
+    values = {name: _ENUM.sub(r"\1", text) for name, text in texts.items()}
+    return CheckFailedError("wrong_answer", request=request, **values)
 
 
 def insist(request: str, answer: object, expected: object) -> None:

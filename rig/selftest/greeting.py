@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def identify(board: BoardUnderTest) -> str:
     """See that the board introduces itself, sensibly and twice alike."""
     board.line.port.write(DELIMITER)
-    board.unasked(BOOT_WAIT_S, wire.Boot)
+    board.wait_unasked(BOOT_WAIT_S, wire.Boot)
     identity = board.answer(wire.Identify(), wire.Identity)
     board.identity = identity
     faults = [

@@ -60,13 +60,13 @@ def let_arming_time_out(board: BoardUnderTest) -> str:
     board.arm(timeout_ms=_TIMEOUT_MS)
     for _ in range(3):
         board.wait(_ASK_S, lambda _: False)
-        phase, now = board.phase(), board.clock.now_ns()
+        phase, now_ns = board.phase(), board.clock.now_ns()
         if phase is not Phase.ARMED:
-            if now - asked > HOST_SILENCE_MS * 10**6 or now - sent > _TIMEOUT_MS * 10**6:
-                board.unasked(_QUIET_S, wire.Disarmed)
+            if now_ns - asked > HOST_SILENCE_MS * 10**6 or now_ns - sent > _TIMEOUT_MS * 10**6:
+                board.wait_unasked(_QUIET_S, wire.Disarmed)
                 raise NotPossibleError("computer_busy", interval_s=HOST_SILENCE_MS / 1000)
             raise wrong_answer("Status before the timeout", "ARMED", phase.name)
-        asked = now
+        asked = now_ns
     return _insist_disarmed(board, DisarmReason.TIMEOUT, _TIMEOUT_MS, sent)
 
 
@@ -82,7 +82,7 @@ def stay_silent(board: BoardUnderTest) -> str:
 def _insist_disarmed(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_ns: int) -> str:
     """Wait in silence for DISARMED, neither early nor late."""
     silence = f"{ms} ms of silence"
-    heard = board.unasked(ms / 1000 + 0.3, wire.Disarmed)
+    heard = board.wait_unasked(ms / 1000 + 0.3, wire.Disarmed)
     if heard is None:
         raise wrong_answer(silence, "Disarmed", "no message")
     insist(silence, heard.message, wire.Disarmed(LABEL, reason))

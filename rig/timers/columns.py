@@ -74,7 +74,7 @@ _WHOLE = re.compile(r"[0-9]{1,4}")
 _STATES = (BLOCKED | CLEAR) - RISING - FALLING
 _WORTH = 200  # rows that are looked at
 _SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
-_SAID = {
+_MEANINGS = {
     "state": "states, blocked or clear",
     "duration": "durations, not used",
     "time": "times",
@@ -137,7 +137,7 @@ class Columns:
         Whether places, speeds or other measured things stand beside the times.
     row_is_run
         Whether each row is a drop of its own, its times side by side.
-    said
+    meanings
         What each column was taken for, in words, by its heading or number.
     """
 
@@ -150,7 +150,7 @@ class Columns:
     unused: list[str] = field(default_factory=list)
     derived: bool = False
     row_is_run: bool = False
-    said: dict[str, str] = field(default_factory=dict)
+    meanings: dict[str, str] = field(default_factory=dict)
 
 
 def columns_of(block: RowBlock, separator: str, unit: str | None, problems: ProblemList) -> Columns:
@@ -165,7 +165,7 @@ def columns_of(block: RowBlock, separator: str, unit: str | None, problems: Prob
     """
     width = max(len(row.cells) for row in block.rows[:_WORTH])
     values = [_values(block, n) for n in range(width)]
-    heading = _with_units(block, _heading(block, width))
+    heading = _with_units(block, _find_heading(block, width))
     if heading is None:
         return _by_values(block, values, separator, unit, problems)
     return _by_heading(block, heading, values, separator, unit, problems)
@@ -176,21 +176,21 @@ def _values(block: RowBlock, n: int) -> list[str]:
     return [text for text in cells if text]
 
 
-def _heading(block: RowBlock, width: int) -> Row | None:
+def _find_heading(block: RowBlock, width: int) -> Row | None:
     """The row with most cells that are known; below it may stand symbols and units."""
 
-    def known(row: Row) -> int:
+    def count_known(row: Row) -> int:
         return sum(
             any(
-                one.search(text)
-                for one in (_TIME, _STATE, _VOLTS, _CHANNEL, _EDGE, _INPUT, _MOMENT)
+                pattern.search(text)
+                for pattern in (_TIME, _STATE, _VOLTS, _CHANNEL, _EDGE, _INPUT, _MOMENT)
             )
             for text in row.texts
         )
 
     rows = [row for row in block.headings if len(row.cells) > 1 or width == 1]
-    named = [row for row in rows if known(row)]
-    return max(named, key=known) if named else None
+    candidates = [row for row in rows if count_known(row)]
+    return max(candidates, key=count_known) if candidates else None
 
 
 def _with_units(block: RowBlock, heading: Row | None) -> Row | None:
@@ -199,13 +199,13 @@ def _with_units(block: RowBlock, heading: Row | None) -> Row | None:
         return None
 
     def units(row: Row) -> list[str]:
-        said = [text.strip("()[] ") for text in row.texts]
-        known = [one.lower() in UNITS or one.lower() in _VOLT_WORDS for one in said if one]
-        return said if len(known) > 1 and all(known) else []
+        words = [text.strip("()[] ") for text in row.texts]
+        are_units = [word.lower() in UNITS or word.lower() in _VOLT_WORDS for word in words if word]
+        return words if len(are_units) > 1 and all(are_units) else []
 
     rows = [row for row in block.headings if len(row.cells) == len(heading.cells)]
     stated = next(filter(None, map(units, rows)), None)
-    if stated is None or not _VOLT_WORDS & {one.lower() for one in stated}:
+    if stated is None or not _VOLT_WORDS & {word.lower() for word in stated}:
         return heading
     names = (
         heading if not units(heading) else next((row for row in rows if not units(row)), heading)
@@ -226,53 +226,53 @@ def _by_heading(
     unit: str | None,
     problems: ProblemList,
 ) -> Columns:
-    found = Columns()
+    columns = Columns()
     durations, states = [], []
     for n, cell in enumerate(heading.cells):
         text = cell.text
-        here = values[n] if n < len(values) else []
-        kind = _kind(text, here)
-        said = _SAID[kind]
+        texts = values[n] if n < len(values) else []
+        kind = _find_kind(text, texts)
+        meaning = _MEANINGS[kind]
         if kind == "state":
             states.append(n)
         elif kind == "duration":
             durations.append(cell)
         elif kind in {"time", "time of an input", "moment"}:
-            power = _power(block, heading, n, here, unit, problems)
+            power = _find_power(block, heading, n, texts, unit, problems)
             dark = _DARKENS.search(text)
             blocked = None if dark is None or kind == "moment" else not (dark[1] or dark[2])
             label = "" if kind != "time of an input" else text if dark is None else _input(text)
-            found.times.append(TimeColumn(n, power, label=label, blocked=blocked))
-            found.row_is_run |= kind == "moment" or blocked is not None
-            said = f"times in {_SYMBOLS[power]}"
+            columns.times.append(TimeColumn(n, power, label=label, blocked=blocked))
+            columns.row_is_run |= kind == "moment" or blocked is not None
+            meaning = f"times in {_SYMBOLS[power]}"
         elif kind == "volts":
-            found.volts[n] = text
+            columns.volts[n] = text
         elif kind == "level":
-            found.levels[n] = text
+            columns.levels[n] = text
         elif kind in {"edge", "channel", "run"}:
-            setattr(found, kind, n)
-        elif kind == "other" and (text or here):
-            found.unused.append(_name(heading, n))
-            _check_unused(heading.line, cell, here, problems)
-        if text or here:
-            found.said[_name(heading, n)] = said
-    found.derived = bool(found.unused)
-    _side_by_side(found, heading, values, separator)
-    _pair_states(found, heading, states, len(heading.cells))
-    _check_gate(found, heading, values, problems)
-    _one_clock(found, heading, block, separator)
-    if not (found.times or found.levels or found.volts):
+            setattr(columns, kind, n)
+        elif kind == "other" and (text or texts):
+            columns.unused.append(_name(heading, n))
+            _check_unused(heading.line, cell, texts, problems)
+        if text or texts:
+            columns.meanings[_name(heading, n)] = meaning
+    columns.derived = bool(columns.unused)
+    _join_row(columns, heading, values, separator)
+    _pair_states(columns, heading, states, len(heading.cells))
+    _check_gate(columns, heading, values, problems)
+    _keep_finest(columns, heading, block, separator)
+    if not (columns.times or columns.levels or columns.volts):
         if durations:
             cell = durations[0]
             problems.add(heading.line, cell.column, "", "durations", numbers=repr(cell.text))
         else:
             problems.add(heading.line, heading.cells[0].column, "", "no_time_column")
-    return found
+    return columns
 
 
-def _check_unused(line: int, cell: TableCell, here: Sequence[str], problems: ProblemList) -> None:
+def _check_unused(line: int, cell: TableCell, texts: Sequence[str], problems: ProblemList) -> None:
     """Leave nothing out that may say what an edge is of."""
-    if not _DERIVED.search(cell.text) and _few_whole(here):
+    if not _DERIVED.search(cell.text) and _few_whole(texts):
         _refuse_to_guess(line, cell, "the gate or the run of a row, or its state", problems)
 
 
@@ -282,19 +282,19 @@ def _refuse_to_guess(line: int, cell: TableCell, readings: str, problems: Proble
 
 
 def _check_gate(
-    found: Columns, heading: Row, values: Sequence[list[str]], problems: ProblemList
+    columns: Columns, heading: Row, values: Sequence[list[str]], problems: ProblemList
 ) -> None:
     """Do not guess whether a lone column of 0 and 1 is a gate's number or its state."""
-    n = found.channel
-    stated = found.edge is not None or any(one.state is not None for one in found.times)
+    n = columns.channel
+    stated = columns.edge is not None or any(column.state is not None for column in columns.times)
     if n is not None and not stated and set(values[n]) <= {"0", "1"}:
         cell = heading.cells[n]
         _refuse_to_guess(heading.line, cell, "a gate's number or its state", problems)
 
 
-def _kind(text: str, here: Sequence[str]) -> str:
+def _find_kind(text: str, texts: Sequence[str]) -> str:
     """What a column is, by its heading and its values."""
-    levels = _levels(here)
+    levels = _levels(texts)
     match = _UNIT.search(text)
     timed = match is not None and (match[1] or "").lower() in UNITS
     by_heading = (
@@ -306,17 +306,17 @@ def _kind(text: str, here: Sequence[str]) -> str:
         ("time of an input", _CHANNEL, timed and not levels),
         ("edge", _EDGE, levels),
         ("volts", _VOLTS, True),
-        ("volts", _SCOPE, _fractions(here)),
+        ("volts", _SCOPE, _fractions(texts)),
         ("level", _INPUT, levels),
-        ("run", _NUMBERED_RUN, _whole(here)),
-        ("state", _CHANNEL, levels and not _digits(here)),  # a gate that is blocked or clear
-        ("channel", _CHANNEL, bool(here) and not _fractions(here)),
+        ("run", _NUMBERED_RUN, _all_whole(texts)),
+        ("state", _CHANNEL, levels and not _digits(texts)),  # a gate that is blocked or clear
+        ("channel", _CHANNEL, bool(texts) and not _fractions(texts)),
         ("counter", _COUNTER, True),
     )
     for kind, pattern, fits in by_heading:
         if fits and pattern.search(text):
             return kind
-    return "counter" if _counts(here) else "other"
+    return "counter" if _counts(texts) else "other"
 
 
 def _name(heading: Row, n: int) -> str:
@@ -329,78 +329,76 @@ def _input(text: str) -> str:
     return match[0] if match else text
 
 
-def _side_by_side(
-    found: Columns, heading: Row, values: Sequence[list[str]], separator: str
-) -> None:
+def _join_row(columns: Columns, heading: Row, values: Sequence[list[str]], separator: str) -> None:
     """Find out whether times that stand side by side are one drop: a row each, gate after gate."""
-    times = found.times
-    numbered = all(one.label or _NUMBERED.search(heading.cells[one.at].text) for one in times)
-    if len(times) < 2 or found.channel is not None or not numbered or found.row_is_run:
+    times = columns.times
+    numbered = all(time.label or _NUMBERED.search(heading.cells[time.at].text) for time in times)
+    if len(times) < 2 or columns.channel is not None or not numbered or columns.row_is_run:
         return
-    if any(_RUN.search(heading.cells[one.at].text) for one in times):
+    if any(_RUN.search(heading.cells[time.at].text) for time in times):
         return
-    down = all(_rises(values[one.at], separator) for one in times)
-    if found.run is None and (down and len(values[times[0].at]) > 1):
+    down = all(_rises(values[time.at], separator) for time in times)
+    if columns.run is None and (down and len(values[times[0].at]) > 1):
         return
-    found.row_is_run = True
-    for one in times:
-        one.label = one.label or heading.cells[one.at].text
+    columns.row_is_run = True
+    for time in times:
+        time.label = time.label or heading.cells[time.at].text
 
 
-def _pair_states(found: Columns, heading: Row, states: Sequence[int], width: int) -> None:
+def _pair_states(columns: Columns, heading: Row, states: Sequence[int], width: int) -> None:
     """Give each column of times the states that stand behind it, or before the first."""
     paired: list[TimeColumn] = []
-    for one, end in pairwise([*found.times, None]):
-        assert one is not None
-        behind = [n for n in states if one.at < n < (width if end is None else end.at)]
-        before = [n for n in states if n < one.at] if one is found.times[0] else []
-        here = [*behind, *before]
-        if len(here) < 2:
-            one.state = here[0] if here else None
-            paired.append(one)
+    for column, end in pairwise([*columns.times, None]):
+        assert column is not None
+        behind = [n for n in states if column.at < n < (width if end is None else end.at)]
+        before = [n for n in states if n < column.at] if column is columns.times[0] else []
+        beside = [*behind, *before]
+        if len(beside) < 2:
+            column.state = beside[0] if beside else None
+            paired.append(column)
             continue
         # One clock, and a column of states for each input.
-        names = [heading.cells[n].text for n in here]
+        names = [heading.cells[n].text for n in beside]
         short = [_input(name) for name in names]
         labels = short if len(set(short)) == len(short) else names
-        paired += [TimeColumn(one.at, one.power, n, label)
-                   for n, label in zip(here, labels, strict=True)]  # fmt: skip
-    found.times = paired
+        paired += [TimeColumn(column.at, column.power, n, label)
+                   for n, label in zip(beside, labels, strict=True)]  # fmt: skip
+    columns.times = paired
 
 
-def _one_clock(found: Columns, heading: Row, block: RowBlock, separator: str) -> None:
+def _keep_finest(columns: Columns, heading: Row, block: RowBlock, separator: str) -> None:
     """Of columns that say the same times in other units, keep the finest."""
-    if len({one.power for one in found.times}) < 2:
+    if len({column.power for column in columns.times}) < 2:
         return
-    finest = max(found.times, key=lambda one: one.power)
-    coarser = [one for one in found.times if one is not finest]
-    if all(_same(one, finest, block, separator) for one in coarser):
-        state = next((one.state for one in found.times if one.state is not None), None)
-        found.times = [TimeColumn(finest.at, finest.power, state)]
+    finest = max(columns.times, key=lambda column: column.power)
+    coarser = [column for column in columns.times if column is not finest]
+    if all(_same_times(column, finest, block, separator) for column in coarser):
+        state = next((column.state for column in columns.times if column.state is not None), None)
+        columns.times = [TimeColumn(finest.at, finest.power, state)]
         # First these: with like headings, what the finest one is stays.
-        found.said |= {
-            _name(heading, one.at): "the same times, coarser; not used" for one in coarser
+        columns.meanings |= {
+            _name(heading, column.at): "the same times, coarser; not used" for column in coarser
         } | {_name(heading, finest.at): f"times in {_SYMBOLS[finest.power]}"}
 
 
-def _same(one: TimeColumn, other: TimeColumn, block: RowBlock, separator: str) -> bool:
+def _same_times(first: TimeColumn, second: TimeColumn, block: RowBlock, separator: str) -> bool:
     for row in block.rows[:20]:
-        if max(one.at, other.at) >= len(row.cells):
+        if max(first.at, second.at) >= len(row.cells):
             return False
-        texts = row.cells[one.at].text, row.cells[other.at].text
+        texts = row.cells[first.at].text, row.cells[second.at].text
         if not all(is_number(text, separator) for text in texts):
             continue
         a, b = (float(text.replace(",", ".")) for text in texts)
-        if abs(a * 10.0**-one.power - b * 10.0**-other.power) > 3.0 * 10.0**-one.power:
+        if abs(a * 10.0**-first.power - b * 10.0**-second.power) > 3.0 * 10.0**-first.power:
             return False
     return True
 
 
-def _power(
+def _find_power(
     block: RowBlock,
     heading: Row,
     n: int,
-    here: Sequence[str],
+    texts: Sequence[str],
     stated: str | None,
     problems: ProblemList,
 ) -> int:
@@ -408,7 +406,7 @@ def _power(
     cell = heading.cells[n]
     text = _RUN.sub("", cell.text).strip()
     for match in _UNIT.finditer(text):
-        unit = next(one for one in match.groups() if one).lower()
+        unit = next(word for word in match.groups() if word).lower()
         if unit in UNITS:
             return UNITS[unit]
         if match[1]:
@@ -422,16 +420,16 @@ def _power(
         for row in block.headings
         if row.line > heading.line and n < len(row.cells)
     ]
-    unit = next((one for one in below if one in UNITS), stated or "")
+    unit = next((word for word in below if word in UNITS), stated or "")
     if unit:
         return UNITS[unit]
-    return _bare(here, heading.line, cell.column, problems)
+    return _guess(texts, heading.line, cell.column, problems)
 
 
-def _bare(here: Sequence[str], line: int, column: int, problems: ProblemList) -> int:
+def _guess(texts: Sequence[str], line: int, column: int, problems: ProblemList) -> int:
     """Take times without a unit for seconds, but not whole numbers that run into thousands."""
-    if here and all(re.fullmatch(r"[+-]?[0-9]+", text) for text in here):
-        span = abs(int(here[-1]) - int(here[0]))
+    if texts and all(re.fullmatch(r"[+-]?[0-9]+", text) for text in texts):
+        span = abs(int(texts[-1]) - int(texts[0]))
         if span > 100:
             problems.add(line, column, "time", "unit_missing")
     return 0
@@ -445,13 +443,13 @@ def _by_values(
     problems: ProblemList,
 ) -> Columns:
     """Without a heading: one column of times, and others that can be nothing else."""
-    found = Columns()
+    columns = Columns()
     first = block.rows[0]
     if block.headings and not all(len(row.cells) == 1 for row in block.headings):
         last = block.headings[-1]
         problems.add(last.line, last.cells[0].column, "", "no_time_column")
-        return found
-    rest = [n for n, here in enumerate(values) if not _counts(here) or len(values) == 1]
+        return columns
+    rest = [n for n, texts in enumerate(values) if not _counts(texts) or len(values) == 1]
     times = [n for n in rest if not _levels(values[n]) and _rises(values[n], separator)]
     if len(values) == 1:
         times = [0]
@@ -459,68 +457,69 @@ def _by_values(
     times = fractional if len(fractional) == 1 else times
     if len(values) == 2 and not times:
         times = [0]  # whatever is wrong with it is said where it is read
-    others = [n for n in rest if n not in times]
-    states = [n for n in others if _levels(values[n])] if len(times) == 1 else []
-    gates = [n for n in others if n not in states and (_few_whole(values[n]) or _names(values[n]))]
-    if len(times) != 1 or len(states) > 1 or len(gates) > 1 or len(others) > len(states + gates):
+    beside = [n for n in rest if n not in times]
+    states = [n for n in beside if _levels(values[n])] if len(times) == 1 else []
+    gates = [n for n in beside if n not in states and (_few_whole(values[n]) or _names(values[n]))]
+    if len(times) != 1 or len(states) > 1 or len(gates) > 1 or len(beside) > len(states + gates):
         if len(values) == 2 and len(times) == 1 and not gates:
-            states = others  # faults in it are said where they are read
+            states = beside  # faults in it are said where they are read
         else:
             cell = first.cells[min(2, len(first.cells) - 1)]
             problems.add(first.line, cell.column, "", "no_heading", columns=len(first.cells))
-            return found
+            return columns
     (at,) = times
-    power = UNITS[unit] if unit else _bare(values[at], first.line, first.cells[at].column, problems)
+    cell = first.cells[at]
+    power = UNITS[unit] if unit else _guess(values[at], first.line, cell.column, problems)
     # 0 and 1 beside a gate's number are levels: which one is dark is not said.
     state = states[0] if states else None
     signal = bool(states and gates) and not set(map(str.lower, values[states[0]])) <= _STATES
-    found.times = [TimeColumn(at, power, None if signal else state)]
-    found.edge = state if signal else None
-    found.channel = gates[0] if gates else None
+    columns.times = [TimeColumn(at, power, None if signal else state)]
+    columns.edge = state if signal else None
+    columns.channel = gates[0] if gates else None
     names = {at: f"times in {_SYMBOLS[power]}"}
     names |= dict.fromkeys(gates, "which gate") | dict.fromkeys(states, "states")
     for n in range(len(values)):
-        found.said[f"column {n + 1}"] = names.get(n, "counts rows, not used")
-    return found
+        columns.meanings[f"column {n + 1}"] = names.get(n, "counts rows, not used")
+    return columns
 
 
-def _levels(here: Sequence[str]) -> bool:
+def _levels(texts: Sequence[str]) -> bool:
     """Whether a column holds two states, or levels, and nothing else."""
-    known = BLOCKED | CLEAR | RISING | FALLING | NO_LEVEL
-    return bool(here) and all(as_state(text) in known for text in here)
+    states = BLOCKED | CLEAR | RISING | FALLING | NO_LEVEL
+    return bool(texts) and all(as_state(text) in states for text in texts)
 
 
-def _digits(here: Sequence[str]) -> bool:
-    return all(text[:1].isdigit() for text in here)
+def _digits(texts: Sequence[str]) -> bool:
+    return all(text[:1].isdigit() for text in texts)
 
 
-def _whole(here: Sequence[str]) -> bool:
-    return bool(here) and all(_WHOLE.fullmatch(text) for text in here)
+def _all_whole(texts: Sequence[str]) -> bool:
+    return bool(texts) and all(_WHOLE.fullmatch(text) for text in texts)
 
 
-def _names(here: Sequence[str]) -> bool:
-    return bool(here) and all(NAME_AND_NUMBER.fullmatch(text) for text in here)
+def _names(texts: Sequence[str]) -> bool:
+    return bool(texts) and all(NAME_AND_NUMBER.fullmatch(text) for text in texts)
 
 
-def _few_whole(here: Sequence[str]) -> bool:
+def _few_whole(texts: Sequence[str]) -> bool:
     """Whether a column holds few different whole numbers, again and again."""
-    return _whole(here) and len(here) > 2 * len(set(here))
+    return _all_whole(texts) and len(texts) > 2 * len(set(texts))
 
 
-def _fractions(here: Sequence[str]) -> bool:
-    return any("." in text or "," in text for text in here)
+def _fractions(texts: Sequence[str]) -> bool:
+    return any("." in text or "," in text for text in texts)
 
 
-def _counts(here: Sequence[str]) -> bool:
+def _counts(texts: Sequence[str]) -> bool:
     """Whether a column counts its rows."""
-    if len(here) < 2 or not all(re.fullmatch("[0-9]+", text) for text in here):
+    if len(texts) < 2 or not all(re.fullmatch("[0-9]+", text) for text in texts):
         return False
-    numbers = [int(text) for text in here]
+    numbers = [int(text) for text in texts]
     return numbers[0] in {0, 1} and all(b - a == 1 for a, b in pairwise(numbers))
 
 
-def _rises(here: Sequence[str], separator: str) -> bool:
-    if not here or not all(is_number(text, separator) for text in here):
+def _rises(texts: Sequence[str], separator: str) -> bool:
+    if not texts or not all(is_number(text, separator) for text in texts):
         return False
-    numbers = [float(text.replace(",", ".")) for text in here]
+    numbers = [float(text.replace(",", ".")) for text in texts]
     return all(a <= b for a, b in pairwise(numbers))

@@ -125,10 +125,10 @@ class _Table:
         self._span: dict[int, tuple[int, int]] = {}
 
     def add(self, place: _Place, record: list[str]) -> None:
-        run = place.whole(record, 0, range(1, 10**9), "a run: a whole number from 1")
-        channel = place.whole(record, 1, range(GATES), f"a channel: 0 to {GATES - 1}")
-        time = place.time(record, 2)
-        state = place.whole(record, 3, range(2), "a state: 1 is blocked, 0 is clear")
+        run = place.read_whole(record, 0, range(1, 10**9), "a run: a whole number from 1")
+        channel = place.read_whole(record, 1, range(GATES), f"a channel: 0 to {GATES - 1}")
+        time = place.read_time(record, 2)
+        state = place.read_whole(record, 3, range(2), "a state: 1 is blocked, 0 is clear")
         if run is None or channel is None or time is None or state is None:
             return
         before = self._last.get((run, channel), time)
@@ -163,7 +163,7 @@ class _Place:
         """Note a value that is not what is accepted there."""
         self.add(field, "not_accepted", text=text, accepted=accepted)
 
-    def whole(self, record: list[str], field: int, limits: range, accepted: str) -> int | None:
+    def read_whole(self, record: list[str], field: int, limits: range, accepted: str) -> int | None:
         """Read a whole number within limits."""
         text = record[field]
         if not _WHOLE.fullmatch(text) or int(text) not in limits:
@@ -171,7 +171,7 @@ class _Place:
             return None
         return int(text)
 
-    def time(self, record: list[str], field: int) -> int | None:
+    def read_time(self, record: list[str], field: int) -> int | None:
         """Read a time in seconds as picoseconds, ties to even."""
         text = record[field]
         ticks = picoseconds(text)
@@ -192,8 +192,8 @@ def picoseconds(text: str, power: int = 0) -> int | None:
     match = _DECIMAL.fullmatch(text)
     if match is None or not (match[2] or match[3]):
         return None
-    sign, whole, part, exponent = match.groups(default="")
-    digits, shift = int(whole + part), int(exponent or 0) - len(part) + 12 + power
+    sign, integer, part, exponent = match.groups(default="")
+    digits, shift = int(integer + part), int(exponent or 0) - len(part) + 12 + power
     ticks = digits * 10**shift if shift >= 0 else round(Fraction(digits, 10**-shift))
     return -ticks if sign == "-" else ticks
 
@@ -248,6 +248,6 @@ def _seconds(tick: int, rate: Fraction) -> str:
     # In whole numbers: dividing Fractions costs ten times as much.
     ticks, ratio = 2 * tick * TICK_HZ * rate.denominator, rate.numerator
     picoseconds = (ticks + ratio) // (2 * ratio)
-    whole, part = divmod(abs(picoseconds), TICK_HZ)
+    integer, part = divmod(abs(picoseconds), TICK_HZ)
     sign = "-" if picoseconds < 0 else ""
-    return f"{sign}{whole}.{part:012d}".rstrip("0").rstrip(".")
+    return f"{sign}{integer}.{part:012d}".rstrip("0").rstrip(".")

@@ -8,7 +8,7 @@ from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers.edges_csv import TICK_HZ, picoseconds
-from rig.timers.table import BLOCKED, CLEAR, FALLING, RISING, as_state, pointed
+from rig.timers.table import BLOCKED, CLEAR, FALLING, RISING, as_state, with_point
 
 if TYPE_CHECKING:
     from rig.timers.columns import Columns, TimeColumn
@@ -80,7 +80,7 @@ class PassageRows:
     def add(self, row: Row) -> None:
         """Read one row; runs that ended earlier have blanks."""
         columns = self._columns
-        number = self._whole(row, columns.run, "run")
+        number = self._read_whole(row, columns.run, "run")
         if columns.row_is_run:
             key = (number, self._drops)
             self._drops += 1
@@ -108,13 +108,13 @@ class PassageRows:
             state = row.cell(column.state)
             if column.label and not state.text:
                 return  # another input's row
-            blocked = _said(state.text, BLOCKED, CLEAR)
+            blocked = _read_state(state.text, BLOCKED, CLEAR)
             if blocked is None:
                 self._refuse(row, state, "state", "a state: 1 or blocked, 0 or unblocked")
                 return
         elif self._columns.edge is not None:
             edge = row.cell(self._columns.edge)
-            high = _said(edge.text, RISING, FALLING)
+            high = _read_state(edge.text, RISING, FALLING)
             if high is None:
                 self._refuse(row, edge, "edge", "an edge: rising or falling")
                 return
@@ -137,7 +137,7 @@ class PassageRows:
 
     def _never(self, row: Row, column: TimeColumn) -> bool:
         """Whether a time side by side was never reached: a zero after others."""
-        zero = picoseconds(pointed(row.cell(column.at).text, self._separator)) == 0
+        zero = picoseconds(with_point(row.cell(column.at).text, self._separator)) == 0
         return zero and column is not self._columns.times[0]
 
     @staticmethod
@@ -151,7 +151,7 @@ class PassageRows:
         at = self._columns.channel
         return "" if at is None else row.cell(at).text
 
-    def _whole(self, row: Row, at: int | None, key: str) -> int:
+    def _read_whole(self, row: Row, at: int | None, key: str) -> int:
         if at is None:
             return 0
         cell = row.cell(at)
@@ -168,7 +168,7 @@ def moment(text: str, separator: str, power: int) -> int | None:
     """Read a time as picoseconds: a number, or a date with its time of day."""
     match = _DATE.fullmatch(text)
     if match is None:
-        return picoseconds(pointed(text, separator), -power)
+        return picoseconds(with_point(text, separator), -power)
     try:
         day = date.fromisoformat(match[1]).toordinal()
     except ValueError:
@@ -178,22 +178,22 @@ def moment(text: str, separator: str, power: int) -> int | None:
     return ((day * 24 + int(match[2])) * 60 + int(match[3])) * 60 * TICK_HZ + seconds
 
 
-def _said(text: str, yes: set[str], no: set[str]) -> bool | None:
+def _read_state(text: str, yes: set[str], no: set[str]) -> bool | None:
     text = as_state(text)
     return True if text in yes else False if text in no else None
 
 
-def parted(passages: list[Passage]) -> list[list[Passage]]:
+def split_at_pauses(passages: list[Passage]) -> list[list[Passage]]:
     """Part drops that were recorded one after the other, at pauses longer than `PAUSE_S`.
 
     Only where all together last too long for one.
     """
-    ordered = sorted(passages, key=lambda one: one.tick)
+    ordered = sorted(passages, key=lambda passage: passage.tick)
     if ordered[-1].tick - ordered[0].tick <= MAX_SPAN_S * TICK_HZ:
         return [passages]
-    found = [[ordered[0]]]
-    for one in ordered[1:]:
-        if one.tick - found[-1][-1].tick > PAUSE_S * TICK_HZ:
-            found.append([])
-        found[-1].append(one)
-    return found
+    drops = [[ordered[0]]]
+    for passage in ordered[1:]:
+        if passage.tick - drops[-1][-1].tick > PAUSE_S * TICK_HZ:
+            drops.append([])
+        drops[-1].append(passage)
+    return drops

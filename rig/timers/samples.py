@@ -67,9 +67,9 @@ def level_passages(
     list of Passage, dict
         Changes, and the level that each input begins with.
     """
-    found: list[Passage] = []
+    passages: list[Passage] = []
     begins: dict[str, bool] = {}
-    now: dict[str, bool] = {}
+    current: dict[str, bool] = {}
     for row, time in zip(rows, times, strict=True):
         for at, label in columns.levels.items():
             cell = row.cell(at)
@@ -80,10 +80,10 @@ def level_passages(
                 problems.reject(row.line, cell.column, label, cell.text, "a level: 0 or 1")
                 continue
             high = level in RISING
-            if high is not now.get(label, begins.setdefault(label, high)):
-                found.append(Passage(time, label, None, high))
-            now[label] = high
-    return found, begins
+            if high is not current.get(label, begins.setdefault(label, high)):
+                passages.append(Passage(time, label, None, high))
+            current[label] = high
+    return passages, begins
 
 
 def volt_passages(
@@ -114,7 +114,7 @@ def volt_passages(
     centre, half = middle
     high = bool(volts[0] > centre)
     begins = high
-    found: list[Passage] = []
+    passages: list[Passage] = []
     for n in np.flatnonzero(np.abs(volts - centre) > half).tolist():
         if bool(volts[n] > centre) is high:
             continue
@@ -124,10 +124,10 @@ def volt_passages(
             k -= 1
         a, b = float(volts[k - 1]), float(volts[k])
         share = (centre - a) / (b - a) if b != a else 1.0
-        found.append(
+        passages.append(
             Passage(times[k - 1] + round(share * (times[k] - times[k - 1])), label, None, high)
         )
-    return found, begins, centre
+    return passages, begins, centre
 
 
 def _middle(volts: Array) -> tuple[float, float] | None:
@@ -145,7 +145,7 @@ def _middle(volts: Array) -> tuple[float, float] | None:
     above = volts > 0.5 * (low + high)
     swing = float(high - low)
     noise = max(
-        float(np.median(np.abs(volts[one] - np.median(volts[one])))) for one in (above, ~above)
+        float(np.median(np.abs(volts[mask] - np.median(volts[mask])))) for mask in (above, ~above)
     )
     if swing <= 0.0 or swing < _CLEAR_SWING * 1.4826 * noise:
         return None
@@ -164,14 +164,14 @@ def sample_times(
         assert rate_hz is not None
         return [round(n * TICK_HZ / rate_hz) for n in range(len(rows))]
     column = columns.times[0]
-    found: list[int] = []
+    ticks: list[int] = []
     for row in rows:
         cell = row.cell(column.at)
         time = moment(cell.text, separator, column.power)
         if time is None:
             problems.reject(row.line, cell.column, "time", cell.text, "a time")
-            time = found[-1] if found else 0
-        elif found and time < found[-1]:
+            time = ticks[-1] if ticks else 0
+        elif ticks and time < ticks[-1]:
             problems.add(row.line, cell.column, "time", "backwards", text=cell.text)
-        found.append(time)
-    return found
+        ticks.append(time)
+    return ticks

@@ -111,7 +111,7 @@ def lines_of(path: str | os.PathLike[str]) -> list[str]:
 
 def read_table(lines: Sequence[str]) -> Table:
     """Split a file into remarks, headings and blocks of rows."""
-    lines, names = _unkeyed([_CLOCK.sub(_blanks, line) for line in lines])
+    lines, names = _strip_keys([_CLOCK.sub(_blanks, line) for line in lines])
     marked = [_REMARK.match(line) is not None for line in lines]
     plain = [line for line, remark in zip(lines, marked, strict=True) if not remark]
     separator = _separator(plain)
@@ -120,8 +120,8 @@ def read_table(lines: Sequence[str]) -> Table:
         blocks[0].headings.append(Row(1, [TableCell(1, name) for name in names]))
     for number, line in enumerate(lines, 1):
         if marked[number - 1]:
-            last = Row(number, _cells(_unmarked(line), separator))
-            remarks.append(_unmarked(line).strip())
+            last = Row(number, _cells(_strip_mark(line), separator))
+            remarks.append(_strip_mark(line).strip())
             continue
         row = Row(number, _cells(line, separator))
         if not any(row.texts):
@@ -129,7 +129,7 @@ def read_table(lines: Sequence[str]) -> Table:
         block = blocks[-1]
         if block.rows and (
             _NEW_BLOCK.match(_first_text(row))
-            or (not has_number(row, separator) and _like(row, block))
+            or (not has_number(row, separator) and _repeats_heading(row, block))
         ):
             block = RowBlock()
             blocks.append(block)
@@ -138,46 +138,46 @@ def read_table(lines: Sequence[str]) -> Table:
                 not block.rows
                 and not block.headings
                 and last is not None
-                and (len([one for one in last.texts if one]) == len(row.cells))
+                and (len([text for text in last.texts if text]) == len(row.cells))
             ):
                 block.headings.append(last)  # a heading that is marked as a remark
             block.rows.append(row)
         else:
             block.headings.append(row)
-    return Table(separator, tuple(remarks), tuple(one for one in blocks if one.rows))
+    return Table(separator, tuple(remarks), tuple(block for block in blocks if block.rows))
 
 
-def _blanks(found: re.Match[str]) -> str:
-    return " " * len(found[0])
+def _blanks(match: re.Match[str]) -> str:
+    return " " * len(match[0])
 
 
-def _unkeyed(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
+def _strip_keys(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     """Take the names out of lines such as ``gate=1 t=402345`` where all have the same."""
     parts = [_KEYED.findall(line) for line in lines]
-    names = next(([name for name, _ in one] for one in parts if len(one) > 1), None)
-    like = [[name for name, _ in one] == names for one in parts]
-    if names is None or sum(like) * 2 <= sum(bool(line.strip()) for line in lines):
-        return _unspoken(lines)
+    names = next(([name for name, _ in pairs] for pairs in parts if len(pairs) > 1), None)
+    alike = [[name for name, _ in pairs] == names for pairs in parts]
+    if names is None or sum(alike) * 2 <= sum(bool(line.strip()) for line in lines):
+        return _strip_sentences(lines)
     return [
-        "\t".join(value for _, value in one) if same else f"# {line}"
-        for line, one, same in zip(lines, parts, like, strict=True)
+        "\t".join(value for _, value in pairs) if same else f"# {line}"
+        for line, pairs, same in zip(lines, parts, alike, strict=True)
     ], names
 
 
-def _unspoken(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
+def _strip_sentences(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     """Take gate, state and time out of sentences where most lines are such, with one unit."""
-    told = [_SENTENCE.search(line) for line in lines]
-    units = {one[5] for one in told if one}
-    if len(units) != 1 or sum(map(bool, told)) * 2 <= sum(bool(line.strip()) for line in lines):
+    matches = [_SENTENCE.search(line) for line in lines]
+    units = {match[5] for match in matches if match}
+    if len(units) != 1 or sum(map(bool, matches)) * 2 <= sum(bool(line.strip()) for line in lines):
         return lines, []
     return [
-        f"# {line}" if one is None else f"{one[1]}\t{one[4]}\t{_blocked(one)}"
-        for line, one in zip(lines, told, strict=True)
+        f"# {line}" if match is None else f"{match[1]}\t{match[4]}\t{_is_blocked(match)}"
+        for line, match in zip(lines, matches, strict=True)
     ], ["gate", f"time ({units.pop()})", "state"]
 
 
-def _blocked(told: re.Match[str]) -> int:
-    return int((told[3].lower() != "clear") is not bool(told[2]))
+def _is_blocked(match: re.Match[str]) -> int:
+    return int((match[3].lower() != "clear") is not bool(match[2]))
 
 
 def is_data(row: Row, separator: str) -> bool:
@@ -198,7 +198,7 @@ def is_number(text: str, separator: str) -> bool:
     return NUMBER.fullmatch(text) is not None and not (separator == "," and "," in text)
 
 
-def pointed(text: str, separator: str) -> str:
+def with_point(text: str, separator: str) -> str:
     """Write a number with a decimal point; it may have a comma where none separates cells."""
     return text if separator == "," else text.replace(",", ".", 1)
 
@@ -208,7 +208,7 @@ def as_state(text: str) -> str:
     return re.sub("[.,]0*$", "", text) if NUMBER.fullmatch(text) else text.lower()
 
 
-def _unmarked(line: str) -> str:
+def _strip_mark(line: str) -> str:
     return re.sub(r'^\s*"?(?:#|%|//|;)+', lambda mark: " " * len(mark[0]), line)
 
 
@@ -216,10 +216,10 @@ def _first_text(row: Row) -> str:
     return next(text for text in row.texts if text)
 
 
-def _like(row: Row, block: RowBlock) -> bool:
+def _repeats_heading(row: Row, block: RowBlock) -> bool:
     """Whether a row is a heading of this block once more."""
-    said = [one.lower() for one in row.texts]
-    return any(said == [one.lower() for one in above.texts] for above in block.headings)
+    words = [text.lower() for text in row.texts]
+    return any(words == [text.lower() for text in above.texts] for above in block.headings)
 
 
 def _is_faulty_data(row: Row, block: RowBlock, separator: str) -> bool:
@@ -241,7 +241,7 @@ def _separator(lines: Sequence[str]) -> str:
         if sum(separator in row for row in rows) * 2 > len(rows):
             return separator
     heading = next(
-        (one for one in lines if "," in one and re.search("[A-Za-z]{2}|[A-Za-z][0-9]", one)), None
+        (line for line in lines if "," in line and re.search("[A-Za-z][A-Za-z0-9]", line)), None
     )
     if rows and all(re.fullmatch("[01xX](,[01xX])+", row) for row in rows):
         return ","  # levels of inputs
@@ -276,8 +276,8 @@ def _cells(line: str, separator: str) -> list[TableCell]:
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
         pattern = r"\S+" if all(map(_is_value, line.split())) else r"\S+(?: \S+)*"
-        return [TableCell(one.start() + 1, one[0]) for one in re.finditer(pattern, line)]
-    found, start, quoted = [], 0, False
+        return [TableCell(match.start() + 1, match[0]) for match in re.finditer(pattern, line)]
+    cells, start, quoted = [], 0, False
     for position, character in enumerate([*line, separator]):
         if position < len(line) and character == '"':
             quoted = not quoted
@@ -285,6 +285,6 @@ def _cells(line: str, separator: str) -> list[TableCell]:
             raw = line[start:position]
             text = raw.strip()
             lead = len(raw) - len(raw.lstrip())
-            found.append(TableCell(start + lead + 1, text.strip('"').strip()))
+            cells.append(TableCell(start + lead + 1, text.strip('"').strip()))
             start = position + 1
-    return found
+    return cells

@@ -18,7 +18,7 @@ from rig.reasons import make_reason
 from rig.records import Edge
 from rig.timers.columns import columns_of
 from rig.timers.edges_csv import HEADER, TICK_HZ, drop_of
-from rig.timers.passages import MAX_SPAN_S, PAUSE_S, PassageRows, parted
+from rig.timers.passages import MAX_SPAN_S, PAUSE_S, PassageRows, split_at_pauses
 from rig.timers.problems import ProblemList
 from rig.timers.samples import (
     input_names,
@@ -27,7 +27,7 @@ from rig.timers.samples import (
     sample_times,
     volt_passages,
 )
-from rig.timers.table import is_number, lines_of, pointed, read_table
+from rig.timers.table import is_number, lines_of, read_table, with_point
 from rig.timers.vcd import is_vcd, read_vcd
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ class TimerFile:
     @property
     def labels(self) -> tuple[str, ...]:
         """What the file calls its inputs, in order; none where it does not say."""
-        found = {one.label for run in self.runs.values() for one in run if one.label}
-        return tuple(sorted(found, key=lambda one: (label_number(one) or 0, one)))
+        labels = {passage.label for run in self.runs.values() for passage in run} - {""}
+        return tuple(sorted(labels, key=lambda label: (label_number(label) or 0, label)))
 
     def add(self, passages: list[Passage], number: int = 0) -> None:
         """Add a run, under its number or else the next one."""
@@ -91,7 +91,7 @@ class TimerFile:
 def is_edge_file(path: str | os.PathLike[str]) -> bool:
     """Whether a file has the heading of the project's own format, be it with faults."""
     lines = lines_of(path)
-    first = next((one for one in lines if one.strip() and not one.lstrip().startswith("#")), "")
+    first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
     return first.lower().replace(" ", "").startswith(",".join(HEADER[:2]))
 
 
@@ -115,25 +115,24 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     if is_vcd(lines):
         passages, begins, scale = read_vcd(lines, problems)
         problems.raise_if_any()
-        found = TimerFile("a value change dump", begins=begins, period_s=scale / TICK_HZ)
+        file = TimerFile("a value change dump", begins=begins, period_s=scale / TICK_HZ)
         if passages:
-            found.add(passages)
+            file.add(passages)
     else:
         table = read_table(lines)
         if not table.blocks:
             problems.refuse(1, 1, "no_edges")
-        found = _of_table(table, unit, problems)
-    _parted(found, problems)
+        file = _read_blocks(table, unit, problems)
+    _split_drops(file, problems)
     problems.raise_if_any()
-    if not found.runs:
-        notes = "".join(f"; {note}" for note in found.notes)
+    if not file.runs:
+        notes = "".join(f"; {note}" for note in file.notes)
         problems.refuse(1, 1, "nothing_passes", notes=notes)
-    return found
+    return file
 
 
-def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFile:
-    parts = _SEPARATORS[table.separator]
-    found = TimerFile(f"a table, its cells parted by {parts}")
+def _read_blocks(table: Table, unit: str | None, problems: ProblemList) -> TimerFile:
+    file = TimerFile(f"a table, its cells separated by {_SEPARATORS[table.separator]}")
     columns: Columns | None = None
     above = None
     for block in table.blocks:
@@ -147,9 +146,9 @@ def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFil
         _named_inputs(block, table)
         columns = columns_of(block, table.separator, unit, problems)
         problems.raise_if_any()
-        found.columns |= columns.said
+        file.columns |= columns.meanings
         if columns.levels or columns.volts:
-            _samples(found, block, columns, table, problems)
+            _samples(file, block, columns, table, problems)
         else:
             rows = PassageRows(columns, table.separator, problems)
             for row in block.rows:
@@ -157,24 +156,23 @@ def _of_table(table: Table, unit: str | None, problems: ProblemList) -> TimerFil
             if rows.up_and_down:
                 numbers = "these numbers go up and down: they"
                 problems.refuse(block.rows[0].line, 1, "durations", numbers=numbers)
-            if columns.derived and _sampled(rows.runs(), columns):
+            if columns.derived and _is_sampled(rows.runs(), columns):
                 unused = ", ".join(columns.unused)
                 problems.refuse(block.rows[0].line, 1, "regular_samples", columns=unused)
             for number, passages in rows.runs():
-                found.add(passages, number)
+                file.add(passages, number)
     assert columns is not None
     if columns.unused:
-        found.notes.append(make_reason("columns_unused", columns=", ".join(columns.unused)))
-    return found
+        file.notes.append(make_reason("columns_unused", columns=", ".join(columns.unused)))
+    return file
 
 
-def _sampled(runs: Sequence[tuple[int, list[Passage]]], columns: Columns) -> bool:
+def _is_sampled(runs: Sequence[tuple[int, list[Passage]]], columns: Columns) -> bool:
     """Whether all times are as far apart as in a recording at a fixed rate."""
-    if columns.edge is not None or any(one.state is not None for one in columns.times):
+    if columns.edge is not None or any(column.state is not None for column in columns.times):
         return False
-    steps = [
-        step for _, run in runs for step in np.diff([one.tick for one in run]).tolist() if run[4:]
-    ]
+    times = [[passage.tick for passage in run] for _, run in runs if run[4:]]
+    steps = [step for ticks in times for step in np.diff(ticks).tolist()]
     return bool(steps) and max(steps) < 1.5 * min(steps)
 
 
@@ -202,7 +200,7 @@ def _input(name: str) -> str:
 
 
 def _samples(
-    found: TimerFile, block: RowBlock, columns: Columns, table: Table, problems: ProblemList
+    file: TimerFile, block: RowBlock, columns: Columns, table: Table, problems: ProblemList
 ) -> None:
     """Find the passages in samples."""
     rate = sample_rate_hz(table.remarks)
@@ -214,23 +212,23 @@ def _samples(
     passages: list[Passage] = []
     if columns.levels:
         passages, begins = level_passages(block.rows, columns, times, problems)
-        found.begins |= begins
-        found.period_s = None if rate is None else 1.0 / rate
+        file.begins |= begins
+        file.period_s = None if rate is None else 1.0 / rate
     for at, heading in columns.volts.items():
         volts = _volts(block, at, table.separator, problems)
         problems.raise_if_any()
         crossed = volt_passages(heading, times, volts)
         if crossed is None:
             low, high = float(volts.min()), float(volts.max())
-            found.notes.append(make_reason("no_passage", input=heading, low=low, high=high))
+            file.notes.append(make_reason("no_passage", input=heading, low=low, high=high))
             continue
-        more, found.begins[heading], middle = crossed
-        passages += more
+        crossings, file.begins[heading], middle = crossed
+        passages += crossings
         level = {"input": heading, "level": float(middle)}
-        found.notes.append(make_reason("crossings", crossings=len(more), **level))
-        found.period_s = float(np.median(steps)) if steps.size else None
+        file.notes.append(make_reason("crossings", crossings=len(crossings), **level))
+        file.period_s = float(np.median(steps)) if steps.size else None
     if passages:
-        found.add(passages)
+        file.add(passages)
 
 
 def _volts(
@@ -242,31 +240,32 @@ def _volts(
         if not is_number(cell.text, separator):
             problems.reject(row.line, cell.column, "volts", cell.text, "a number of volts")
             continue
-        values[n] = float(pointed(cell.text, separator))
+        values[n] = float(with_point(cell.text, separator))
     return values
 
 
-def _parted(found: TimerFile, problems: ProblemList) -> None:
+def _split_drops(file: TimerFile, problems: ProblemList) -> None:
     """Part drops that stand one after the other in one recording."""
-    parts = [part for run in found.runs.values() for part in parted(run)]
-    if len(parts) > len(found.runs):
-        found.notes.append(make_reason("several_drops", drops=len(parts), pause_s=PAUSE_S))
-        found.runs = dict(enumerate(parts, 1))
-    for number, run in found.runs.items():
-        span = (max(one.tick for one in run) - min(one.tick for one in run)) / TICK_HZ
+    parts = [part for run in file.runs.values() for part in split_at_pauses(run)]
+    if len(parts) > len(file.runs):
+        file.notes.append(make_reason("several_drops", drops=len(parts), pause_s=PAUSE_S))
+        file.runs = dict(enumerate(parts, 1))
+    for number, run in file.runs.items():
+        ticks = [passage.tick for passage in run]
+        span = (max(ticks) - min(ticks)) / TICK_HZ
         if span > MAX_SPAN_S:
             values = {"recording": f"run {number}", "lasting_s": span, "limit_s": MAX_SPAN_S}
             problems.refuse(1, 1, "too_long", **values)
 
 
 def drops_of(
-    found: TimerFile, channels: Mapping[str, int], bars: int, dark: str | None = None
+    file: TimerFile, channels: Mapping[str, int], bars: int, dark: str | None = None
 ) -> list[Drop]:
     """Turn what was understood into drops.
 
     Parameters
     ----------
-    found
+    file
         From `read_timer_file`.
     channels
         Of each label; of ``""`` where the file names no input.
@@ -282,50 +281,50 @@ def drops_of(
     list of Drop
         One a run, numbered from 1; as `rig.timers.edges_csv.read_edges` gives them.
     """
-    high = _dark_is_high(found, dark)
+    high = _dark_is_high(file, dark)
     drops = []
-    for number, run in sorted(found.runs.items()):
+    for number, run in sorted(file.runs.items()):
         edges: list[Edge] = []
-        for label in dict.fromkeys(one.label for one in run):
+        for label in dict.fromkeys(passage.label for passage in run):
             if label in channels:
-                ours = [one for one in run if one.label == label]
+                ours = [passage for passage in run if passage.label == label]
                 edges += _edges(ours, channels[label], bars, high)
         if edges:
             drops.append(drop_of(number, edges))
     return drops
 
 
-def _dark_is_high(found: TimerFile, dark: str | None) -> bool:
+def _dark_is_high(file: TimerFile, dark: str | None) -> bool:
     """Whether a signal is high where the beam is blocked."""
-    signals = [one for run in found.runs.values() for one in run if one.high is not None]
+    signals = [passage for run in file.runs.values() for passage in run if passage.high is not None]
     if not signals:
         return True
     if dark is None:
-        if found.begins:
+        if file.begins:
             moved = {passage.label for passage in signals}
-            starts = [high for label, high in found.begins.items() if label in moved]
+            starts = [high for label, high in file.begins.items() if label in moved]
         else:  # edges: the first of a beam darkens it
             first = {
                 (number, passage.label): passage.high
-                for number, run in found.runs.items()
+                for number, run in file.runs.items()
                 for passage in sorted(run, key=lambda passage: -passage.tick)
             }
             starts = [high is False for high in first.values()]
-        dark, other = ("low", "high") if sum(starts) * 2 > len(starts) else ("high", "low")
-        found.notes.append(make_reason("blocked_level", level=dark, other=other))
+        dark, opposite = ("low", "high") if sum(starts) * 2 > len(starts) else ("high", "low")
+        file.notes.append(make_reason("blocked_level", level=dark, other=opposite))
     return dark == "high"
 
 
 def _edges(run: Sequence[Passage], channel: int, bars: int, high: bool) -> Iterable[Edge]:
     both = len(run) > bars
-    for n, one in enumerate(run):
-        if one.blocked is not None:
-            blocked = one.blocked
-        elif one.high is not None:
-            blocked = one.high is high
+    for n, passage in enumerate(run):
+        if passage.blocked is not None:
+            blocked = passage.blocked
+        elif passage.high is not None:
+            blocked = passage.high is high
         else:
             blocked = n % 2 == 0 if both else True
-        yield Edge(one.tick, channel, blocked)
+        yield Edge(passage.tick, channel, blocked)
 
 
 def label_number(label: str) -> int | None:

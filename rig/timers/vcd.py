@@ -35,13 +35,13 @@ def read_vcd(
     names: dict[str, str] = {}
     unit, time = 0, 0
     first: dict[str, bool] = {}
-    now: dict[str, bool] = {}
-    found: list[Passage] = []
+    current: dict[str, bool] = {}
+    passages: list[Passage] = []
     text, skipping = "", False
     for number, line in enumerate(lines, 1):
         for word in line.split():
             if word == "$end":
-                _declared(text, names)
+                _note_wire(text, names)
                 if text.startswith("$timescale"):
                     match = _SCALE.search(text)
                     unit = int(match[1]) * _PS[match[2]] if match else 0
@@ -62,16 +62,16 @@ def read_vcd(
                 time = at
             elif word[0] in "01" and word[1:] in names:
                 name, high = names[word[1:]], word[0] == "1"
-                if name in now and now[name] is not high:
-                    found.append(Passage(time, name, None, high))
+                if name in current and current[name] is not high:
+                    passages.append(Passage(time, name, None, high))
                 first.setdefault(name, high)
-                now[name] = high
+                current[name] = high
     if not unit:
         problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
-    return found, first, unit
+    return passages, first, unit
 
 
-def _declared(text: str, names: dict[str, str]) -> None:
+def _note_wire(text: str, names: dict[str, str]) -> None:
     """Note a wire of one bit: ``$var wire 1 ! D0``."""
     parts = text.split()
     if parts[:1] == ["$var"] and len(parts) >= 5 and parts[2] == "1":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.timers.problems import ProblemList
-from rig.timers.table import is_number, lines_of, pointed, read_table
+from rig.timers.table import is_number, lines_of, read_table, with_point
 
 if TYPE_CHECKING:
     import os
@@ -48,7 +48,7 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
     problems = ProblemList(str(path), _HINT)
     table = read_table(lines_of(path))
     block = next(iter(table.blocks), None)
-    heading = None if block is None else next(filter(_named, reversed(block.headings)), None)
+    heading = None if block is None else next(filter(_has_columns, reversed(block.headings)), None)
     if block is None or heading is None:
         problems.refuse(1, 1, "no_track")
     at = {name: _column(heading, name) for name in _NAMES}
@@ -63,17 +63,17 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
                 problems.reject(row.line, cell.column, name, cell.text, "a number")
                 break
         else:
-            frames.append([scales[name] * float(pointed(cell.text, table.separator))
+            frames.append([scales[name] * float(with_point(cell.text, table.separator))
                            for name, cell in cells.items()])  # fmt: skip
     problems.raise_if_any()
-    found = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)
-    if found.times.size < FEWEST or not np.all(np.diff(found.times) > 0):
-        problems.refuse(1, 1, "few_frames", frames=found.times.size, needed=FEWEST)
-    return found
+    track = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)
+    if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
+        problems.refuse(1, 1, "few_frames", frames=track.times.size, needed=FEWEST)
+    return track
 
 
-def _named(row: Row) -> bool:
-    return all(any(one.search(text) for text in row.texts) for one in _NAMES.values())
+def _has_columns(row: Row) -> bool:
+    return all(any(pattern.search(text) for text in row.texts) for pattern in _NAMES.values())
 
 
 def _column(heading: Row, name: str) -> int:
