@@ -69,7 +69,7 @@ _CLEAR = "clear the beam, and see that its emitter has power and its plugs sit"
 _STILL = f"{_CLEAR}; let everything come to rest"
 _CABLE = "take another cable or USB port"
 _FLASH = "write the firmware for this very board: rig flash"
-_LOOPBACK = "check the wire from the sync output to this gate"
+_LOOPBACK = "check the wire from the sync output to gate {gate}"
 _RULE = (
     "python -m rig.usb.udev | sudo tee /etc/udev/rules.d/60-chainrig.rules, then "
     "sudo udevadm control --reload and sudo udevadm trigger"

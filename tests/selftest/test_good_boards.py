@@ -110,7 +110,7 @@ def test_a_wire_that_is_not_there_fails(rig):
     assert [line for line in lines if ": failed" in line] == [
         "sync output to gate: failed: FIRE made 0 events at gate 2 instead of one edge"
     ]
-    assert err == "do: check the wire from the sync output to this gate\n1 check failed\n"
+    assert err == "do: check the wire from the sync output to gate 2\n1 check failed\n"
 
 
 def test_json_lists_each_check_with_its_codes(rig):
