@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import ast
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from rig.link.messages import DisarmReason, RefusalReason
-from rig.reasons import make_reason
+from rig.reasons import _PHRASES, make_reason
+from rig.vocabulary import Vocabulary
 from rig.wordings import WORDINGS
 
 RIG = Path(__file__).parents[1] / "rig"
 RAISERS = {"make_reason": 0, "plain_reason": 1, "problem": 1, "CheckFailedError": 0,
            "NotPossibleError": 0, "problems.add": 3, "_problems.add": 3, "place.add": 1,
-           "problems.refuse": 2}  # fmt: skip
+           "problems.refuse": 2, "refusal": 1}  # fmt: skip
 """Functions that take a code, and which of their arguments it is."""
 REFUSED = {f"refused_{reason.name.lower()}" for reason in RefusalReason}
 DISARMED = {f"disarmed_{reason.name.lower()}" for reason in DisarmReason}
@@ -36,7 +38,7 @@ def texts(tree):
 
 
 def raised_codes():
-    """Codes that calls name, with the file that does."""
+    """Codes that calls name, with the file and the call that does."""
     for path, tree in trees():
         for call in ast.walk(tree):
             if not isinstance(call, ast.Call):
@@ -45,13 +47,28 @@ def raised_codes():
             at = RAISERS.get(names[-1], RAISERS.get(".".join(names[-2:])))
             if at is not None and len(call.args) > at:
                 for text in texts(call.args[at]):
-                    yield path, text
+                    yield path, text, call
 
 
 def test_each_raised_code_is_in_the_table():
-    missing = {(path.name, code) for path, code in raised_codes() if code not in WORDINGS}
+    missing = {(path.name, code) for path, code, _ in raised_codes() if code not in WORDINGS}
     assert not missing
     assert set(WORDINGS) >= REFUSED | DISARMED
+
+
+def test_each_call_gives_what_its_sentence_and_remedy_need():
+    words = set(_PHRASES) | {field.name for field in fields(Vocabulary)}
+    lacking = {}
+    for path, code, call in raised_codes():
+        values = {keyword.arg for keyword in call.keywords}
+        if "plain_reason" in ast.unparse(call.func):
+            values.add("text")
+        if None not in values:  # ** may hold any
+            wording = WORDINGS[code]
+            places = re.findall(r"(?<!\{)\{(\w+)", wording.sentence + wording.remedy)
+            if missing := set(places) - values - words:
+                lacking[path.name, call.lineno] = missing
+    assert not lacking
 
 
 def test_each_code_of_the_table_is_raised():
