@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 from bench.studies.accuracy import accuracy
 from bench.studies.fast_accuracy import BLOCK, DOUBLED, STACK, doubled, fast_accuracy
+from bench.workers import results
 from rig.commands.output import print_found, say, write_page
 from rig.files import make_folder
 from rig.measurands import MEASURANDS
@@ -53,25 +51,23 @@ def _stack(arguments: Namespace, port: str, repeats: int | None = None) -> dict[
 
 def _acceptance(arguments: Namespace) -> dict[str, Any]:
     """Measure with each dial of the simulation doubled, many rigs each, several at a time."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
     rigs = arguments.seeds or RIGS
     protocol = arguments.protocol
     ports = {dial: doubled(arguments.port, dial) for dial in DOUBLED}
     ports = {"default": arguments.port} | ports
-    with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as pool:
-        cases = {
-            dial: pool.submit(fast_accuracy, protocol, port, rigs)
-            for dial, port in ports.items()
-            if dial not in STACK
-        }
-        cases |= {
-            f"{dial}, whole stack": pool.submit(accuracy, protocol, ports[dial], 1, say, BLOCK)
-            for dial in ("default", *STACK)
-        }
-        found = {}
-        for name, case in cases.items():
-            found[name] = case.result()
-            say(f"{name}: {sum(found[name]['verdicts'].values())} drops")
+    calls: dict[str, tuple[Any, ...]] = {
+        dial: (fast_accuracy, protocol, port, rigs)
+        for dial, port in ports.items()
+        if dial not in STACK
+    }
+    calls |= {
+        f"{dial}, whole stack": (accuracy, protocol, ports[dial], 1, say, BLOCK)
+        for dial in ("default", *STACK)
+    }
+    found = {}
+    for name, case in zip(calls, results([*calls.values()], arguments.jobs), strict=True):
+        found[name] = case
+        say(f"{name}: {sum(case['verdicts'].values())} drops")
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +35,6 @@ def main(arguments: Namespace) -> int:
     """Drop chains on rigs with one fault each; keep the table, and print it."""
     layouts = chosen(LAYOUTS, arguments.only)
     folder = make_folder(arguments.output)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
     clean = CLEAN if arguments.clean is None else arguments.clean
     drops = arguments.drops or DROPS
     found = study(layouts, drops, clean, arguments.jobs, say)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from typing import TYPE_CHECKING, Any
 
 from bench.studies.figures import layouts_figure
@@ -36,7 +35,6 @@ def main(arguments: Namespace) -> int:
     """Drop chains on every layout; keep table, picture and page, and print the table."""
     layouts = chosen(LAYOUTS, arguments.only)
     folder = make_folder(arguments.output)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core is quicker
     before = _found_before(folder / "layouts.json") if arguments.more else []
     found = study(layouts, arguments.drops or DROPS, arguments.jobs, say, before)
     whole = as_json(found)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bench.studies.layout_catalogue import FENCE, KINDS, SINGLE, STANDARD, GateLayout, Kind, under
 from bench.studies.wrong_rigs import WRONG_RIGS
+from bench.workers import results
 from rig.analysis.drop import fit_drop
 from rig.bench.falls import Asked, falls, time_scale, with_setting
 from rig.clock.calibration import TimeScale
@@ -129,13 +128,13 @@ def study(
     say
         Told how far it is.
     """
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        work = {pool.submit(cells, one, drops, clean): n for n, one in enumerate(layouts)}
-        found: dict[int, list[DiagnosisTally]] = {}
-        for done in as_completed(work):
-            found[work[done]] = done.result()
-            say(f"{len(found)} of {len(layouts)}: {layouts[work[done]].kind.name}")
-    return [cell for n in sorted(found) for cell in found[n]]
+    found: list[DiagnosisTally] = []
+    for layout, some in zip(
+        layouts, results([(cells, one, drops, clean) for one in layouts], jobs), strict=True
+    ):
+        found += some
+        say(f"{layout.kind.name}: done")
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,16 +6,15 @@ import math
 import re
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field
 from itertools import chain, islice
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bench.studies.baselines import plain_fit
 from bench.studies.fast_accuracy import DOUBLED, STACK
+from bench.workers import results
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import GOOD
 from rig.bench.falls import HZ, STRAY, Asked, falls, time_scale, with_setting
@@ -224,17 +223,12 @@ def study(
     known: dict[tuple[str, str], list[Cell]] = {}
     for cell in before:
         known.setdefault((cell.chain, cell.heights_mm), []).append(cell)
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        work = {
-            pool.submit(cells, one, drops, known.pop((one.kind.name, one.heights), ())): n
-            for n, one in enumerate(layouts)
-        }
-        found: dict[int, list[Cell]] = {}
-        for done in as_completed(work):
-            found[work[done]] = done.result()
-            first = found[work[done]][0]
-            say(f"{len(found)} of {len(layouts)}: {first.chain}, {first.gates} gates")
-    return [cell for n in sorted(found) for cell in found[n]] + [*chain(*known.values())]
+    calls = [(cells, one, drops, known.pop((one.kind.name, one.heights), ())) for one in layouts]
+    found: list[Cell] = []
+    for n, some in enumerate(results(calls, jobs), 1):
+        found += some
+        say(f"{n} of {len(layouts)}: {some[0].chain}, {some[0].gates} gates")
+    return [*found, *chain(*known.values())]
 
 
 @one_thread
