@@ -159,9 +159,15 @@ def _studies(benches: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         help="seconds that one Monte Carlo setting may take (default 120)",
     )  # fmt: skip
     coverage = study(
-        "coverage", "how often intervals hold, in both worlds", "folder for page, CSV and JSON"
+        "coverage", "how often intervals hold, over drawn rigs", "folder for page, CSV and JSON"
     )
-    coverage.add_argument("--rigs", type=_count, metavar="N", help="of each case")
+    coverage.add_argument("--rigs", type=_count, metavar="N", help="of each world")
+    coverage.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the hypercube")
+    coverage.add_argument(
+        "--world", nargs="+", choices=["model", "resolved", "mujoco", "coefficients"],
+        help="only these; all but mujoco by default, which needs pip install mujoco",
+    )  # fmt: skip
+    coverage.add_argument("--only", type=_count, nargs="+", metavar="N", help="rigs by number")
     coverage.add_argument("--jobs", type=_count, metavar="N", help="processes at a time")
     resolved = study(
         "resolved",
@@ -182,7 +188,7 @@ def _studies(benches: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         bench.add_argument(
             "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
         )
-        bench.add_argument("--only", metavar="TEXT", help="cases with this in their names")
+    resolved.add_argument("--only", metavar="TEXT", help="cases with this in their names")
     layouts = study(
         "layouts", "which layouts of gates let drops be read", "folder for CSV, JSON, page and map"
     )

@@ -19,9 +19,12 @@ from sim.dials import read_dials
 from sim.scene import choose_world
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
+    from sim.scene import Hang
     from sim.truth import Truth
+
+    Choose = Callable[[dict[str, str]], tuple[Hang, dict[str, str]]]
 
 
 class Request(NamedTuple):
@@ -35,8 +38,13 @@ class Request(NamedTuple):
     runs: list[list[int]]
 
 
-def falls(asked: Iterable[Request]) -> Iterator[str]:
+def falls(asked: Iterable[Request], choose: Choose = choose_world) -> Iterator[str]:
     """Let chains fall, of one simulation after the other.
+
+    Parameters
+    ----------
+    choose
+        Finds the world that a URL's settings ask for.
 
     Yields
     ------
@@ -47,7 +55,7 @@ def falls(asked: Iterable[Request]) -> Iterator[str]:
         settings = read_settings(url)
         protocol = reader.read(settings.pop("protocol"))
         filmed = settings.pop("film", "0") == "1"
-        hang, settings = choose_world(settings)
+        hang, settings = choose(settings)
         dials = read_dials(settings)
         for seed, numbers in zip(seeds, runs, strict=True):
             told: list[Truth] = []
@@ -60,8 +68,13 @@ def falls(asked: Iterable[Request]) -> Iterator[str]:
                 yield json.dumps({"seed": seed, "edges": edges, "truth": asdict(told.pop())})
 
 
-if __name__ == "__main__":
+def main(choose: Choose = choose_world) -> None:
+    """Print the drops that the command line asks for."""
     words = iter(sys.argv[1:])
     triples = zip(words, words, words, strict=True)
-    for line in falls(Request(u, json.loads(s), json.loads(r)) for u, s, r in triples):
+    for line in falls((Request(u, json.loads(s), json.loads(r)) for u, s, r in triples), choose):
         print(line)
+
+
+if __name__ == "__main__":
+    main()

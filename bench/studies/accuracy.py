@@ -61,7 +61,7 @@ class Errors:
         self.stated += other.stated
 
     def json(self) -> dict[str, float | int]:
-        """Rms, bias, largest error, mean U95, and the share of intervals that hold the truth.
+        """Rms, bias, largest error, mean and median U95, and share of intervals with the truth.
 
         Drops on one rig share errors: ``bias_se`` and ``coverage_se``, from rig to rig, say how
         well bias and coverage are known. ``bias_over_U`` is the bias in units of the mean U95, and
@@ -76,6 +76,7 @@ class Errors:
             "bias": bias,
             "worst": max(map(abs, self.errors)),
             "mean_U95": mean_u,
+            "median_U95": median(self.expanded),
             "bias_over_U": bias / mean_u,
             "coverage": sum(held) / n,
         }

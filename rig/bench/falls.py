@@ -56,8 +56,8 @@ STRAY = -1
 """The truth's rod number of what was no rod."""
 
 
-def falls(asked: Sequence[Asked]) -> Iterator[SimulatedDrop]:
-    """Let the simulation make the drops of one rig after another.
+def falls(asked: Sequence[Asked], module: str = "sim.edges") -> Iterator[SimulatedDrop]:
+    """Let the simulation, run as a module, make the drops of one rig after another.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def falls(asked: Sequence[Asked]) -> Iterator[SimulatedDrop]:
         for url, seeds, runs in asked
         for text in (url, json.dumps([*seeds]), json.dumps([*runs]))
     ]
-    command = [sys.executable, "-m", "sim.edges", *requests]
+    command = [sys.executable, "-m", module, *requests]
     with Popen(command, stdout=PIPE, text=True) as simulation:  # noqa: S603 - our own
         assert simulation.stdout is not None
         for line in simulation.stdout:

@@ -1,109 +1,157 @@
-"""Coverage of intervals on many rigs: whose runs are chosen, how they are judged, what is kept."""
+"""Coverage of intervals on rigs of a hypercube: how they are drawn, judged and reported."""
 
 from __future__ import annotations
 
 import csv
 import json
 
+import numpy as np
 import pytest
 
 from bench import coverage as bench_coverage
 from bench.__main__ import main
-from bench.studies.coverage import CASES, FULL, GRADED, MISFITS, STEEP, Held, held, merged, sessions
+from bench.studies import coverage as study
+from bench.studies.coverage import (
+    Rig,
+    RigResult,
+    draw_rigs,
+    groups,
+    measure,
+    summarize,
+    worst_tenth,
+)
 from rig.analysis.result import Measured
-from rig.bench.falls import with_setting
 from rig.ports import read_settings
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from sim.dials import read_dials
 from sim.scene import choose_world
-from tests.analysis.drops import PROTOCOLS, UNIFORM
+from tests.analysis.drops import PROTOCOLS
+
+FOLDER = str(PROTOCOLS)
 
 
-def test_each_rig_has_one_drop_at_each_incline():
-    planned = {run.number: run for run in runs(UNIFORM)}
-    found = sessions(UNIFORM, STEEP, 13)
-    assert found[0] == found[12]  # twelve repeats
-    assert len({number for one in found for number in one}) == 12 * len(STEEP)
-    for one in found:
-        assert sorted(planned[number].incline_deg for number in one) == [*STEEP]
+def test_a_cube_has_a_rig_in_each_layer_of_each_axis():
+    rigs = draw_rigs(FOLDER, "resolved", 22, seed=3)
+    assert rigs == draw_rigs(FOLDER, "resolved", 22, seed=3)
+    layouts = [rig.layout for rig in rigs]
+    assert {layouts.count(name) for name in study.LAYOUTS} == {2}
+    layers = np.floor(22 * (np.array([rig.incline_deg for rig in rigs]) - 35.0) / 45.0)
+    assert len({*layers}) >= 21  # inclines are rounded
+    for name, (low, high, _) in study.DIALS.items():
+        values = sorted(rig.dials[name] for rig in rigs)
+        assert low <= values[0] < low + (high - low) / 22 + 1e-5
+        assert high - (high - low) / 22 - 1e-5 < values[-1] <= high
 
 
-def test_every_case_is_a_world_that_there_is():
-    for case in CASES:
-        url = "sim://?stated=1"
-        for name, value in case.settings.items():
-            url = with_setting(url, name, value)
-        read_dials(choose_world(read_settings(url))[1])
-        reader.read(PROTOCOLS / case.protocol)
-    assert len({case.name for case in CASES}) == len(CASES)
+@pytest.mark.parametrize("world", study.WORLDS)
+def test_every_rig_is_one_that_there_can_be(world, tmp_path):
+    for rig in draw_rigs(FOLDER, world, 33, seed=1):
+        protocol = reader.parse(rig.text)
+        inclines = [run.incline_deg for run in runs(protocol)]
+        planned = {*range(0, 90, 10)} if world == "coefficients" else {rig.incline_deg}
+        assert len(inclines) == rig.drops
+        assert {*inclines} == planned
+        counts = [sum(gate.side == side for gate in protocol.gates.gates)
+                  for side in ("impact", "free")]  # fmt: skip
+        if "+" in rig.layout:
+            assert " + ".join(map(str, counts)) == rig.layout
+        if "graded" not in rig.layout:
+            assert study.RODS[0] <= rig.rods <= study.RODS[1]
+        settings = read_settings(rig.ask(tmp_path).url)
+        assert reader.read(settings.pop("protocol")).gates == protocol.gates
+        read_dials(choose_world(settings)[1])
 
 
-def test_every_wrong_rig_is_one_that_can_be():
-    sizes = {fault.name: [size for size, _ in fault.rigs(FULL.protocol())] for fault in MISFITS}
-    assert sizes == {fault.name: [*fault.sizes] for fault in MISFITS}
+def rig_result(number: int, errors: list[float], **changes: object) -> RigResult:
+    rig = draw_rigs(FOLDER, "resolved", 1, seed=number)[0]
+    parts = {name: getattr(rig, name) for name in Rig.__slots__} | {"number": number} | changes
+    result = RigResult(Rig(**parts), seconds=0.5)
+    for error in errors:
+        result.verdicts["accepted"] += 1
+        result.add("separation_m", Measured(1.0 + error, 0.5), 1.0)
+    return result
 
 
-@pytest.fixture(scope="module")
-def graded() -> Held:
-    (case,) = [one for one in CASES if one.name == "model, graded"]
-    assert case.protocol == GRADED
-    return held(str(PROTOCOLS), case, [1])
+def test_the_worst_tenth_is_chosen_by_both_measures():
+    good = [rig_result(n, [0.1] * 4) for n in range(1, 19)]
+    often, far = rig_result(19, [1.1, 1.2, 1.1, 0.1]), rig_result(20, [0.1, 0.1, 0.1, 9.0])
+    silent = rig_result(21, [])
+    worst = worst_tenth([*good, often, far, silent])
+    held, error = ([one.rig.number for one in rigs] for rigs in worst.values())
+    assert held[:2] == [19, 20]
+    assert error[:2] == [20, 19]
+    assert far.worst is not None
+    assert far.row()["worst_ratio"] == pytest.approx(9.0 / far.worst.expanded)
+    assert worst_tenth([silent]) == {}
 
 
-def test_a_rig_s_drops_are_set_beside_the_truth(graded):
-    whole = merged([graded, graded]).json()
-    assert whole["drops"] == 8
-    assert whole["void_share"] == whole["wrong"] == 0
-    quantities = whole["quantities"]
-    assert quantities["separation_m"]["n"] == quantities["separation_m, 40°"]["n"] == 8
-    assert quantities["mean speed_m_s"]["n"] == quantities["drag_per_m"]["n"] == 2
-    for one in quantities.values():
-        assert 0.0 < one["rms"] < 2.0 * one["mean_U95"]
+def test_shares_are_from_rig_to_rig_and_leave_out_what_must_be_void():
+    one, other = rig_result(1, [0.1, 0.2]), rig_result(2, [0.1, 5.0])
+    one.verdicts["void"], one.beyond = 2, 1
+    found = summarize([one, other])
+    assert (found["rigs"], found["drops"], found["beyond"]) == (2, 6, 1)
+    assert found["void_share"] == pytest.approx(1 / 5)
+    assert found["quantities"]["separation_m"]["coverage"] == 0.75
+    assert found["quantities"]["separation_m"]["coverage_se"] >= 0.25
 
 
-def test_a_drop_is_quiet_only_where_nothing_is_said():
-    found = Held()
-    found.verdicts.update(accepted=3, marginal=1, void=2)
-    found.beyond = 1
-    found.add("speed_m_s", Measured(7.1, 0.1), 7.0, 1, 40.0)
-    whole = found.json()
-    assert (whole["void_share"], whole["marginal_share"]) == (0.2, 0.2)
-    assert whole["quantities"]["speed_m_s, 40°"]["bias"] == pytest.approx(0.1)
+def test_each_rig_is_in_one_group_of_each_kind():
+    found = [rig_result(n, [0.1], drops=drops, incline_deg=40.0 + n)
+             for n, drops in enumerate((1, 4, 12, 4))]  # fmt: skip
+    sizes = {name: len(rigs) for name, rigs in groups(found).items()}
+    assert sum(sizes.values()) == 4 * len(found)
+    assert sizes["drops a session: 4"] == 2
+    assert sizes["incline 35 to 50°"] == 4
 
 
-class Here:
-    """A pool of this process alone."""
-
-    def __init__(self, *_):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    map = staticmethod(map)
+def test_a_rig_s_drops_are_set_beside_the_truth():
+    (rig,) = [one for one in draw_rigs(FOLDER, "model", 12, seed=1) if one.number == 2]
+    (found,) = measure([rig])
+    assert found.verdicts.total() == rig.drops
+    names = {one.quantity for one in found.intervals}
+    assert {"separation_m", "speed_strike_m_s", "release_skew_s"} <= names
+    assert {"mean separation_m", "gravity_m_s2"} <= {one.quantity for one in found.session}
+    assert all(one.ratio < 3.0 for one in [*found.intervals, *found.session])
 
 
-def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, graded):
-    monkeypatch.setattr(bench_coverage, "ProcessPoolExecutor", Here)
-    monkeypatch.setattr(bench_coverage, "held", lambda *_: graded)
-    monkeypatch.setattr(bench_coverage, "misfits", lambda *_: iter([("clock -0.3 %", graded)]))
-    assert main(["coverage", "-o", str(tmp_path), "--rigs", "9"]) == 0
-    said = capsys.readouterr().out
-    assert "SIMULATED DATA" in said
-    assert "clock -0.3 %" in said
+def test_coefficients_are_set_beside_what_is_stated():
+    (found,) = measure(draw_rigs(FOLDER, "coefficients", 1, seed=1))
+    assert {"restitution", "friction"} <= {one.quantity for one in found.session}
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Work in this process."""
+    monkeypatch.setattr(
+        bench_coverage, "results", lambda calls, _: (call(*inputs) for call, *inputs in calls)
+    )
+
+
+def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, here):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(study, "DROPS", (1,))
+    words = ["coverage", "-o", str(tmp_path), "--rigs", "2", "--world", "resolved", "model"]
+    assert main(words) == 0
+    assert "SIMULATED DATA" in capsys.readouterr().out
     whole = json.loads((tmp_path / "coverage.json").read_text())
-    assert [*whole["cases"]] == [case.name for case in CASES]
-    assert whole["cases"]["model"]["drops"] == 8  # nine rigs are two parts
+    assert [*whole] == ["resolved", "model"]
     with (tmp_path / "coverage.csv").open(newline="") as table:
         rows = list(csv.DictReader(table))
-    assert {row["case"] for row in rows} == {*whole["cases"]}
-    assert "in U95" in (tmp_path / "coverage.md").read_text("utf-8")
+    assert [row["number"] for row in rows] == ["1", "2"] * 2
+    page = (tmp_path / "coverage.md").read_text("utf-8")
+    assert "worst tenth, fewest held:" in page
 
 
-def test_a_case_that_is_none_is_named(tmp_path, capsys):
-    assert main(["coverage", "-o", str(tmp_path), "--only", "steel"]) == 2
-    assert "there are model; resolved, damped strings; " in capsys.readouterr().err
+def test_a_rig_is_drawn_again_by_its_number(tmp_path, here):
+    words = ["coverage", "-o", str(tmp_path), "--rigs", "12", "--world", "model", "--only", "2"]
+    assert main(words) == 0
+    rows = json.loads((tmp_path / "coverage.json").read_text())["model"]["rigs"]
+    assert [row["number"] for row in rows] == [2]
+    assert rows[0]["heights"] == draw_rigs(FOLDER, "model", 12, seed=1)[1].heights
+
+
+def test_a_world_without_its_engine_says_how_to_get_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(bench_coverage, "find_spec", lambda name: None)
+    assert main(["coverage", "-o", str(tmp_path), "--world", "mujoco"]) == 2
+    assert "pip install mujoco" in capsys.readouterr().err
