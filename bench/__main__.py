@@ -122,20 +122,10 @@ def _studies(benches: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         bench.add_argument("-o", "--output", required=needed, metavar="DIR", help=folder)
         return bench
 
-    def scene(bench: argparse.ArgumentParser) -> None:
-        bench.add_argument(
-            "--protocol",
-            default="protocols/inclined-uniform.yaml",
-            metavar="FILE",
-            help="the scene",
-        )
-        bench.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
-
     accuracy = study(
         "accuracy", "errors of Δz, V and skew, coverage, matches", "folder for a page of the same",
         needed=False,
     )  # fmt: skip
-    scene(accuracy)
     accuracy.add_argument("--seeds", type=_count, metavar="N", help="sessions to simulate")
     accuracy.add_argument(
         "--repeats", type=_count, metavar="N", help="drops at each incline, not the protocol's"
@@ -149,7 +139,9 @@ def _studies(benches: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "estimators", "error against run time from edges to Δz and V",
         "folder for page, CSV, JSON and picture",
     )  # fmt: skip
-    scene(every)
+    for bench in (accuracy, every):
+        bench.add_argument("--protocol", default=_SCENE, metavar="FILE", help="the scene")
+        bench.add_argument("--port", default="sim://", help="simulation URL, with dials if wanted")
     every.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
     every.add_argument(
         "--repeats", type=_count, default=4, metavar="N", help="drops at each incline (default 4)"
@@ -169,26 +161,19 @@ def _studies(benches: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     )  # fmt: skip
     coverage.add_argument("--only", type=_count, nargs="+", metavar="N", help="rigs by number")
     coverage.add_argument("--jobs", type=_count, metavar="N", help="processes at a time")
-    resolved = study(
-        "resolved",
-        "sessions whose chains fall by no model",
-        "folder for page, CSV, JSON and picture",
+    resolved = study("resolved", "the resolved world by itself", "folder for what is made")
+    asked = resolved.add_mutually_exclusive_group(required=True)
+    asked.add_argument("--film", type=float, metavar="DEG", help="draw one fall at this incline")
+    asked.add_argument(
+        "--work", action="store_true", help="error against run time of that world itself"
     )
-    resolved.add_argument("--drops", type=_count, metavar="N", help="at each incline (default 4)")
-    resolved.add_argument(
-        "--film", type=float, metavar="DEG", help="draw one fall at this incline instead"
-    )
-    resolved.add_argument(
-        "--work", action="store_true", help="error against run time of that world itself instead"
-    )
-    resolved.add_argument(
-        "--published", action="store_true", help="chains of other experiments in that world instead"
+    asked.add_argument(
+        "--published", action="store_true", help="chains of other experiments in that world"
     )
     for bench in (coverage, resolved):
         bench.add_argument(
             "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
         )
-    resolved.add_argument("--only", metavar="TEXT", help="cases with this in their names")
     layouts = study(
         "layouts", "which layouts of gates let drops be read", "folder for CSV, JSON, page and map"
     )

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import cycle, groupby
+from itertools import groupby
 from operator import itemgetter
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.result import GOOD
-from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED
 from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-
-    from bench.studies.resolved import JudgedDrop
 
 _ESTIMATOR_PANELS = (("separation_rms_m", 1e3, "rms error of Δz (mm)"),
            ("speed_rms_m_s", 1e3, "rms error of V (mm/s)"))  # fmt: skip
@@ -106,56 +101,6 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
             for chain, gates, heights in rows
         ]
         drawing.axes[0].set_yticks(range(len(rows)), labels, fontsize=6.5)
-    return drawing.svg
-
-
-def resolved_figure(drops: Sequence[JudgedDrop]) -> str:
-    """Draw the errors of resolved sessions against inclination: Δz, V and skew below each other.
-
-    Parameters
-    ----------
-    drops
-        Of the study; those that were void have no errors, and are counted at the foot.
-
-    Returns
-    -------
-    str
-        SVG.
-    """
-    rows = [SEPARATION, SPEED, RELEASE_SKEW]
-    cases = list(dict.fromkeys(one.case for one in drops))
-    with canvas((2.7, 2.3, 2.3, 1.6), 8.0, simulated=True) as drawing:
-        *panels, foot = drawing.axes
-        for number, (case, (marker, color)) in enumerate(
-            zip(cases, cycle((*_STYLES, ("x", SECOND), ("+", INK), ("P", MODEL))), strict=False)
-        ):
-            mine = [one for one in drops if one.case == case]
-            aside = 0.55 * (number - (len(cases) - 1) / 2)
-            for panel, row in zip(panels, rows, strict=True):
-                read = [one for one in mine if row.name in one.errors]
-                panel.errorbar(
-                    [one.incline_deg + aside for one in read],
-                    [row.fine_scale * one.errors[row.name][0] for one in read],
-                    [row.fine_scale * one.errors[row.name][1] for one in read],
-                    color=color, marker=marker, linestyle="none", markersize=3.0, elinewidth=0.5,
-                    capsize=0, label=case,
-                )  # fmt: skip
-            inclines = sorted({one.incline_deg for one in mine})
-            shares = [
-                fmean(one.verdict not in GOOD for one in mine if one.incline_deg == incline)
-                for incline in inclines
-            ]
-            foot.plot(
-                [incline + aside for incline in inclines], [100 * share for share in shares],
-                color=color, marker=marker, linestyle="none", markersize=4.0,
-            )  # fmt: skip
-        for panel, row in zip(panels, rows, strict=True):
-            panel.axhline(0.0, color=MUTED, linewidth=0.9)
-            panel.set_ylabel(f"error of {row.symbol} ({row.fine})")
-        foot.set_ylabel("void drops (%)")
-        foot.set_xlabel("inclination of the surface (°); bars are U95, cases side by side")
-        handles, labels = panels[0].get_legend_handles_labels()
-        drawing.figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=7.0)
     return drawing.svg
 
 

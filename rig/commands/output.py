@@ -10,10 +10,9 @@ from contextlib import contextmanager
 from shutil import get_terminal_size
 from textwrap import wrap
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rig.command_help import runnable
-from rig.errors import InputError
 from rig.files import write_atomic
 from rig.streams import say as narrate
 
@@ -95,30 +94,6 @@ def stage(what: str) -> None:
     """
     if sys.stderr.isatty():
         print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
-
-
-class _Named(Protocol):
-    @property
-    def name(self) -> str: ...
-
-
-_Case = TypeVar("_Case", bound=_Named)
-
-
-def named(cases: Iterable[_Case], wanted: str) -> list[_Case]:
-    """Choose the cases of a study that have a text in their names.
-
-    Raises
-    ------
-    InputError
-        None has it.
-    """
-    every = [*cases]
-    chosen = [one for one in every if wanted in one.name]
-    if not chosen:
-        names = "; ".join(one.name for one in every)  # some have commas in them
-        raise InputError(f"no case has {wanted!r} in its name", f"there are {names}")
-    return chosen
 
 
 def leave_study(

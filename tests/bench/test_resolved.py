@@ -1,89 +1,19 @@
-"""Sessions of the resolved world judged by the truth, and its falls in the paper's figures."""
+"""The bench of the resolved world, and its falls in the paper's figures."""
 
 from __future__ import annotations
 
 import csv
-import json
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 
 import pytest
 
 from bench import resolved as bench_resolved
 from bench.__main__ import main
-from bench.studies.resolved import CASES, JudgedDrop, as_json, summary
 from rig import cli
 from rig.bench import resolved_paper
 from rig.bench.resolved_paper import Ensemble
 from rig.report.film import film_figure
 from tests.report.test_figures import FILM
-
-TWO = """
-protocol: 1
-title: Two rods
-chains:
-  A: {rods: 2, length: 48 mm, diameter: 12.7 mm, rod_length: 102 mm, tilt: 12 deg}
-  B: {like: A}
-surface: {restitution: 0.5, friction: 0.2}
-drop: 1200 mm
-gravity: 9.81 m/s^2
-gates:
-  impact: [{channel: 0, height: 25 mm}, {channel: 1, height: 60 mm}, {channel: 2, height: 400 mm}]
-  free: [{channel: 8, height: 25 mm}, {channel: 9, height: 60 mm}, {channel: 10, height: 400 mm}]
-plan: {incline: [40 deg, 60 deg], repeats: 1, order: ABBA, settle: 0 s}
-"""
-
-GOOD = JudgedDrop(
-    "damped strings", 40.0, 1, "accepted", (), beyond=False,
-    errors={"separation_m": (1e-3, 2e-3, 1e-3), "speed_m_s": (0.03, 0.02, 0.01)}, wrong=0,
-    truth={"separation_m": 0.12, "separation_strike_m": 0.11, "speed_m_s": 7.0,
-           "contact_height_m": 0.01},
-)  # fmt: skip
-REASON = "release_skew"
-VOID = replace(GOOD, run=2, verdict="void", reasons=(REASON,), errors={})
-
-
-def test_shares_are_of_drops_that_could_have_been_good():
-    found = summary([GOOD, VOID, replace(VOID, run=3, beyond=True)])
-    assert (found["drops"], found["beyond"], found["void_share"]) == (3, 1, 0.5)
-    assert found["reasons"] == {REASON: 1}
-    assert found["quantities"]["separation_m"]["coverage"] == 1.0
-    assert found["quantities"]["speed_m_s"]["coverage"] == 0.0
-    assert found["quantities"]["speed_m_s"]["bias"] == pytest.approx(0.03)
-
-
-def test_inclines_stand_for_themselves():
-    whole = as_json([GOOD, replace(GOOD, incline_deg=60.0, case="air"), VOID])
-    assert [(one["case"], one["incline_deg"]) for one in whole["inclines"]] == [
-        ("damped strings", 40.0), ("air", 60.0),
-    ]  # fmt: skip
-    assert whole["inclines"][0]["true"]["contact_height_m"] == pytest.approx(0.01)
-
-
-def test_the_command_leaves_page_table_and_picture(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    (tmp_path / "inclined-uniform.yaml").write_text(TWO)
-    # Two rods that swing turn about each other, which no formula follows on the long way down.
-    still = replace(CASES[0], settings={"swing_sd": "0 m/s"})
-    monkeypatch.setattr(bench_resolved, "CASES", (still,))
-    out = tmp_path / "out"
-    words = ["resolved", "-o", out, "--protocols", tmp_path, "--only", "damped"]
-    assert main([str(word) for word in words]) == 0
-    assert "SIMULATED DATA" in capsys.readouterr().out
-    whole = json.loads((out / "resolved.json").read_text())
-    assert whole["cases"][0]["drops"] == 2
-    with (out / "resolved.csv").open(newline="") as table:
-        rows = list(csv.DictReader(table))
-    assert {float(row["incline_deg"]) for row in rows} == {40.0, 60.0}
-    assert all(float(row["true separation_strike_m"]) > 0 for row in rows)
-    ET.fromstring((out / "resolved.svg").read_text())
-    assert "resolved.svg" in (out / "resolved.md").read_text()
-
-
-def test_a_case_that_is_none_is_named(tmp_path, capsys):
-    assert main(["resolved", "-o", str(tmp_path), "--only", "steel"]) == 2
-    assert "lively strings" in capsys.readouterr().err
-    assert len({one.name for one in CASES}) == len(CASES)
 
 
 def ensemble(incline: float) -> Ensemble:
