@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 mujoco: Any = import_module("mujoco")  # no dependency of the package
 
 STEP = 2e-5
-"""s; half of it and a quarter change the mean Δz of 8 falls at 40° and 60° by 0.6 to 1.6 mm, and
-single falls scatter by 1.2 to 4 mm; twice of it takes 4 mm from the mean at 40°."""
+"""s. Half of it and a quarter change the mean Δz of 8 falls at 40° and 60° by 0.6 to 1.6 mm, where
+single falls scatter by 1.2 to 4 mm; twice of it takes 4 mm from the mean at 40°. Two rods that do
+not touch each other: the top rod's lead of 2.38 mm becomes 2.44 and 2.41 mm."""
 _SOUND = 0.5
 """Longest step in units of 1/ω of the stiffest string."""
 _HARD = 'solimp="0.999 0.999 0.001"'
@@ -50,8 +51,7 @@ _ROD = """\
 def damping_ratio(restitution: float) -> float:
     """Return the damping ratio of a linear contact without adhesion.
 
-    T. Schwager and T. Pöschel, Granular Matter 9 (2007) 465, Eq. 21: the contact ends when its
-    force does.
+    T. Schwager and T. Pöschel, Granular Matter 9 (2007) 465: the contact ends when its force does.
     """
     low, high = 0.0, 10.0
     for _ in range(60):
