@@ -64,6 +64,8 @@ def main(arguments: Namespace) -> int:
     for world in worlds:
         rigs = draw_rigs(arguments.protocols, world, arguments.rigs or RIGS[world], arguments.seed)
         rigs = [one for one in rigs if one.number in (arguments.only or [one.number])]
+        if not rigs:
+            raise InputError("no rig of the cube has such a number", "give --only up to --rigs")
         parts = [(measure, rigs[n : n + _CHUNK]) for n in range(0, len(rigs), _CHUNK)]
         found: list[RigResult] = []
         count = progress(world)

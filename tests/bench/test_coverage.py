@@ -149,6 +149,7 @@ def test_a_rig_is_drawn_again_by_its_number(tmp_path, here):
     rows = json.loads((tmp_path / "coverage.json").read_text())["model"]["rigs"]
     assert [row["number"] for row in rows] == [2]
     assert rows[0]["heights"] == draw_rigs(FOLDER, "model", 12, seed=1)[1].heights
+    assert main([*words[:-1], "13"]) == 2
 
 
 def test_a_world_without_its_engine_says_how_to_get_it(tmp_path, monkeypatch, capsys):
