@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import csv
+import struct
 import subprocess
 from contextlib import closing, contextmanager
+from pathlib import Path
 
 import pytest
 
-from rig.cli import main
 from rig.link.client import Device
 from rig.link.messages import Phase
 from rig.link.port import open_port, port_clock
+from rig.selftest.findings import Verdict
 from tests.firmware.toolchain import FIRMWARE, need
 from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL
+from tests.selftest.benches import outcomes, port_of
 
 FLAGS = "-std=c11 -O1 -Wall -Wextra -Wconversion -Wshadow -Werror -fsanitize=address,undefined"
 FALL = [30_000, 42_000, 70_000, 82_000, 130_000, 142_000]  # µs, of its first rods
+STEPPED = Path(__file__).with_name("stepped.c")
+WRAP = [f"-Wl,--wrap={name}" for name in ("clock_gettime", "poll", "read", "write")]
 ORDER = {"gates": 3, "release": 0, "pulse_us": 0, "timeout_ms": 500, "record_ms": 150}
 
 
@@ -25,9 +30,13 @@ ORDER = {"gates": 3, "release": 0, "pulse_us": 0, "timeout_ms": 500, "record_ms"
 def built(tmp_path_factory):
     need("gcc")
     folder = tmp_path_factory.mktemp("examples")
-    for name in ("device", "client"):
-        sources = [FIRMWARE / f"examples/{name}.c", FIRMWARE / "examples/frames.c"]
-        command = ["gcc", *FLAGS.split(), "-o", folder / name, *sources]
+    for name, source, more in (
+        ("device", "device", []),
+        ("client", "client", []),
+        ("stepped", "device", [STEPPED, *WRAP]),
+    ):
+        sources = [FIRMWARE / f"examples/{part}.c" for part in (source, "frames")]
+        command = ["gcc", *FLAGS.split(), "-o", folder / name, *sources, *more]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     return folder
@@ -51,15 +60,52 @@ def client(built, port, gates, record_ms):
     return [(int(tick), int(state)) for tick, state in rows]
 
 
-def test_the_device_passes_the_selftest(built, capsys):
-    with device_of(built) as path:
-        main(["selftest", "--port", path])
-    out, _ = capsys.readouterr()
-    failed = [line for line in out.splitlines() if ": failed" in line]
-    # How fast a busy computer is says nothing of the device.
-    assert [line for line in failed if not line.startswith("round trips: ")] == []
-    assert "handshake: ok: an example in C, example 1" in out
-    assert "repeated frames: ok" in out
+class SteppedDevice:
+    """The device at a simulated port: its clock is the port's, however busy the computer is."""
+
+    byte_ns = 20_000
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.process, self.line = process, self
+        process.stdout.readline()  # the terminal that it is not behind
+        self.now_us, self.waiting = 0, self._sent()
+
+    def _sent(self) -> bytes:
+        (count,) = struct.unpack("I", self.process.stdout.read(4))
+        return self.process.stdout.read(count)
+
+    def receive(self, at_ns: int, data: bytes) -> None:
+        self.process.stdin.write(struct.pack("II", at_ns // 1000, len(data)) + data)
+        self.process.stdin.flush()
+        self.now_us = at_ns // 1000
+        self.waiting += self._sent()
+
+    def advance(self, until_ns: int) -> None:
+        if until_ns // 1_000_000 > self.now_us // 1000:  # it looks at its clock once a millisecond
+            self.receive(until_ns, b"")
+
+    def reset(self, at_ns: int) -> None:
+        """Nothing: a terminal has no DTR."""
+
+    def next_ns(self) -> int:
+        return (self.now_us // 1000 + 1) * 1_000_000
+
+    def next_arrival_ns(self) -> int | None:
+        return self.now_us * 1000 if self.waiting else None
+
+    def arrived(self, now_ns: int) -> bytes:
+        data, self.waiting = self.waiting, b""
+        return data
+
+
+def test_the_device_passes_the_selftest(built):
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([built / "stepped"], **pipes) as process:
+        found = outcomes(port_of(SteppedDevice(process)), loopback=None, release=False)
+    assert [str(one) for one in found.values() if one.verdict is Verdict.FAILED] == []
+    assert found["handshake"].what.startswith("an example in C, example 1")
+    assert found["repeated frames"].verdict is Verdict.OK
+    assert found["a silent host disarms"].what == "after 250 ms"
 
 
 def test_its_drop_is_read_by_this_project_and_by_the_client(built):
