@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from rig.commands import design
-from rig.design.trials import trials
 from tests.scenes.draw import scene
 from tests.scenes.through import faults
 
@@ -22,21 +20,6 @@ FALLING = (63, 75, 85, 110)
 """Further scenes without a chain, of which the first 60 have few: an object, a track, fences."""
 SOME = [seed for seed in (*range(60), *FALLING) if seed not in DEAR]
 MANY = 240
-
-
-@pytest.fixture(autouse=True)
-def _trials_once(monkeypatch):
-    """Make a layout's trial drops once: `check` and `design` each say what became of them."""
-    made = {}
-
-    def once(protocol):
-        key = repr(protocol)
-        if key not in made:
-            made[key] = trials(protocol)
-        return made[key]
-
-    monkeypatch.setattr("rig.design.trials.trials", once)
-    monkeypatch.setattr(design, "trials", once)
 
 
 def _assert_sound(drawn: Scene, folder: Path) -> None:

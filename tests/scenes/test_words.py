@@ -63,7 +63,7 @@ def recorded(request, tmp_path_factory):
     for port in ("sim://?seed=2", "sim://?seed=2&gate_sd=12mm"):
         main(["run", str(protocol), "--port", port, "--session", str(session), "--yes"])
         session.rename(session.with_suffix(f".{len(port)}"))
-    return request.param, protocol, [*folder.glob("scene.[0-9]*")]
+    return request.param, protocol, sorted(folder.glob("scene.[0-9]*"))
 
 
 def assert_own_words(scene: str, where: str, text: str) -> None:
@@ -113,10 +113,12 @@ def test_plans_speak_the_words_of_their_scene(scene, capsys):
 
 def test_commands_and_page_speak_the_words_of_their_scene(recorded, tmp_path, capsys):
     scene, _, sessions = recorded
-    for session in sessions:
+    for number, session in enumerate(sessions):
         capsys.readouterr()
         main(["analyze", str(session), "--scatter"])
-        main(["analyze", str(session), "--budget", "1"])
+        # Whether trials agree is said in the same words of every scene: one makes enough of them.
+        trials = () if (scene, number) == ("picket-fence", 0) else ("--trials", "2")
+        main(["analyze", str(session), "--budget", "1", *trials])
         main(["report", str(session), "-o", str(tmp_path / "page.html")])
         assert_own_words(scene, "analyze", "".join(capsys.readouterr()))
         html = (tmp_path / "page.html").read_text("utf-8")
@@ -135,12 +137,14 @@ def test_screens_speak_the_words_of_their_scene(recorded):
 
 def test_dialogs_speak_the_words_of_their_scene(recorded):
     scene, _, sessions = recorded
-    view = LiveAnalysis(sessions[-1]).read()
+    live = LiveAnalysis(sessions[-1])
+    view = live.read()
     job = view.jobs[-1]
     moment = next(shot for shot in screenshots(view) if shot.name == "result")
 
     async def opened() -> dict[str, str]:
         app = RigApp(Options(session=sessions[-1]), KEYS, FakeClient(moment.state))
+        app.follower.look_with(live)
         texts = {}
         async with app.run_test(size=(120, 60)) as pilot:
             while app.view is None or not app.page:
