@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -32,9 +33,14 @@ EXACT = replace(
 
 
 @pytest.fixture(scope="module")
-def single_drops() -> Comparisons:
-    """Two dozen rigs that are off by as much as their protocol says, one drop an incline."""
-    return compare_sessions(PROTOCOLS / "inclined-uniform.yaml", 1, range(1, 25))
+def single_drops(tmp_path_factory) -> Comparisons:
+    """Two dozen rigs that are off by as much as their protocol says, a drop at four inclines."""
+    text = (PROTOCOLS / "inclined-uniform.yaml").read_text("utf-8")
+    protocol = tmp_path_factory.mktemp("inclines") / "four.yaml"
+    text, changed = re.subn(r"(?<=incline: )\[.*\]", "[10 deg, 30 deg, 50 deg, 70 deg]", text)
+    assert changed == 1
+    protocol.write_text(text, "utf-8")
+    return compare_sessions(protocol, 1, range(1, 25))
 
 
 def test_p_of_single_drops_is_uniform(single_drops):

@@ -12,6 +12,7 @@ import pytest
 
 from rig.cli import main
 from tests.cli.lab import PROTOCOLS, rig, short
+from tests.once import analysed_once  # noqa: F401 - a fixture
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 import rig as door
 from tests.cli.lab import short
 
 
+@pytest.mark.usefixtures("analysed_once")
 def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp_path):
     protocol, session, page = (tmp_path / name for name in ("b.yaml", "b.session", "b.html"))
     protocol.write_text(short("[40 deg]", 4) + "\nblind: true\n", "utf-8")

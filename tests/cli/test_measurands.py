@@ -10,8 +10,11 @@ import pytest
 
 from rig.analysis.quantities import COMPUTED
 from rig.measurands import MEASURANDS, Measurand
-from rig.tui.pictures import draw
+from rig.tui.pictures import seen
 from tests.tui.lab import KEYS
+from tests.tui.screen import text_of
+
+SIZE = [(120, 36)]
 
 BLOW = Measurand(
     "free_blow_J", "Ef", "free energy", "energy of the free chain",
@@ -60,7 +63,7 @@ def test_keys_of_any_name_and_unit(stem, unit):
     assert (row.stem, row.key("sd")) == (stem, f"{stem}_sd{unit}")
 
 
-@pytest.mark.usefixtures("added")
+@pytest.mark.usefixtures("added", "analysed_once")
 def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
     session = finished.copy(tmp_path)
     found = json.loads(call("analyze", session, "--json").out)
@@ -82,8 +85,6 @@ def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
     page = (tmp_path / "r.html").read_text("utf-8")
     assert page.count("Ef ± U (kJ)") == 2  # the summary's table, and that of the runs
     assert "could not be made" not in page
-    pictures = draw(session, tmp_path / "screens", KEYS, sizes=[(120, 36)], themes=["dark"])
-    screens = {path.stem.partition("-")[0]: path for path in pictures}
+    screens = {name: text for name, *_, text in seen(session, KEYS, (), SIZE, ["dark"], text_of)}
     for screen, text in (("result", BLOW.label), ("session", BLOW.symbol)):
-        drawn = screens[screen].read_text("utf-8").replace("&#160;", " ")
-        assert text in drawn, screen
+        assert text in screens[screen], screen
