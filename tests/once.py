@@ -1,7 +1,4 @@
-"""What many commands work out again of the same file is worked out once a test.
-
-Modules that import `analysed_once` and use it have each test begin without memory.
-"""
+"""What many commands work out again of the same file is worked out once, for who asks for that."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from rig.results import whole
 from rig.session.store import Session
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 ANALYSE = whole._analysed
 
@@ -45,12 +42,25 @@ def _file(session, protocol, progress=None, known=None):
     return session.path, at.st_mtime_ns, at.st_size
 
 
-@pytest.fixture
-def analysed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def _remember(patch: pytest.MonkeyPatch) -> None:
     trial_drops = once(trials, repr)
-    monkeypatch.setattr("rig.design.trials.trials", trial_drops)
-    monkeypatch.setattr(design, "trials", trial_drops)
-    monkeypatch.setattr(whole, "_analysed", once(ANALYSE, _file))
+    patch.setattr("rig.design.trials.trials", trial_drops)
+    patch.setattr(design, "trials", trial_drops)
+    patch.setattr(whole, "_analysed", once(ANALYSE, _file))
     session_estimate = once(estimate, lambda _, analysis: id(analysis))
     for command in (estimates, report):
-        monkeypatch.setattr(command, "estimate", session_estimate)
+        patch.setattr(command, "estimate", session_estimate)
+
+
+@pytest.fixture
+def analysed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Remember for a test."""
+    _remember(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def analysed_once_for_all() -> Iterator[None]:
+    """Remember for a module, the tests of which only show what is found."""
+    with pytest.MonkeyPatch.context() as patch:
+        _remember(patch)
+        yield

@@ -12,7 +12,7 @@ import pytest
 
 from rig.cli import main
 from tests.cli.lab import PROTOCOLS, rig, short
-from tests.once import analysed_once  # noqa: F401 - a fixture
+from tests.once import analysed_once, analysed_once_for_all  # noqa: F401 - fixtures
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -53,6 +53,16 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 def analysis(finished: Finished) -> dict[str, Any]:
     """What ``rig analyze --json`` prints of the finished session."""
     return json.loads(rig("analyze", finished.session, "--json").stdout)
+
+
+@pytest.fixture(scope="session")
+def page(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return what ``rig report`` writes of the finished session."""
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    done = rig("report", finished.session, "-o", path)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert done.stderr == f"report: {path}\n"
+    return path
 
 
 @pytest.fixture

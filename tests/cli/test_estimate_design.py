@@ -14,11 +14,12 @@ from sim.lab import ChainLab
 from tests.analysis.drops import SINGLE, case
 from tests.cli.lab import PROTOCOLS
 
+pytestmark = pytest.mark.usefixtures("analysed_once_for_all")
 FENCE = PROTOCOLS / "picket-fence.yaml"
 
 
 @pytest.fixture(scope="module")
-def estimated(finished, tmp_path_factory):
+def estimated(analysed_once_for_all, finished, tmp_path_factory):
     from rig.cli import main
 
     folder = tmp_path_factory.mktemp("estimated") / "pictures"
@@ -52,9 +53,8 @@ def test_pictures_of_an_estimate_are_stamped(estimated):
     assert all("SIMULATED" in path.read_text("utf-8") for path in estimated.iterdir())
 
 
-def test_a_report_has_the_impacts_too(call, finished, tmp_path):
-    assert call("report", finished.session, "-o", tmp_path / "r.html").code == 0
-    html = (tmp_path / "r.html").read_text("utf-8")
+def test_a_report_has_the_impacts_too(page):
+    html = page.read_text("utf-8")
     for heading in ("Best single α", "End correction", "Single impulses"):
         assert f"<h3>{heading}</h3>" in html
 

@@ -120,6 +120,7 @@ def test_a_clock_that_is_hardly_known_widens_the_uncertainties(bring, call, tmp_
         assert two["speed_m_s"]["u"] > one["speed_m_s"]["u"]
 
 
+@pytest.mark.usefixtures("analysed_once")
 def test_only_what_is_simulated_is_stamped(bring, call, exported, tmp_path):
     rows = (exported / "edges.csv").read_text("utf-8").splitlines(keepends=True)
     events = tmp_path / "one.csv"

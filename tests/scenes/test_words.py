@@ -16,6 +16,7 @@ from rig.ready import ready_protocol
 from rig.records import Job
 from rig.report.method import SOFTWARE
 from rig.results.live import LiveAnalysis
+from rig.tui import pictures
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from rig.tui.pictures import FakeClient, screenshots, seen
@@ -63,7 +64,8 @@ def recorded(request, tmp_path_factory):
     for port in ("sim://?seed=2", "sim://?seed=2&gate_sd=12mm"):
         main(["run", str(protocol), "--port", port, "--session", str(session), "--yes"])
         session.rename(session.with_suffix(f".{len(port)}"))
-    return request.param, protocol, sorted(folder.glob("scene.[0-9]*"))
+    sessions = sorted(folder.glob("scene.[0-9]*"))
+    return request.param, protocol, {session: LiveAnalysis(session) for session in sessions}
 
 
 def assert_own_words(scene: str, where: str, text: str) -> None:
@@ -127,23 +129,30 @@ def test_commands_and_page_speak_the_words_of_their_scene(recorded, tmp_path, ca
         assert_own_words(scene, "page", unescape(re.sub(r"<[^>]+>", "\n", html)))
 
 
-def test_screens_speak_the_words_of_their_scene(recorded):
+def test_screens_speak_the_words_of_their_scene(recorded, monkeypatch):
     scene, protocol, sessions = recorded
+    monkeypatch.setattr(pictures, "LiveAnalysis", sessions.__getitem__)
+    shown = {"result", "session", "history"}  # before there is a result they are all the same
     for session in sessions:
+        monkeypatch.setattr(
+            pictures,
+            "screenshots",
+            lambda view, names=shown: [shot for shot in screenshots(view) if shot.name in names],
+        )
         for page, _, _, text in seen(session, KEYS, (protocol,), SIZES, ["dark"], text_of):
-            if page != "protocol":
-                assert_own_words(scene, page, "\n".join(text.split("\n")[1:]))
+            assert_own_words(scene, page, "\n".join(text.split("\n")[1:]))
+        shown = shown | {"device", "run", "live"}
 
 
 def test_dialogs_speak_the_words_of_their_scene(recorded):
     scene, _, sessions = recorded
-    live = LiveAnalysis(sessions[-1])
+    session, live = [*sessions.items()][-1]
     view = live.read()
     job = view.jobs[-1]
     moment = next(shot for shot in screenshots(view) if shot.name == "result")
 
     async def opened() -> dict[str, str]:
-        app = RigApp(Options(session=sessions[-1]), KEYS, FakeClient(moment.state))
+        app = RigApp(Options(session=session), KEYS, FakeClient(moment.state))
         app.follower.look_with(live)
         texts = {}
         async with app.run_test(size=(120, 60)) as pilot:

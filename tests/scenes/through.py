@@ -246,7 +246,7 @@ class _Journey:
         # Of a void run there may be a fit, or none.
         for verdicts, promised in ((GOOD, (DONE,)), (("void",), (DONE, BAD_INPUT))):
             for run in [run for run in found["runs"] if run["verdict"] in verdicts][:1]:
-                told = self.call("analyze", self.session, "--budget", run["run"], "--trials", 10,
+                told = self.call("analyze", self.session, "--budget", run["run"], "--trials", 3,
                                  promised=promised)  # fmt: skip
                 self.read("analyze --budget", told.out)
         return found
