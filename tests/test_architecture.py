@@ -151,5 +151,5 @@ def test_a_commit_is_checked_as_the_tests_begin():
         r"entry: \.venv/(.+)", (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
     )
     run = (ROOT / "run").read_text("utf-8")
-    checks = re.findall(r'^    "\$bin/((?:ruff|mypy|lint).*)$', run, re.MULTILINE)
-    assert [f"bin/{check.replace(chr(34), '', 1)}" for check in checks] == entries
+    checks = re.findall(r'^    "\$bin/((?:ruff|mypy|lint)[-\w" .]*)', run, re.MULTILINE)
+    assert [f"bin/{check.replace(chr(34), '', 1).strip()}" for check in checks] == entries
