@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import closing
 
 import pytest
 
+from rig.cli import main
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.recorder.recorder import Recorder
@@ -14,7 +16,25 @@ from rig.records import ClockSample
 from rig.replay import replay
 from rig.session.store import Session
 from sim.board import VirtualBoard
+from tests.cli.lab import PROTOCOLS
 from tests.session.altering import unguarded
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Four drops of a fence, which are quickly analysed."""
+    folder = tmp_path_factory.mktemp("recorded")
+    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
+    protocol, session = folder / "fence.yaml", folder / "fence.session"
+    protocol.write_text(text.replace("repeats: 10, settle: 5 s", "repeats: 4, settle: 1 s"))
+    assert main(["run", str(protocol), "--port", "sim://?seed=2", "--session", str(session)]) == 0
+    return session
+
+
+@pytest.fixture
+def fenced(recorded, tmp_path):
+    """Of these a copy."""
+    return shutil.copy(recorded, tmp_path / "copy.session")
 
 
 def tamper(session, sql, *values):
@@ -53,10 +73,9 @@ def test_a_session_is_identical_to_its_own_bytes(call, finished):
     assert finished.session.read_bytes() == before
 
 
-def test_what_is_recorded_meanwhile_is_no_difference(finished, tmp_path, monkeypatch):
-    session = finished.copy(tmp_path)
+def test_what_is_recorded_meanwhile_is_no_difference(fenced, monkeypatch):
     read = Session.byte_log
-    with Session.open(session) as writer, Session.open(session, readonly=True) as reader:
+    with Session.open(fenced) as writer, Session.open(fenced, readonly=True) as reader:
 
         def late(self, after=0):
             yield from read(self, after)
@@ -71,9 +90,9 @@ def test_what_is_recorded_meanwhile_is_no_difference(finished, tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("sql", "found"),
     [
-        ('UPDATE edge SET tick = tick + 1 WHERE "drop" = 2 AND idx = 100', {"drops", "results"}),
+        ('UPDATE edge SET tick = tick + 1 WHERE "drop" = 2 AND idx = 10', {"drops", "results"}),
         ('UPDATE "drop" SET release_sense = 3 WHERE id = 2', {"drops"}),
-        ('UPDATE edge SET channel = 15 - channel WHERE "drop" = 1 AND idx = 0', {"drops"}),
+        ('UPDATE edge SET channel = 1 - channel WHERE "drop" = 1 AND idx = 0', {"drops"}),
         ('UPDATE "drop" SET fire_tick = fire_tick + 1 WHERE run = 3', {"drops"}),
         ('UPDATE "drop" SET faults = \'["late"]\' WHERE run = 4', {"drops", "results"}),
         ("UPDATE ping SET tick = tick + 500 WHERE id = 1", {"clock samples", "results"}),
@@ -81,10 +100,9 @@ def test_what_is_recorded_meanwhile_is_no_difference(finished, tmp_path, monkeyp
         ("UPDATE bytes SET host_ns = host_ns + 1 WHERE id = (SELECT max(id) FROM bytes)", set()),
     ],
 )
-def test_what_was_tampered_with_is_called_different(call, finished, tmp_path, sql, found):
-    session = finished.copy(tmp_path)
-    tamper(session, sql)
-    done = call("replay", session)
+def test_what_was_tampered_with_is_called_different(call, fenced, sql, found):
+    tamper(fenced, sql)
+    done = call("replay", fenced)
     *lines, last = done.out.splitlines()
     different = {line.partition(":")[0] for line in lines if line.endswith("DIFFERENT")}
     assert different >= found
@@ -98,25 +116,23 @@ def test_what_was_tampered_with_is_called_different(call, finished, tmp_path, sq
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
-def test_changed_bytes_are_found(call, finished, tmp_path, share):
-    session = finished.copy(tmp_path)
-    with closing(sqlite3.connect(session)) as connection:
+def test_changed_bytes_are_found(call, fenced, share):
+    with closing(sqlite3.connect(fenced)) as connection:
         rows = connection.execute(
             "SELECT id, data FROM bytes WHERE direction = 'rx' AND length(data) > 30 ORDER BY id"
         ).fetchall()
     number, data = rows[int(share * len(rows))]
     changed = bytes([*data[:10], data[10] ^ 0x55, *data[11:]])
-    tamper(session, "UPDATE bytes SET data = ? WHERE id = ?", changed, number)
-    done = call("replay", session)
+    tamper(fenced, "UPDATE bytes SET data = ? WHERE id = ?", changed, number)
+    done = call("replay", fenced)
     assert done.code == 1
     assert "drops: 4 DIFFERENT" in done.out
     assert done.err == ""
 
 
-def test_the_guards_refuse_what_was_done_here(finished, tmp_path):
-    session = finished.copy(tmp_path)
+def test_the_guards_refuse_what_was_done_here(fenced):
     with (
-        closing(sqlite3.connect(session)) as connection,
+        closing(sqlite3.connect(fenced)) as connection,
         pytest.raises(sqlite3.IntegrityError, match="never altered"),
     ):
         connection.execute("UPDATE edge SET tick = 1")
