@@ -50,6 +50,17 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 
 @pytest.fixture(scope="session")
+def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record four drops of a fence, which are quickly analysed."""
+    folder = tmp_path_factory.mktemp("fences")
+    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
+    protocol, session = folder / "fence.yaml", folder / "fence.session"
+    protocol.write_text(text.replace("repeats: 10, settle: 5 s", "repeats: 4, settle: 1 s"))
+    assert main(["run", str(protocol), "--port", "sim://?seed=2", "--session", str(session)]) == 0
+    return session
+
+
+@pytest.fixture(scope="session")
 def analysis(finished: Finished) -> dict[str, Any]:
     """What ``rig analyze --json`` prints of the finished session."""
     return json.loads(rig("analyze", finished.session, "--json").stdout)

@@ -9,10 +9,11 @@ import pytest
 from tests.cli.lab import rig
 
 
-def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
-    done = rig("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+@pytest.mark.usefixtures("analysed_once")
+def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
+    done = call("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
     assert (found["run"], found["monte_carlo"]["trials"]) == (1, 40)
     for name, one in found["budget"].items():
         assert sum(line["share"] for line in one["lines"]) == pytest.approx(1.0)
@@ -20,11 +21,11 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(finished):
         trial = found["monte_carlo"]["quantities"][name]
         # χ² of 39, once in 10⁴ each side.
         assert 0.6 < trial["u"] / found["by_itself"][name]["u"] < 1.45
-    table = rig("analyze", finished.session, "--budget", 1, "--trials", 2)
-    assert "beam heights" in table.stdout
-    assert "Δz = " in table.stdout
-    assert "_m" not in table.stdout  # symbols, not names of JSON members
-    assert max(map(len, table.stdout.splitlines())) <= 80
+    table = call("analyze", finished.session, "--budget", 1, "--trials", 2).out
+    assert "beam heights" in table
+    assert "Δz = " in table
+    assert "_m" not in table  # symbols, not names of JSON members
+    assert max(map(len, table.splitlines())) <= 80
 
 
 def test_a_mistyped_number_of_trials_is_told_both_ways():

@@ -280,8 +280,8 @@ def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port
         ("--help",),
     ],
 )
-def test_a_closed_pipe_is_no_error(finished, tmp_path, arguments):
-    names = {"SESSION": finished.copy(tmp_path), "PROTOCOL": finished.protocol}
+def test_a_closed_pipe_is_no_error(fences, arguments):
+    names = {"SESSION": fences, "PROTOCOL": fences.with_suffix(".yaml")}
     ours, theirs = os.pipe()
     os.close(ours)  # as `head` does when it has seen enough, only sooner
     try:
@@ -355,9 +355,9 @@ def test_a_command_that_nobody_listens_to_keeps_its_exit_code(
         os.close(theirs)
 
 
-def test_names_need_not_be_utf_8(tmp_path, protocol):
+def test_names_need_not_be_utf_8(tmp_path, fence):
     session = os.fsdecode(os.fsencode(tmp_path) + b"/\xff.session")
-    done = rig("run", protocol, "--port", "sim://", "--session", session)
+    done = rig("run", fence, "--port", "sim://", "--session", session)
     assert done.returncode == 0, done.stderr
     assert rig("analyze", session).returncode == 0
 

@@ -8,7 +8,6 @@ from contextlib import closing
 
 import pytest
 
-from rig.cli import main
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.recorder.recorder import Recorder
@@ -16,25 +15,13 @@ from rig.records import ClockSample
 from rig.replay import replay
 from rig.session.store import Session
 from sim.board import VirtualBoard
-from tests.cli.lab import PROTOCOLS
 from tests.session.altering import unguarded
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    """Four drops of a fence, which are quickly analysed."""
-    folder = tmp_path_factory.mktemp("recorded")
-    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
-    protocol, session = folder / "fence.yaml", folder / "fence.session"
-    protocol.write_text(text.replace("repeats: 10, settle: 5 s", "repeats: 4, settle: 1 s"))
-    assert main(["run", str(protocol), "--port", "sim://?seed=2", "--session", str(session)]) == 0
-    return session
-
-
 @pytest.fixture
-def fenced(recorded, tmp_path):
-    """Of these a copy."""
-    return shutil.copy(recorded, tmp_path / "copy.session")
+def fenced(fences, tmp_path):
+    """Copy a session that is quickly analysed."""
+    return shutil.copy(fences, tmp_path / "copy.session")
 
 
 def tamper(session, sql, *values):
