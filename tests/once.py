@@ -20,16 +20,17 @@ ANALYSE = whole._analysed
 
 
 def once(work: Callable, key: Callable) -> Callable:
-    """Make a function that remembers what `work` returned, and of what; no key, no memory."""
-    known = {}
+    """Make a function that remembers what `work` returned last, and of what; no key, no memory."""
+    last = {}
 
     def remembered(*arguments):
         name = key(*arguments)
         if name is None:
             return work(*arguments)
-        if name not in known:
-            known[name] = arguments, work(*arguments)
-        return known[name][1]
+        if name not in last:
+            last.clear()
+            last[name] = arguments, work(*arguments)
+        return last[name][1]
 
     return remembered
 
@@ -42,25 +43,15 @@ def _file(session, protocol, progress=None, known=None):
     return session.path, at.st_mtime_ns, at.st_size
 
 
-def _remember(patch: pytest.MonkeyPatch) -> None:
-    trial_drops = once(trials, repr)
-    patch.setattr("rig.design.trials.trials", trial_drops)
-    patch.setattr(design, "trials", trial_drops)
-    patch.setattr(whole, "_analysed", once(ANALYSE, _file))
-    session_estimate = once(estimate, lambda _, analysis: id(analysis))
-    for command in (estimates, report):
-        patch.setattr(command, "estimate", session_estimate)
-
-
-@pytest.fixture
-def analysed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Remember for a test."""
-    _remember(monkeypatch)
-
-
 @pytest.fixture(scope="module")
-def analysed_once_for_all() -> Iterator[None]:
-    """Remember for a module, the tests of which only show what is found."""
+def analysed_once() -> Iterator[None]:
+    """Have the tests of a module share what they only show."""
     with pytest.MonkeyPatch.context() as patch:
-        _remember(patch)
+        trial_drops = once(trials, repr)
+        patch.setattr("rig.design.trials.trials", trial_drops)
+        patch.setattr(design, "trials", trial_drops)
+        patch.setattr(whole, "_analysed", once(ANALYSE, _file))
+        session_estimate = once(estimate, lambda _, analysis: id(analysis))
+        for command in (estimates, report):
+            patch.setattr(command, "estimate", session_estimate)
         yield

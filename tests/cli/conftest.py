@@ -12,7 +12,7 @@ import pytest
 
 from rig.cli import main
 from tests.cli.lab import PROTOCOLS, rig, short
-from tests.once import analysed_once, analysed_once_for_all  # noqa: F401 - fixtures
+from tests.once import analysed_once  # noqa: F401 - a fixture
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -51,11 +51,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 @pytest.fixture(scope="session")
 def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Record four drops of a fence, which are quickly analysed."""
-    folder = tmp_path_factory.mktemp("fences")
-    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
-    protocol, session = folder / "fence.yaml", folder / "fence.session"
-    protocol.write_text(text.replace("repeats: 10, settle: 5 s", "repeats: 4, settle: 1 s"))
+    """Record ten drops of a fence, which are quickly analysed."""
+    protocol, session = PROTOCOLS / "picket-fence.yaml", tmp_path_factory.mktemp("fences") / "s"
     assert main(["run", str(protocol), "--port", "sim://?seed=2", "--session", str(session)]) == 0
     return session
 

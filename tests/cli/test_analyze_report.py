@@ -16,7 +16,7 @@ from tests.cli.lab import PROTOCOLS, rig, short
 SVG = 'xmlns="http://www.w3.org/2000/svg"'
 
 
-pytestmark = pytest.mark.usefixtures("analysed_once_for_all")
+pytestmark = pytest.mark.usefixtures("analysed_once")
 
 
 def test_the_table_is_the_one_of_the_run(call, finished):

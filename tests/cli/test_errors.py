@@ -281,7 +281,7 @@ def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port
     ],
 )
 def test_a_closed_pipe_is_no_error(fences, arguments):
-    names = {"SESSION": fences, "PROTOCOL": fences.with_suffix(".yaml")}
+    names = {"SESSION": fences, "PROTOCOL": PROTOCOLS / "picket-fence.yaml"}
     ours, theirs = os.pipe()
     os.close(ours)  # as `head` does when it has seen enough, only sooner
     try:

@@ -14,12 +14,12 @@ from sim.lab import ChainLab
 from tests.analysis.drops import SINGLE, case
 from tests.cli.lab import PROTOCOLS
 
-pytestmark = pytest.mark.usefixtures("analysed_once_for_all")
+pytestmark = pytest.mark.usefixtures("analysed_once")
 FENCE = PROTOCOLS / "picket-fence.yaml"
 
 
 @pytest.fixture(scope="module")
-def estimated(analysed_once_for_all, finished, tmp_path_factory):
+def estimated(analysed_once, finished, tmp_path_factory):
     from rig.cli import main
 
     folder = tmp_path_factory.mktemp("estimated") / "pictures"

@@ -113,7 +113,7 @@ def test_changed_bytes_are_found(call, fenced, share):
     tamper(fenced, "UPDATE bytes SET data = ? WHERE id = ?", changed, number)
     done = call("replay", fenced)
     assert done.code == 1
-    assert "drops: 4 DIFFERENT" in done.out
+    assert "drops: 10 DIFFERENT" in done.out
     assert done.err == ""
 
 

@@ -218,15 +218,6 @@ def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_pat
     assert [(run, len(entries)) for run, entries in log_of(path).items()] == [(1, 3), (2, 4)]
 
 
-def test_a_void_run_is_made_again(run, tmp_path):
-    done = run("s", port="sim://?skew_sd=6ms&seed=1")
-    assert done.code == 0
-    assert "release skew" in done.err
-    states = [state for entries in log_of(tmp_path / "s").values() for _, state in entries]
-    assert RunState.VOID in states
-    assert_whole(tmp_path / "s", 2)
-
-
 def test_a_finished_session_is_not_made_again(call, finished, tmp_path):
     session = finished.copy(tmp_path)
     log = log_of(session)

@@ -34,3 +34,12 @@ def client(processes: ProcessFixture) -> Iterator[Callable[[str], Client]]:
     yield connect
     for one in made:
         one.close()
+
+
+@pytest.fixture
+def driver(processes, client):
+    """Have a session open and control of it."""
+    one = client("the driver")
+    one.take_control()
+    one.open_session(str(processes.protocol), str(processes.session))
+    return one

@@ -50,15 +50,6 @@ def client(processes):
         one.close()
 
 
-@pytest.fixture
-def driver(processes, client):
-    """Have a session open and control of it."""
-    one = client("the driver")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
-    return one
-
-
 def ended(processes):
     """Wait until the daemon has ended, and give the lines that it said."""
     _, told = processes.daemon.communicate(timeout=PATIENCE_S)

@@ -17,15 +17,6 @@ from rig.session.store import Session
 from tests.waiting import until
 
 
-@pytest.fixture
-def driver(processes, client):
-    """Have a session open and control of it."""
-    one = client("the driver")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
-    return one
-
-
 def section(client):
     return client.call("subscribe")["state"]["release_test"]
 

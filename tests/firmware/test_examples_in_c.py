@@ -84,9 +84,6 @@ class SteppedDevice:
         if until_ns // 1_000_000 > self.now_us // 1000:  # it looks at its clock once a millisecond
             self.receive(until_ns, b"")
 
-    def reset(self, at_ns: int) -> None:
-        """Nothing: a terminal has no DTR."""
-
     def next_ns(self) -> int:
         return (self.now_us // 1000 + 1) * 1_000_000
 
@@ -101,7 +98,9 @@ class SteppedDevice:
 def test_the_device_passes_the_selftest(built):
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([built / "stepped"], **pipes) as process:
-        found = outcomes(port_of(SteppedDevice(process)), loopback=None, release=False)
+        found = outcomes(
+            port_of(SteppedDevice(process), reset_on_open=False), loopback=None, release=False
+        )
     assert [str(one) for one in found.values() if one.verdict is Verdict.FAILED] == []
     assert found["handshake"].what.startswith("an example in C, example 1")
     assert found["repeated frames"].verdict is Verdict.OK

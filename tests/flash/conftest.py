@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from rig.cli import main
+
 _SCRIPT = """#!{python}
 import json, pathlib, sys
 folder = pathlib.Path(__file__).parent
@@ -47,3 +49,14 @@ def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeAvrdude:
     fake = FakeAvrdude(path)
     fake.will("Writing | ######## | 100% 1.92s\n", 0)
     return fake
+
+
+@pytest.fixture
+def flash(capsys):
+    def call(*arguments, board="mega"):
+        code = main(["flash", "--board", board, *map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return code, out, err
+
+    return call

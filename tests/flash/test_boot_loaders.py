@@ -10,7 +10,6 @@ import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.boards import FLASHED
-from rig.cli import main
 from rig.flash.boards import TARGETS
 from rig.link.client import Device
 from rig.link.messages import Phase
@@ -55,17 +54,6 @@ def wiring_of(board: str) -> Wiring:
     return next(w for word, w in BOARDS.items() if FLASHED[word] is FLASHED[board])
 
 
-@pytest.fixture
-def flash(capsys):
-    def call(board: str, there: BoughtBoard):
-        code = main(["flash", "--board", board, "--port", there.path])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return code, out, err
-
-    return call
-
-
 @pytest.mark.parametrize(
     ("board", "power"), [("mega", True), ("uno", False), ("nano-old", True)], ids=TARGETS
 )
@@ -80,12 +68,12 @@ def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the
                 there.pull(power=power)
 
             done = hand.submit(cut)
-            code, out, err = flash(board, there)
+            code, out, err = flash("--port", there.path, board=board)
             assert (code, out) == (4, "")
             done.result()
         assert f"flashing {there.path} failed: the connection broke" in err
         there.plug()
-        code, out, err = flash(board, there)
+        code, out, err = flash("--port", there.path, board=board)
         assert code == 0, err
         assert out.startswith(TARGETS[board].board.name)
         assert out.endswith(": flashed and verified\n")
@@ -104,7 +92,7 @@ def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the
 def test_another_chip_than_the_board_that_was_named_is_not_written(bought, flash):
     with bought("uno") as there:
         before = there.avr.program(0, 256)
-        code, out, err = flash("mega", there)
+        code, out, err = flash("--port", there.path)
         assert (code, out) == (4, "")
         assert "wrong --board" in err
         assert there.avr.program(0, 256) == before

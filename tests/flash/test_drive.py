@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -50,14 +51,8 @@ def plugged(monkeypatch, path: str, after: int = 1) -> None:
 
 
 @pytest.fixture
-def flash(capsys):
-    def call(*arguments):
-        code = main(["flash", "--board", "pico", *map(str, arguments)])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return code, out, err
-
-    return call
+def flash(flash):
+    return partial(flash, board="pico")
 
 
 def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):

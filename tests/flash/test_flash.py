@@ -10,24 +10,12 @@ from pathlib import Path
 import pytest
 import serial
 
-from rig.cli import main
 from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
 from tests.flash.pty_board import PtyBoard
 
 VERSION = read_image(TARGETS["mega"].shipped, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
-
-
-@pytest.fixture
-def flash(capsys):
-    def call(*arguments, board="mega"):
-        code = main(["flash", "--board", board, *map(str, arguments)])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return code, out, err
-
-    return call
 
 
 @contextmanager

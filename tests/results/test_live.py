@@ -55,8 +55,11 @@ def test_all_drops_together_say_what_rig_analyze_says(session, rejected):
     view = live.read()
     assert view.lagging == (6 - len(rejected) >= FEWEST)
     if view.lagging:
+        alone = view.analysis.summary
         live.fit_jointly(view)
         view = live.read()
+        assert (view.fitted, view.lagging) == (6 - len(rejected), False)
+        assert view.analysis.summary != alone
     assert view.analysis.json() == whole(session).json()
     assert bool(view.analysis.with_rejected) == bool(rejected)
 

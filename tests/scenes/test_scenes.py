@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from tests.scenes.draw import Scene
 
+pytestmark = pytest.mark.usefixtures("analysed_once")
 DEAR = (18, 23, 24, 56)
 """Scenes that take several times as long as others."""
 FALLING = (63, 75, 85, 110)

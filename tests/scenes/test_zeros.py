@@ -15,6 +15,7 @@ from tests.analysis.sessions import analysis
 from tests.scenes.draw import Scene
 from tests.scenes.through import faults
 
+pytestmark = pytest.mark.usefixtures("analysed_once")
 GATES = (
     "[{channel: %d, height: 25 mm}, {channel: %d, height: 80 mm}, {channel: %d, height: 130 mm}]"
 )

@@ -32,16 +32,26 @@ _PYTHON = re.compile(
 )
 """How Python writes what is no text, in a key or a value."""
 _EXPONENT = re.compile(r"±\s*[\d.]+e[+-]?\d+")
-_STRUNG = (r"\bchains?\b", r"\brods?\b", r"\bhangs?\b", r"\bhanging\b", "free side")
+_STRUNG = (r"\bchains?\b", r"\brods?\b", r"\bhangs?\b", r"\bhanging\b", r"\bhung\b", "free side")
 _OTHERS = {
     "object": (*_STRUNG, "glider"),
     "track": _STRUNG,
     "picket-fence": (*_STRUNG, "glider"),
-    "free-chain": ("glider",),
+    "free-chain": ("glider", r"\bfence"),
 }
 """Words of other scenes that strike nothing."""
-_PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous")
-_IMPACT = ("inclin", "impact", "strike", "restitution", "friction", "α", "surface", " V ")
+_PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous", "both chains")
+_IMPACT = (
+    "inclin",
+    "impact",
+    "strike",
+    r"\bstruck",
+    "restitution",
+    "friction",
+    "α",
+    "surface",
+    " V ",
+)
 
 
 class TooLongError(BaseException):
@@ -63,7 +73,8 @@ def lacking(scene: Scene) -> tuple[str, ...]:
         words = (*_PAIR, *_IMPACT, *_OTHERS[scene.protocol.vocabulary.scene], "pile")
         of_tracks = () if scene.protocol.track is None else ("inclin", "friction")
         return tuple(word for word in words if word not in of_tracks)
-    words = () if scene.protocol.two_chains else (*_PAIR, "free side", "free chain")
+    words = _OTHERS["free-chain"]
+    words += () if scene.protocol.two_chains else (*_PAIR, "free side", "free chain")
     if all(rods.chain.alpha is not None for rods in scene.protocol.chains.values()):
         return (*words, "restitution", "friction", "pile")
     return (*words, "pile") if surface.pile is None else words
@@ -194,7 +205,8 @@ class _Journey:
         """Look for what the scene does not have in what a command says."""
         text = text.replace(self.scene.protocol.title, "").replace(SOFTWARE, "")
         text = re.sub(r"(?m)^  hang  ", "", text)  # the prior's name, as protocols have it
-        for word in self.lacking:
+        plan = command in {"check", "predict", "design"} and self.scene.protocol.surface
+        for word in (*self.lacking, *(["the object"] if plan else [])):
             if met := re.search(word, text, re.IGNORECASE if len(word) > 3 else re.NOFLAG):
                 self.fault(command, f"speaks of {word!r}: {_around(text, met)}")
         if _NO_NUMBER.search(text):

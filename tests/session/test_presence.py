@@ -215,12 +215,3 @@ def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
     simulated = Controller("sim://")
     simulated.open_session(str(protocol), str(session))
     simulated.close()
-
-
-def test_a_scene_without_gates_makes_no_session(tmp_path):
-    protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
-    text = FENCE.replace("RUNS", "1")
-    protocol.write_text(text[: text.index("gates:")] + text[text.index("release:") :], "utf-8")
-    with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
-        Controller("sim://").open_session(str(protocol), str(session))
-    assert not session.exists()

@@ -37,9 +37,13 @@ async def stops(op, key):
         await op.until(lambda: "stop answered" in called)
 
 
-def test_stop_works_in_every_dialog(lab):
+def test_stop_works_on_every_page_and_in_every_dialog(lab):
     async def work():
         async with lab.ready() as op:
+            for page in "123456":
+                await op.press(page)
+                await stops(op, "f9")
+            await op.press("3")
             for opens, dialog, key in (
                 ("l", Confirm, "f9"), ("l", Confirm, "escape"),
                 ("question_mark", Help, "f9"), ("question_mark", Help, "escape"),
