@@ -39,21 +39,34 @@ class BudgetLine(NamedTuple):
         Whether nobody has measured its size, unless a joint fit finds it.
     scale
         The component that a joint fit finds, whose degrees of freedom the line has.
+    known
+        What could be measured better, with the protocol's key; empty where nothing can.
     """
 
     common: bool = False
     guessed: bool = False
     scale: str = ""
+    known: str = ""
 
 
 BUDGET = {
     "edges": BudgetLine(scale="jitter"),
-    **dict.fromkeys(("clock", "gravity", "air", "drop height", "datum"), BudgetLine(common=True)),
-    "beam heights": BudgetLine(common=True, scale="gates"),
-    "side": BudgetLine(common=True, guessed=True),
-    "beam offsets": BudgetLine(common=True, guessed=True, scale="beam"),
-    "spacing": BudgetLine(common=True, scale="rods"),
-    "width": BudgetLine(common=True),
+    "clock": BudgetLine(common=True, known="the clock's rate"),
+    "gravity": BudgetLine(common=True, known="gravity (`gravity`)"),
+    "air": BudgetLine(common=True, known="the air's drag (`drag`)"),
+    "drop height": BudgetLine(common=True, known="the drop height (`drop`)"),
+    "datum": BudgetLine(common=True, known="the zero of each post (`datum_uncertainty`)"),
+    "beam heights": BudgetLine(
+        common=True, scale="gates", known="the heights of the beams (`height_uncertainty`)"
+    ),
+    "side": BudgetLine(
+        common=True, guessed=True, known="how much higher one side hangs (`priors: side`)"
+    ),
+    "beam offsets": BudgetLine(
+        common=True, guessed=True, scale="beam", known="the aim of the beams (`beam_offset`)"
+    ),
+    "spacing": BudgetLine(common=True, scale="rods", known="the spacing (`position_uncertainty`)"),
+    "width": BudgetLine(common=True, known="the width (`width_uncertainty`)"),
     "start height": BudgetLine(guessed=True, scale="hang"),
     "swing": BudgetLine(guessed=True, scale="swing"),
     "single impulses": BudgetLine(guessed=True, scale="impulse"),

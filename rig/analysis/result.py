@@ -154,8 +154,8 @@ class DropResult:
         For each matched edge (by its number in the drop) its rod, bottom rod 0.
     scatter
         How much more than assumed the edges scatter, at least 1; `None` when nothing was fitted.
-    learned
-        Whether the quantities are in the light of the whole session.
+    alone
+        What the drop says by itself, where the quantities are in the light of the whole session.
     unmatched
         Every edge that is missing or belongs to no rod, and why.
     limits
@@ -176,12 +176,17 @@ class DropResult:
     quantities: Mapping[str, Measured] = field(default_factory=dict)
     matches: Mapping[int, int] = field(default_factory=dict)
     scatter: float | None = None
-    learned: bool = False
+    alone: Mapping[str, Measured] = field(default_factory=dict)
     unmatched: tuple[UnmatchedEdge, ...] = ()
     limits: Verdict | None = None
     damaged: bool = False
     last_passages: Mapping[str, Measured] = field(default_factory=dict)
     gates: tuple[GatePassage, ...] = ()
+
+    @property
+    def learned(self) -> bool:
+        """Whether the quantities are in the light of the whole session."""
+        return bool(self.alone)
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
@@ -204,6 +209,8 @@ class DropResult:
         if self.last_passages:
             found["last_passages"] = {n: one.json() for n, one in self.last_passages.items()}
         found["learned"] = self.learned
+        if self.learned:
+            found["alone"] = {name: value.json() for name, value in self.alone.items()}
         found["verdict"] = self.verdict
         found |= reasons_json(self.reasons)
         found["degrees"] = {

@@ -284,7 +284,7 @@ def _fit_jointly(
             quantities=budgets.measured(drop),
             gates=budgets.gates(drop),
             matches=drop.rods,
-            learned=True,
+            alone=found[n].quantities,
             unmatched=unmatched,
         )
     return found, joint, dict(zip(keys, joint.drops, strict=True)), False

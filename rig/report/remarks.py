@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.likeness import likeness
 from rig.analysis.result import Measured
-from rig.measurands import averaged
+from rig.measurands import averaged, told
 from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import decimals_for, fixed, plus_minus, ranges, signed
+from rig.results.improvements import improvements
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +34,9 @@ def remarks(results: SessionResults) -> list[str]:
     return [
         *([_ALONE] if results.analysis.unsettled else []),
         *model_lines(joint),
+        *alone_lines(results.analysis),
         *common_lines(results.analysis.summary),
+        *(one.sentence for one in improvements(results.analysis.summary)),
         *clock_lines(results.calibration),
         *air_lines(None if in_air else joint),  # predictions are made in stated air
     ]
@@ -53,6 +56,23 @@ def common_lines(summary: Sequence[Incline]) -> list[str]:
     return [
         f"These means share systematic errors ({', '.join(causes)}). "
         "More runs will not reduce them."
+    ]
+
+
+def alone_lines(analysis: Analysis) -> list[str]:
+    """Set what the last good run says by itself beside what it says among all, and say why."""
+    runs = [run for run in analysis.runs if run.learned]
+    row = next((row for row in told() if runs and row.name in runs[-1].alone), None)
+    if row is None:
+        return []
+    last = runs[-1]
+    alone, among = (
+        f"{row.symbol} {plus_minus(where[row.name], row.scale, row.decimals)} {row.unit}"
+        for where in (last.alone, last.quantities)
+    )
+    return [
+        f"By itself run {last.run.number} says {alone}, among all {len(runs)} runs {among}: "
+        "together they tell what is off in every run, and how much runs scatter."
     ]
 
 

@@ -50,7 +50,7 @@ def veiled_drop(result: DropResult) -> DropResult:
         unmatched=(),
         last_passages={},
         gates=(),
-        learned=False,
+        alone={},
     )
 
 

@@ -12,6 +12,7 @@ from rig.protocol import reader
 from rig.reasons import notes_in
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
+from rig.results.improvements import improvements
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ class SessionResults:
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
         head |= {"blind": True} if self.blind else {}
-        return head | {"calibration": self.calibration} | said
+        better = [one.json() for one in improvements(self.analysis.summary)]
+        return head | {"calibration": self.calibration} | said | {"measure_next": better}
 
 
 def protocol_of(session: Reader) -> Protocol:
