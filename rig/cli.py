@@ -269,7 +269,7 @@ def _parser() -> Parser:
     imported.add_argument(
         "--protocol", required=True, metavar="FILE", help="the protocol of these drops"
     )
-    imported.add_argument("--session", metavar="FILE", help="the new session")
+    imported.add_argument("-o", "--session", metavar="FILE", help="the new session")
     imported.add_argument(
         "--dry-run", action="store_true", help="show how the file is read, without a session"
     )

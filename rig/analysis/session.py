@@ -13,6 +13,7 @@ from rig.analysis.pairs import Effects, effects
 from rig.analysis.refine import Budgets
 from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
+from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
 from rig.errors import InputError
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
@@ -237,13 +238,17 @@ def _fit_jointly(
     """Give good drops the numbers that they have in the light of all of them.
 
     A verdict is on a drop by itself, by limits fixed beforehand: what others say of the rig
-    changes its numbers and never whether they count. One that loses its edges among the others
-    keeps the numbers that it has by itself, and is left out.
+    changes its numbers and not whether they count, but for a release so near the limit that the
+    drop alone cannot tell. One that loses its edges among the others keeps the numbers that it has
+    by itself, and is left out.
     """
+    limit = protocol.accept.release_skew
     good = {
         n: fit
         for n, (result, fit) in enumerate(zip(results, fits, strict=True))
-        if fit is not None and result.verdict in GOOD and fit.estimate.settled
+        if fit is not None
+        and fit.estimate.settled
+        and (result.verdict in GOOD or nearly_in_time(result, limit))
     }
     found = list(results)
     joint, unsettled = None, False
@@ -272,19 +277,33 @@ def _fit_jointly(
             found[n] = replace(found[n], reasons=(*found[n].reasons, why))
             del good[n]
             joint = None
-    keys = [(results[n].run.number, results[n].attempt) for n in good]
     if joint is None:
-        return found, None, dict(zip(keys, good.values(), strict=True)), unsettled
+        return found, None, _good(found, good), unsettled
     budgets = Budgets(joint)
     for n, drop in zip(good, joint.drops, strict=True):
-        unmatched = unmatched_edges(drop)
+        unmatched, measured = unmatched_edges(drop), budgets.measured(drop)
+        reasons = [one for one in found[n].reasons if not one.code.startswith("release_skew")]
+        reasons += release_reasons(protocol, measured)
         found[n] = replace(
             found[n],
+            verdict=verdict_of(reasons),
+            reasons=tuple(reasons),
             audit=found[n].audit.count(drop.matched, count_unexplained(unmatched)),
-            quantities=budgets.measured(drop),
+            quantities=measured,
             gates=budgets.gates(drop),
             matches=drop.rods,
             alone=found[n].quantities,
             unmatched=unmatched,
         )
-    return found, joint, dict(zip(keys, joint.drops, strict=True)), False
+    return found, joint, _good(found, dict(zip(good, joint.drops, strict=True))), False
+
+
+def _good(
+    results: Sequence[DropResult], adjusted: Mapping[int, Fit | JointDrop]
+) -> dict[tuple[int, int], Fit | JointDrop]:
+    """Return those of some adjusted drops that are good, by run and attempt."""
+    return {
+        (results[n].run.number, results[n].attempt): drop
+        for n, drop in adjusted.items()
+        if results[n].verdict in GOOD
+    }

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.fit import Fit
     from rig.analysis.identify import Identification
-    from rig.analysis.result import Audit, Measured, Verdict
+    from rig.analysis.result import Audit, DropResult, Measured, Verdict
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
     from rig.vocabulary import Vocabulary
@@ -173,9 +173,28 @@ def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> 
         yield _many_missed("edges_missed", words, audit, accept.missed_edges)
     if audit.unexplained > _most_unexplained(audit.received, accept.unexplained_edges):
         yield _many_unexplained("edges_unexplained", words, audit, accept.unexplained_edges)
-    skew = found.get("release_skew_s")
-    if skew is not None and _too_late(skew, accept.release_skew):
-        yield make_reason("release_skew", skew_s=skew.value, limit_s=accept.release_skew)
+    yield from (one for one in release_reasons(protocol, found) if one.severity is Severity.VOID)
+
+
+def release_reasons(protocol: Protocol, found: Mapping[str, Measured]) -> tuple[Reason, ...]:
+    """Say that releases were too far apart, or that nobody can tell; nothing where all is well."""
+    skew, limit = found.get("release_skew_s"), protocol.accept.release_skew
+    if skew is None:
+        return ()
+    near = abs(abs(skew.value) - limit) < skew.expanded
+    code = "release_skew" if _too_late(skew, limit) else "release_skew_near" if near else ""
+    return (make_reason(code, skew_s=skew.value, limit_s=limit),) if code else ()
+
+
+def nearly_in_time(result: DropResult, limit: float) -> bool:
+    """Whether a drop is void for its release alone, and by no more than that is uncertain."""
+    if result.verdict != "void":
+        return False
+    void = [reason.code for reason in result.reasons if reason.severity is Severity.VOID]
+    if void != ["release_skew"]:
+        return False
+    skew = result.quantities["release_skew_s"]
+    return abs(skew.value) - skew.expanded < limit
 
 
 def _too_late(skew: Measured, limit: float) -> bool:
@@ -229,11 +248,7 @@ def _doubts(
         yield _many_missed("edges_missed_few", words, audit, missed)
     if unexplained * audit.received < audit.unexplained <= _PULSE:
         yield _many_unexplained("edges_unexplained_few", words, audit, unexplained)
-    skew = found.get("release_skew_s")
-    limit = protocol.accept.release_skew
-    near = skew is not None and abs(abs(skew.value) - limit) < skew.expanded
-    if skew is not None and near and not _too_late(skew, limit):
-        yield make_reason("release_skew_near", skew_s=skew.value, limit_s=limit)
+    yield from (one for one in release_reasons(protocol, found) if one.severity is Severity.DOUBT)
     if estimate.scatter > RESTLESS:
         yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:

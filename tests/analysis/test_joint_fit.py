@@ -10,11 +10,13 @@ import pytest
 
 from bench.studies.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.analysis.components import LEAST_SHARE, above
+from rig.analysis.drop import fit_drop
 from rig.analysis.equations import STRAY, linearize
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.quantities import measurands
 from rig.analysis.refine import Budgets
+from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
 from rig.model.chain import Chain
 from rig.model.impact import impact_on
@@ -290,6 +292,23 @@ def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
     )
     assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 5
     assert len(rejected.joint.drops) == 7
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it(seed):
+    drops = cases(FOUR, seed=seed)
+    runs = analysis(drops).runs
+    latest = max(runs, key=lambda one: abs(one.alone["release_skew_s"].value))
+    sizes = [abs(each["release_skew_s"].value) for each in (latest.alone, latest.quantities)]
+    # The limit lies between what the drop says by itself and what it says among all.
+    scene = replace(UNIFORM, accept=replace(UNIFORM.accept, release_skew=sum(sizes) / 2.0))
+    n = runs.index(latest)
+    alone, _ = fit_drop(scene, drops[n].run, drops[n].drop, drops[n].scale)
+    among = analysis([replace(one, protocol=scene) for one in drops])
+    assert (alone.verdict in GOOD) is (sizes[0] < sizes[1])
+    assert (among.runs[n].verdict in GOOD) is (sizes[1] < sizes[0])
+    assert ((latest.run.number, 1) in among.adjusted) is (sizes[1] < sizes[0])
+    assert among.runs[n].learned
 
 
 @pytest.mark.parametrize("scene", ["single", "fence"])
