@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.drop_model import prior_air
 from rig.estimate.hypotheses import (
     ALPHA,
     BETA,
@@ -184,14 +185,9 @@ def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
 
 
 def nuisances(protocol: Protocol, found: CoefficientProblem, inner: Hypothesis) -> Hypothesis:
-    """Add where the contact point is at each incline, and drag where a free chain tells it."""
+    """Add where the contact point is at each incline, and the air."""
     added = with_contact(inner, found.inclines, (0.0, CONTACT_U))
-    return with_drag(added) if has_drag(protocol, found) else added
-
-
-def has_drag(protocol: Protocol, found: CoefficientProblem) -> bool:
-    """Whether drag can be told: by a free chain, of chains that slow down alike."""
-    return protocol.two_chains and all(form.chain.alike for form in found.forms)
+    return with_drag(added, prior_air(protocol))
 
 
 def best(protocol: Protocol, found: CoefficientProblem) -> HypothesisFit:

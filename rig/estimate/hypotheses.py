@@ -170,9 +170,9 @@ def with_contact(
     return _with(inner, parameters, 0, lambda form: inclines.index(form.run.incline_deg))
 
 
-def with_drag(inner: Hypothesis) -> Hypothesis:
-    """Suppose air that slows every rod alike, by κv²."""
-    return _with(inner, (Parameter(AIR, 0.0),), 1, lambda _: 0)
+def with_drag(inner: Hypothesis, prior: tuple[float, float]) -> Hypothesis:
+    """Suppose air of a κ that is known so well beforehand."""
+    return _with(inner, (Parameter(AIR, prior[0], prior),), 1, lambda _: 0)
 
 
 def _with(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.comparison import compare
+from rig.analysis.drop_model import prior_air
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.summary import good_cases
 from rig.analysis.unknowns import SharedUnknowns
@@ -116,7 +117,7 @@ class Coefficients:
     contact
         One an incline.
     drag
-        κ in g − κv², 1/m; `None` where it is not fitted.
+        κ in g − κv², 1/m; `None` where the edges tell it no better than the protocol.
     chi2
         Of the edges.
     """
@@ -274,7 +275,7 @@ def _coefficients(
     protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
-    names = list(found.stated)
+    names, drag = list(found.stated), Measured(*outcome[AIR])
     told = posterior(protocol, found, outcome) if names else None
     return Coefficients(
         tuple(_coefficient(name, found, outcome, told) for name in names) if told else (),
@@ -284,7 +285,7 @@ def _coefficients(
             ContactPoint(incline, Measured(*outcome[f"contact {incline:g}"]))
             for incline in found.inclines
         ),
-        Measured(*outcome[AIR]) if AIR in outcome else None,
+        drag if drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,
     )
 

@@ -82,7 +82,7 @@ def _coefficients(heading: str, found: SessionEstimate) -> Part | None:
     words = [f"{left}." for left in found.left_out or ()]
     told = found.coefficients
     if told is not None and told.parameters:
-        words += _coefficient_words(told, free_chain=found.free_chain)
+        words += _coefficient_words(told)
         return Part(heading, words, _COEFFICIENTS, told.parameters)
     return Part(heading, words) if words else None
 
@@ -140,7 +140,7 @@ def _single_impulses(heading: str, found: SessionEstimate) -> Part | None:
     return Part(heading, (), _RODS, lines, folded) if lines else None
 
 
-def _coefficient_words(told: Coefficients, *, free_chain: bool) -> Iterator[str]:
+def _coefficient_words(told: Coefficients) -> Iterator[str]:
     names = [symbol(one.name) for one in told.parameters]
     pairs = [
         f"{one} and {other} {fixed(told.correlation[i, j], 2)}"
@@ -159,8 +159,8 @@ def _coefficient_words(told: Coefficients, *, free_chain: bool) -> Iterator[str]
         if abs(value) > expanded:
             said = "which slows the chains" if value > 0 else "negative, which air cannot cause"
         yield f"Air: κ = ({plus_minus(told.drag, 1e3)})·10⁻³ /m in g − κv², {said}."
-    elif free_chain:
-        yield "Air drag is not fitted: this needs a free chain and identical rods."
+    else:
+        yield "Air: the edges tell κ no better than the protocol does."
 
 
 def symbol(name: str) -> str:

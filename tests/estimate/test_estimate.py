@@ -23,7 +23,7 @@ from rig.report.estimate import estimate_text
 from rig.sections import Sections
 from rig.units import Quantity
 from sim.dials import Dials
-from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
+from tests.analysis.drops import FENCE, SCENES, SINGLE, UNIFORM, case
 from tests.analysis.sessions import analysis as analyzed
 from tests.analysis.sessions import cases
 from tests.estimate.sessions import BETA, DIALS, MU, analysis, forms
@@ -101,13 +101,20 @@ def test_contact_and_air_are_found_where_they_are(found):
     assert abs(found["drag_per_m"]["value"]) < 4 * found["drag_per_m"]["u"]
 
 
-def test_air_is_found_and_takes_nothing_from_the_coefficients():
-    """κ of light rods: a tenth of g at 5 m/s. β and μ are those of the truth all the same."""
-    found = estimate(UNIFORM, analysis(SURFACE, 4, 2, replace(DIALS, drag=0.04))).json()
-    drag = found["drag_per_m"]
-    assert abs(drag["value"] - 0.04) < 4 * drag["u"] < 1e-3
-    for name, truth in (("restitution", BETA), ("friction", MU)):
-        one = parameter(found, name)["least_squares"]
+@pytest.mark.parametrize("name", ["uniform", "graded", "single"])
+@pytest.mark.parametrize("drag", [0.0, 0.04])
+def test_air_takes_nothing_from_the_coefficients(name, drag):
+    """κ of light rods: a tenth of g at 5 m/s. It is stated nowhere, and chains may be unlike."""
+    plan = replace(SCENES[name].plan, inclines=SURFACE, repeats=4)
+    scene, dials = replace(SCENES[name], plan=plan), replace(DIALS, drag=drag)
+    drops = [case(scene, dials, run=run.number) for run in runs(scene)]
+    session = analyze(scene, [one.drop for one in drops], lambda _: drops[0].scale)
+    found = estimate(scene, session).json()
+    air = found["drag_per_m"]
+    assert abs(air["value"] - drag) < 4 * air["u"]
+    assert name == "single" or air["u"] < 2.5e-4  # which a free chain tells
+    for what, truth in (("restitution", BETA), ("friction", MU)):
+        one = parameter(found, what)["least_squares"]
         assert abs(one["value"] - truth) < 4 * one["u"]
 
 
@@ -203,7 +210,7 @@ def test_curves_end_at_the_results():
 def test_one_chain_and_few_drops_are_estimated_too():
     found = estimate(SINGLE, analyzed(cases((1, 2), scene="single"))).json()
     assert found["drops"] == 2
-    assert found["drag_per_m"] is None
+    assert abs(found["drag_per_m"]["value"]) < 4 * found["drag_per_m"]["u"]
     assert "separation_m" not in found["curves"][0]
     (line,) = found["alpha"]["inclines"]
     truth = alpha_inclined(0.5, 0.2, 40.0)
