@@ -64,7 +64,8 @@ def main(arguments: Namespace) -> int:
         for drop in drops:
             session.add_drop(drop, host_ns=None, provenance=events)
             session.add_state(drop.run, drop.attempt, RunState.RECORDED, now_ns)
-    say(f"{edges} edges of {len(drops)} runs → {arguments.session}")
+    runs = f"{len(drops)} run{'s' if len(drops) > 1 else ''}"
+    say(f"{edges} edges of {runs} → {arguments.session}")
     return 0
 
 

@@ -275,7 +275,8 @@ def _coefficients(
     protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
-    names, drag = list(found.stated), Measured(*outcome[AIR])
+    names = list(found.stated)
+    drag = Measured(*outcome[AIR]) if AIR in outcome else None
     told = posterior(protocol, found, outcome) if names else None
     return Coefficients(
         tuple(_coefficient(name, found, outcome, told) for name in names) if told else (),
@@ -285,7 +286,7 @@ def _coefficients(
             ContactPoint(incline, Measured(*outcome[f"contact {incline:g}"]))
             for incline in found.inclines
         ),
-        drag if drag.u < of.FOUND * prior_air(protocol)[1] else None,
+        drag if drag and drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,
     )
 

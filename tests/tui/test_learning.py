@@ -146,8 +146,6 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
             await op.sees("abba.session", "4 drops", "broken.session")
             await op.press("down", "enter")
             await op.sees("drop 1 of 4", "abba.session")
-            await op.press("5", "y")
-            await op.sees("joint fit of 4 runs", "g in free fall", "check heights")
             await op.press("6", "g")
             await op.sees("Drops of this session", "run 4, attempt 1")
             await op.press("end", "enter")
@@ -156,5 +154,18 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
             await op.sees("broken.session")
             await op.press("home", "enter")
             await op.sees("✗", "drop 4 of 4")
+
+    run(work())
+
+
+def test_the_session_page_says_how_many_taught_each_other(recorded):
+    async def work():
+        app = RigApp(Options(session=recorded, offline=True), KEYS)
+        async with app.run_test(size=(120, 36)) as pilot:
+            op = Operator(app, pilot)
+            await op.press("5")
+            await op.sees("joint fit of 4 runs", "release skew")
+            await op.press("y")
+            await op.sees("g in free fall", "check heights")
 
     run(work())
