@@ -58,15 +58,7 @@ class _Passages(NamedTuple):
 
     def only(self, chosen: Flags) -> _Passages:
         """Leave out the others."""
-        return _Passages(
-            self.times[chosen],
-            self.heights[chosen],
-            self.gate[chosen],
-            self.rod[chosen],
-            self.sigma[chosen],
-            self.sign[chosen],
-            self.landed[chosen],
-        )
+        return _Passages(**{name: part[chosen] for name, part in self._asdict().items()})
 
 
 def last_passages(fit: Fit) -> dict[str, Measured]:

@@ -167,8 +167,8 @@ class Adjusted:
         """
         model, x, at = self.model, self.x, self.model.unknowns
         path = model.trajectory("impact", x)
-        speed, d_speed = path.arrival, model.spread("impact", path.d_arrival)
-        hit, d_hit = float(path.time[-1]), model.spread("impact", path.d_time[-1])
+        speed, d_speed = path.arrival, model.spread("impact", path.slopes.arrival)
+        hit, d_hit = float(path.time[-1]), model.spread("impact", path.slopes.time[-1])
         if "stretch" in at:
             modes = model.discrepancy.top(-model.records["impact"].strikes[-1:])
             way, rate, sizes = modes.way[0], modes.rate[0], model.stretch(x)

@@ -242,7 +242,7 @@ def _fit_jointly(
     drop alone cannot tell. One that loses its edges among the others keeps the numbers that it has
     by itself, and is left out.
     """
-    limit = protocol.accept.release_skew
+    limit, words = protocol.accept.release_skew, protocol.vocabulary
     good = {
         n: fit
         for n, (result, fit) in enumerate(zip(results, fits, strict=True))
@@ -258,20 +258,13 @@ def _fit_jointly(
             joint, unsettled = None, True
             break
         fewer = {
-            n: make_reason(
-                "differs_from_session",
-                protocol.vocabulary,
-                matched=drop.matched,
-                alone=fit.matched,
-            )
+            n: make_reason("differs_from_session", words, matched=drop.matched, alone=fit.matched)
             for (n, fit), drop in zip(good.items(), joint.drops, strict=True)
             if drop.matched < _KEPT * fit.matched
         }
         if 2 * len(fewer) > len(good):
-            joint, unsettled = (
-                None,
-                True,
-            )  # it is the adjustment that fails, and no drop is to blame for that
+            # It is the adjustment that fails, and no drop is to blame for that.
+            joint, unsettled = None, True
             break
         for n, why in fewer.items():
             found[n] = replace(found[n], reasons=(*found[n].reasons, why))

@@ -97,26 +97,6 @@ class Trajectory:
         """Speed just before the last impact, m/s; zero where nothing is struck."""
         return 0.0 if self.hits is None else float(self.hits.arrival[-1])
 
-    @property
-    def d_time(self) -> Array:
-        """Derivatives by release time, start, gravity, … , shape ``(legs, parameters)``."""
-        return self._slopes.time
-
-    @property
-    def d_height(self) -> Array:
-        """Derivatives likewise."""
-        return self._slopes.height
-
-    @property
-    def d_speed(self) -> Array:
-        """Derivatives likewise."""
-        return self._slopes.speed
-
-    @property
-    def d_arrival(self) -> Array:
-        """Derivatives of `arrival`, shape ``(parameters,)``."""
-        return self._slopes.arrival
-
     def heights(self, times: Array) -> tuple[Array, Array]:
         """Height of the reference point and its speed (downward positive), shape of `times`."""
         leg, since = self._legs(times)
@@ -141,7 +121,7 @@ class Trajectory:
     def sights(self, times: Array, by: Array | None = None) -> tuple[Array, Array, Array]:
         """What `heights` and `derivatives` say, with every leg gone through once."""
         leg, since = self._legs(times)
-        slopes = self._slopes
+        slopes = self.slopes
         fallen, speed, by_speed, by_gravity, by_kappa = leg_slopes(
             since, self.speed[leg], self.gravity, self.kappas(leg)
         )
@@ -193,7 +173,7 @@ class Trajectory:
         return leg, np.maximum(times - self.time[leg], 0.0)
 
     @cached_property
-    def _slopes(self) -> Slopes:
+    def slopes(self) -> Slopes:
         """All derivatives; whoever only asks where the chain is does without them."""
         if self.hits is None:
             time, height, speed = (np.zeros((1, COMMON)) for _ in range(3))

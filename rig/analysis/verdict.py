@@ -190,8 +190,7 @@ def nearly_in_time(result: DropResult, limit: float) -> bool:
     """Whether a drop is void for its release alone, and by no more than that is uncertain."""
     if result.verdict != "void":
         return False
-    void = [reason.code for reason in result.reasons if reason.severity is Severity.VOID]
-    if void != ["release_skew"]:
+    if {one.code for one in result.reasons if one.severity is Severity.VOID} != {"release_skew"}:
         return False
     skew = result.quantities["release_skew_s"]
     return abs(skew.value) - skew.expanded < limit

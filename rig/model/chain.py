@@ -49,11 +49,6 @@ class Chain:
         return len(self.masses)
 
     @property
-    def alike(self) -> bool:
-        """Whether all rods have one mass: air then slows the chain alike, whichever still fall."""
-        return len(set(self.masses)) == 1
-
-    @property
     def length(self) -> float:
         """Middle of the bottom rod to the middle of the top rod, m."""
         return self.heights[-1]

@@ -121,10 +121,10 @@ def test_values_are_those_of_the_model_room(kappa):
 def test_derivatives_of_times_heights_speeds_and_arrival(kappa):
     there = in_air(kappa)
     path = struck(there)
-    near(path.d_time, derivatives(lambda exact: exact.time, there), kappa)
-    near(path.d_height, derivatives(lambda exact: exact.height, there), kappa)
-    near(path.d_speed, derivatives(lambda exact: exact.speed, there), kappa)
-    near(path.d_arrival, derivatives(lambda exact: [exact.arrival], there)[0], kappa)
+    near(path.slopes.time, derivatives(lambda exact: exact.time, there), kappa)
+    near(path.slopes.height, derivatives(lambda exact: exact.height, there), kappa)
+    near(path.slopes.speed, derivatives(lambda exact: exact.speed, there), kappa)
+    near(path.slopes.arrival, derivatives(lambda exact: [exact.arrival], there)[0], kappa)
 
 
 def near(found, expected, kappa) -> None:
@@ -166,11 +166,11 @@ def test_free_fall_has_the_closed_form():
     close(speeds, gravity * since)
     expected = [gravity * since, since**0, -(since**2) / 2, gravity**2 * since**4 / 12]
     close(path.derivatives(times), np.stack(expected, axis=1))
-    close(path.d_time, [[1, 0, 0, 0]])
-    close(path.d_height, [[0, 1, 0, 0]])
-    assert not path.d_speed.any()
+    close(path.slopes.time, [[1, 0, 0, 0]])
+    close(path.slopes.height, [[0, 1, 0, 0]])
+    assert not path.slopes.speed.any()
     assert path.arrival == 0.0
-    assert not path.d_arrival.any()
+    assert not path.slopes.arrival.any()
 
 
 @pytest.mark.parametrize("kappa", [0.0, 0.03])

@@ -34,7 +34,7 @@ def added(monkeypatch):
         struck, free = model.trajectory("impact", x), model.trajectory("free", x)
         since = float(struck.time[-1] - free.time[0])
         gravity = model.protocol.gravity.value
-        gradient = gravity * model.spread("impact", struck.d_time[-1])
+        gradient = gravity * model.spread("impact", struck.slopes.time[-1])
         gradient[model.unknowns["free release"]] -= gravity
         return (gravity * since) ** 2 / 2.0, gravity * since * gradient
 
