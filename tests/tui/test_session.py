@@ -188,6 +188,7 @@ def test_leaving_does_not_stop_what_falls(lab):
             await again.until(lambda: again.app.flow.job == job)
             await again.at(Stage.RESULT)
             await again.sees("ACCEPTED")
+            await again.until(lambda: again.app.state.line(job.run).state == "accepted")
 
     run(work())
     assert log_of(lab.session)[1][-1][1] is RunState.ACCEPTED
