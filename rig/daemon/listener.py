@@ -69,10 +69,16 @@ class Door:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._ours = identity_of(path)
+        self._lost = False
 
     def there(self) -> bool:
-        """Whether clients still find this daemon by it."""
-        return identity_of(self.path) == self._ours
+        """Whether clients still find this daemon by it; a file that was lost never comes back.
+
+        What stands there later is another daemon's, though the file system may give it the number
+        that this one's had.
+        """
+        self._lost = self._lost or identity_of(self.path) != self._ours
+        return not self._lost
 
     def remove(self) -> None:
         """Take it away, unless another daemon's is in its place."""

@@ -102,6 +102,16 @@ def test_many_late_stamps_are_remarked(late, verdict):
         assert only_reason(result, verdict).text == "133 time stamps may be late"
 
 
+@pytest.mark.parametrize(("glitches", "verdict"), [(13, "accepted"), (14, "marginal")])
+def test_many_short_pulses_are_remarked(glitches, verdict):
+    """A fiftieth of 660 is 13.2."""
+    certificate = Certificate(events=660, crc32=0, glitches=glitches)
+    result = replace(QUIET, drop=replace(QUIET.drop, certificate=certificate)).analyze()
+    assert result.verdict == verdict
+    if verdict == "marginal":
+        assert only_reason(result, verdict).code == "short_pulses"
+
+
 def test_edges_that_scatter_are_remarked_and_widen_the_uncertainty():
     calm, jittery = (
         case(UNIFORM, with_dials(jitter_sd=sd), incline=40.0).analyze() for sd in (0.0, 1e-4)

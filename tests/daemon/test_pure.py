@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given
@@ -11,8 +12,10 @@ from hypothesis import strategies as st
 
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
+from rig.daemon.admission import CLIENTS, Admission
 from rig.daemon.client_protocol import Replica
 from rig.daemon.lease import LEASE_S, ControlError, Lease
+from rig.daemon.listener import Door
 from rig.daemon.stopper import Stopper
 from rig.errors import (
     DeviceError,
@@ -22,6 +25,7 @@ from rig.errors import (
     RigError,
     SessionError,
 )
+from rig.files import identity_of
 from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.controller import Controller
@@ -126,7 +130,8 @@ def test_one_client_has_control_until_it_is_not_heard():
     lease.require("one")
     time.now += 0.2
     assert lease.holder is None
-    lease.heard("one")  # nobody took it meanwhile
+    lease.require("one")  # nobody took it meanwhile, so that it goes on
+    lease.heard("one")
     assert lease.holder == "one"
     time.now += LEASE_S
     lease.take("two", "tui 2")
@@ -135,6 +140,44 @@ def test_one_client_has_control_until_it_is_not_heard():
     assert not lease.release("one")
     assert lease.release("two")
     assert lease.holder is None
+
+
+def test_who_gives_control_up_is_not_told_later_that_it_was_lost():
+    time = Time()
+    lease = Lease(time)
+    lease.take("one", "rig run 1")
+    time.now = LEASE_S
+    lease.take("two", "tui 2")
+    lease.heard("one")
+    with pytest.raises(ControlError, match="control was lost"):
+        lease.require("one")
+    assert not lease.release("one")
+    with pytest.raises(ControlError, match="take control first"):
+        lease.require("one")
+
+
+def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch):
+    """The next daemon's file may have the number that this one's had."""
+    place = tmp_path / "rig.sock"
+    place.touch()
+    door = Door(place)
+    same = identity_of(place)
+    place.unlink()
+    assert not door.there()
+    place.touch()
+    monkeypatch.setattr("rig.daemon.listener.identity_of", lambda _: same)
+    assert not door.there()
+    door.remove()
+    assert place.exists()
+
+
+def test_a_client_in_the_reserve_has_no_more_time_than_a_stranger():
+    admission, *clients = Admission(), *(Mock() for _ in range(CLIENTS + 1))
+    for client in clients:
+        admission.arrived(client)
+        assert admission.late(client)
+        admission.welcome(client)
+    assert [client for client in clients if admission.late(client)] == clients[-1:]
 
 
 def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
@@ -215,6 +258,13 @@ def test_stop_is_sent_five_times_unless_the_worker_takes_over(worker_comes, time
     stopper.ask()
     stopper._run()
     assert len(sent) == times
+
+
+def test_who_asks_for_stop_again_waits_until_that_one_has_left_too():
+    stopper = Stopper(lambda: True)  # never started: nothing leaves
+    stopper._left.set()  # of the time before
+    stopper.ask()
+    assert not stopper._left.is_set()
 
 
 def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
