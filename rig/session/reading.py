@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import contextmanager
+from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -33,6 +34,8 @@ UNBLINDED = "unblinded"
 """The one fact that may be added later."""
 MOST_EDGES = 1 << 22
 """Of a drop that no certificate bounds: no timer that works gives more in an hour."""
+_AT_ONCE = 256
+"""Rows that are fetched in one go."""
 _ALWAYS = {"created", "rig_version", "simulated", "origin", "protocol_sha256"}
 
 
@@ -224,14 +227,19 @@ class Reader:
 
     def _raw(self, table: str, which: str, *values: object) -> Iterator[tuple[Any, ...]]:
         """Read rows as they are; `table` and `which` are of this module only."""
+
+        def fetched() -> list[tuple[Any, ...]]:
+            with translated(self.path):
+                return cursor.fetchmany(_AT_ONCE)
+
         with translated(self.path):
             connection = self._opened()
             if self.readonly:
                 limit_steps(connection)
-            sql = f'SELECT * FROM "{table}" {which}'  # noqa: S608
-            # Not the cursor itself: it would be closed with this generator, which a traceback can
-            # keep alive until after the database.
-            yield from iter(connection.execute(sql, values).fetchone, None)
+            cursor = connection.execute(f'SELECT * FROM "{table}" {which}', values)  # noqa: S608
+        # No generator: where one is left half read, Python ends it by its own hand, and a Ctrl-C
+        # that comes meanwhile is shown and lost.
+        return chain.from_iterable(iter(fetched, []))
 
     def _rows(self, table: str, which: str = "", *values: object) -> Iterator[tuple[Any, ...]]:
         """Read rows, each of them checked.

@@ -6,6 +6,7 @@ import random
 import signal
 import sqlite3
 import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -99,6 +100,7 @@ def campaign(folder, numbers, longest_s, seed, pace):
     return session, ends
 
 
+@pytest.mark.slow
 def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path):
     int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
     cases = [(int_, term), (kill, kill), (term, kill, int_)]
@@ -216,6 +218,40 @@ def test_reading_that_was_broken_off_outlives_the_session(finished):
     next(log)
     session.close()
     log.close()  # anything raised here would be "ignored", and shown to the user
+
+
+def test_ctrl_c_at_any_line_of_reading_is_neither_shown_nor_lost(finished, monkeypatch):
+    """Where Python ends by its own hand what was left half read, an exception goes no further."""
+    lost, left = [], 0
+    monkeypatch.setattr(sys, "unraisablehook", lost.append)
+
+    def trace(frame, event, argument):
+        nonlocal left
+        left -= event == "line"
+        if not left:
+            sys.settrace(None)
+            signal.raise_signal(signal.SIGINT)
+        return trace
+
+    def read(session):
+        next(session.byte_log())
+        session.pulses(), session.states(1), session.latest_state(1), session.drop(1, 1)
+        return session.protocol_source
+
+    before = sys.gettrace()
+    with Session.open(finished.session, readonly=True) as session:
+        for line in count(1):
+            left, source = line, ""
+            try:
+                sys.settrace(trace)
+                source = read(session)
+            except KeyboardInterrupt:
+                continue
+            finally:
+                sys.settrace(before)
+            break
+    assert (lost, source) == ([], "short.yaml")
+    assert left > 0, "it was lost"
 
 
 # ------------------------------------------------- what keeps the signals waiting
