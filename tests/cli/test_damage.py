@@ -21,7 +21,7 @@ from tests.session.altering import unguarded
 pytestmark = pytest.mark.usefixtures("analysed_once")
 RUNS = 3
 HZ = 16_000_000
-PARTS = 100
+PARTS = 200
 OF_DROPS = {"drop", "edge", "bytes"}
 COMMANDS = {
     "analyze": (),

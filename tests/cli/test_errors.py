@@ -327,22 +327,25 @@ def test_streams_may_be_closed(finished, tmp_path, closed):
     assert done.stdout == ("" if closed == "1" else finished.table.out)
 
 
-@pytest.mark.parametrize("streams", [("stderr",), ("stdout", "stderr")])
 @pytest.mark.parametrize(
-    ("code", "arguments"),
+    ("code", "streams", "arguments"),
     [
-        (2, ("analyze", "PLACE/none")),
-        (2, ("check", "/none")),
-        (2, ("no-such-command",)),
-        (2, ()),
-        (0, ("check", "FENCE")),
-        (0, ("run", "FENCE", "--port", "sim://", "--session", "PLACE/s", "--yes")),
-        (0, ("daemon", "--port", "sim://", "--socket", "PLACE/d/s", "--idle-timeout", "0.1")),
-        (0, ("new", "PLACE/new.yaml", "--scene", "object", "--yes")),
+        (2, ("stderr",), ("check", "/none")),
+        (2, ("stdout", "stderr"), ("no-such-command",)),
+        (2, ("stdout", "stderr"), ()),
+        (0, ("stderr",), ("check", "FENCE")),
+        (0, ("stdout", "stderr"), ("check", "FENCE")),
+        (0, ("stderr",), ("run", "FENCE", "--port", "sim://", "--session", "PLACE/s", "--yes")),
+        (
+            0,
+            ("stdout", "stderr"),
+            ("daemon", "--port", "sim://", "--socket", "PLACE/d/s", "--idle-timeout", "0.1"),
+        ),
+        (0, ("stdout", "stderr"), ("new", "PLACE/new.yaml", "--scene", "object", "--yes")),
     ],
 )
 def test_a_command_that_nobody_listens_to_keeps_its_exit_code(
-    tmp_path, fence, code, arguments, streams
+    tmp_path, fence, code, streams, arguments
 ):
     """As before ``| head -1``: Python tries to write once more as it ends, and exits with 120."""
     names = {"PLACE": str(tmp_path), "FENCE": str(fence)}

@@ -7,20 +7,27 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from bench.faults import CONTENTION, KINDS, NOISE, OFF_S, disturbed
+from bench.faults import CONTENTION, NOISE, OFF_S, disturbed
 from bench.invariants import broken
 from rig.errors import SessionError
 from rig.link.messages import Phase
 from rig.session.store import Session
 
 
-def test_nothing_is_lost_whatever_dies():
-    kinds = [kind for kind in KINDS if kind != "reset"]  # a brown-out is one, and more
-    with ThreadPoolExecutor(len(kinds) + len(CONTENTION) + 1) as pool:
+@pytest.mark.parametrize(
+    ("kinds", "contention"),
+    [
+        (("daemon", "brownout"), ()),
+        pytest.param(("runner", "cable", "disk"), CONTENTION, marks=pytest.mark.slow),
+    ],
+)
+def test_nothing_is_lost_whatever_dies(kinds, contention):
+    """Of the others: tests/daemon/test_state_space.py, test_control.py, and a full disk below."""
+    with ThreadPoolExecutor(len(kinds) + len(contention) + 1) as pool:
         noise = pool.submit(disturbed, "daemon", 0, 5, runs=1, dials=NOISE)
         made = [pool.submit(disturbed, kind, 1, 7, runs=1) for kind in kinds]
-        contention = [pool.submit(make, 1, 9) for make in CONTENTION.values()]
-        for tally in (one.result() for one in (noise, *made, *contention)):
+        raced = [pool.submit(CONTENTION[name], 1, 9) for name in contention]
+        for tally in (one.result() for one in (noise, *made, *raced)):
             assert tally.broken == []
             assert tally.longest_on_s <= OFF_S
         assert [sum(one.result().fell_upon.values()) for one in made] == [1] * len(kinds)

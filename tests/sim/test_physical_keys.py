@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import asdict
+from functools import cache
 
 import pytest
 import yaml
@@ -85,12 +86,13 @@ def changed(data: dict, key) -> dict:
     return data
 
 
-def drop(data: dict, world: str) -> tuple | str:
+@cache
+def drop(text: str, world: str) -> tuple | str:
     """Edges and truth of the first run, on a perfect rig, or why there is none."""
     truths = []
     more = {"world": read_resolved_dials({"quiet": "1"})} if world == "resolved" else {}
     lab = {"model": ChainLab, "resolved": ResolvedLab}[world]
-    protocol = parse(yaml.safe_dump(data))
+    protocol = parse(text)
     try:
         edges = lab(protocol, Dials.quiet(), 1, truths.append, **more).drop(pack_label(1, 1))
     except InputError as error:
@@ -99,7 +101,7 @@ def drop(data: dict, world: str) -> tuple | str:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def cache(tmp_path_factory):
+def falls(tmp_path_factory):
     """Falls made here are kept here."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
@@ -110,10 +112,10 @@ def cache(tmp_path_factory):
 @pytest.mark.parametrize("key", PHYSICAL, ids=lambda key: key.path)
 def test_a_physical_key_changes_the_drop_or_is_refused(key, world):
     data = scene(key.path)
-    before = drop(data, world)
-    data = changed(data, key)
-    parse(yaml.safe_dump(data))  # it is the world that refuses it, if anything does
-    after = drop(data, world)
+    before = drop(yaml.safe_dump(data), world)
+    text = yaml.safe_dump(changed(data, key))
+    parse(text)  # it is the world that refuses it, if anything does
+    after = drop(text, world)
     if isinstance(after, str):
         assert key.path.rpartition(".")[2] in after
     # How rods land on rods is stated for the model; in the resolved world they do.
