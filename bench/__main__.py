@@ -47,7 +47,10 @@ def _parser() -> argparse.ArgumentParser:
         help="at each incline",
     )
     agreement.add_argument("--protocol", default=_SCENE, metavar="FILE", help="the scene")
-    agreement.add_argument("-o", "--output", metavar="DIR", help="folder for a page of the same")
+    agreement.add_argument(
+        "-o", "--output", metavar="DIR", help="folder for page and CSV; sessions in it are kept"
+    )
+    agreement.add_argument("--jobs", type=_count, default=1, metavar="N", help="side by side")
 
     clock = benches.add_parser("clock", help="how well the board's clock is known after a time")
     clock.add_argument(

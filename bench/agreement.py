@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import csv
+from collections import defaultdict
+from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
@@ -11,16 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.workers import results
 from rig.analysis.comparison import compare
 from rig.analysis.session import analyze
 from rig.analysis.summary import good_cases
 from rig.bench.falls import Asked, falls, time_scale
-from rig.commands.output import print_json, say, write_page
-from rig.files import make_folder
+from rig.commands.output import print_json, progress, write_page
+from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
-from rig.text_table import text_table
+from rig.text_table import csv_text, text_table
+from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -32,45 +36,62 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 _REPEATS = "repeats: 12 "
+_SEEDS = 1000  # apart: no rig has sessions of two lengths
+_CHUNK = 5  # sessions for one process of the simulation
 _HEAD = """\
 # Is a true model refuted as rarely as p says?
 
-Written by `./run bench agreement`: simulated sessions whose falls follow Eqs. 8 to 13, on rigs that
-are off by as much as their protocol states, β, μ and single impulses included. Over many sessions p
-of χ² is uniform, and |Eₙ| is above 1 in 5 % of the lines. KS is the probability that p of a uniform
-distribution would look less uniform than these (Kolmogorov and Smirnov)."""
+`./run bench agreement`: simulated sessions whose falls follow Eqs. 8 to 13, on rigs that are off by
+as much as their protocol states, β, μ and single impulses included. Over many sessions p of χ² is
+uniform, and |Eₙ| is above 1 in at most 5 % of the lines. *KS* is the probability that p of a
+uniform distribution would look less uniform than these (Kolmogorov and Smirnov). ± of a share is
+from rig to rig."""
+_COLUMNS = ("quantity", "drops", "seed", "chi2", "degrees", "p", "normalized_errors")
 
 
-@dataclass(slots=True)
-class Comparisons:
-    """What sessions said of the model, by measurand.
+@dataclass(frozen=True, slots=True)
+class SessionAgreement:
+    """What a simulated session said of the model that made it.
 
     Attributes
     ----------
-    p
-        Of χ² over all inclines, one a session.
-    errors
-        Eₙ of each incline, one list a session.
+    quantity
+        Its name in JSON.
+    drops, seed
+        Drops at each incline; seed of the rig.
+    chi2, degrees, p
+        Over all inclines.
+    normalized_errors
+        Eₙ of each incline.
     """
 
-    p: dict[str, list[float]] = field(default_factory=dict)
-    errors: dict[str, list[list[float]]] = field(default_factory=dict)
+    quantity: str
+    drops: int
+    seed: int
+    chi2: float
+    degrees: int
+    p: float
+    normalized_errors: tuple[float, ...]
 
-    def lines(self, drops: int) -> Iterator[list[str]]:
-        """One line of the table a measurand."""
-        from scipy.stats import kstest  # noqa: PLC0415 - takes a second
+    def row(self) -> dict[str, Any]:
+        """Return a line of the table of sessions."""
+        errors = " ".join(f"{error:.3f}" for error in self.normalized_errors)
+        values = {name: getattr(self, name) for name in _COLUMNS}
+        figures = {"chi2": f"{self.chi2:.4f}", "p": f"{self.p:.6f}"}
+        return values | figures | {"normalized_errors": errors}
 
-        for name, values in self.p.items():
-            p = np.array(values)
-            beyond = np.abs(np.concatenate(self.errors[name])) > 1.0
-            yield [
-                MEASURANDS[name].symbol, str(drops), str(p.size),
-                f"{kstest(p, 'uniform').pvalue:.2f}", f"{np.mean(p < 0.05):.0%}",
-                f"{np.mean(p > 0.95):.0%}", f"{beyond.mean():.1%}",
-            ]  # fmt: skip
+    @classmethod
+    def from_row(cls, row: dict[str, str]) -> SessionAgreement:
+        """Read a line of the table of sessions."""
+        return cls(
+            row["quantity"], int(row["drops"]), int(row["seed"]), float(row["chi2"]),
+            int(row["degrees"]), float(row["p"]),
+            tuple(map(float, row["normalized_errors"].split())),
+        )  # fmt: skip
 
 
-def compare_sessions(protocol: Path, drops: int, seeds: Iterable[int]) -> Comparisons:
+@one_thread
+def compare_sessions(protocol: Path, drops: int, seeds: Sequence[int]) -> list[SessionAgreement]:
     """Compare a session of each rig with the model.
 
     Parameters
@@ -84,44 +105,104 @@ def compare_sessions(protocol: Path, drops: int, seeds: Iterable[int]) -> Compar
     """
     text = protocol.read_text("utf-8")
     assert _REPEATS in text
-    found, rigs = Comparisons(), [*seeds]
     with TemporaryDirectory() as folder:
         path = Path(folder) / protocol.name
         path.write_text(text.replace(_REPEATS, f"repeats: {drops} "), "utf-8")
         scene = reader.read(path)
         numbers = [run.number for run in planned(scene)]
-        asked = Asked(f"sim://?stated=1&protocol={path}", rigs, [numbers] * len(rigs))
-        for seed, session in groupby(falls([asked]), key=attrgetter("seed")):
-            for one in _compared(scene, list(session), time_scale(seed)):
-                errors = [line.normalized_error or 0.0 for line in one.differences]
-                found.p.setdefault(one.quantity, []).append(one.p)
-                found.errors.setdefault(one.quantity, []).append(errors)
-    return found
+        url = f"sim://?stated=1&protocol={path}"
+        fallen = falls([Asked(url, seeds, [numbers] * len(seeds))])
+        return [
+            SessionAgreement(
+                comparison.quantity, drops, seed, comparison.chi2, comparison.degrees, comparison.p,
+                tuple(line.normalized_error or 0.0 for line in comparison.differences),
+            )
+            for seed, session in groupby(fallen, key=attrgetter("seed"))
+            for comparison in _compared(scene, session, time_scale(seed))
+        ]  # fmt: skip
 
 
 def _compared(
-    scene: Protocol, session: Sequence[SimulatedDrop], scale: TimeScale
+    scene: Protocol, session: Iterable[SimulatedDrop], scale: TimeScale
 ) -> tuple[Comparison, ...]:
     analysis = analyze(scene, [fall.drop for fall in session], lambda _: scale)
     return compare(scene, good_cases(scene, analysis.runs))
 
 
-def main(arguments: Namespace) -> int:
-    """Compare sessions of each number of drops with the model; print a table."""
+def summarize(agreements: Sequence[SessionAgreement]) -> Iterator[dict[str, Any]]:
+    """Yield the counts of each measurand and number of drops."""
+    from scipy.stats import kstest  # noqa: PLC0415 - takes a second
+
+    cases = defaultdict(list)
+    for agreement in agreements:
+        cases[agreement.quantity, agreement.drops].append(agreement)
+    for quantity, drops in sorted(cases):
+        sessions = cases[quantity, drops]
+        p = np.array([session.p for session in sessions])
+        beyond = [np.mean(np.abs(session.normalized_errors) > 1.0) for session in sessions]
+        yield {
+            "quantity": quantity,
+            "drops": drops,
+            "sessions": p.size,
+            "ks_p": float(kstest(p, "uniform").pvalue),
+            **{f"p_below_{level}": float(np.mean(p < level)) for level in (0.01, 0.05, 0.5)},
+            "p_above_0.95": float(np.mean(p > 0.95)),
+            "beyond": float(np.mean(beyond)),
+            "beyond_se": float(np.std(beyond) / np.sqrt(p.size)),
+        }
+
+
+def _table(agreements: Sequence[SessionAgreement]) -> list[str]:
     rows: list[Sequence[str]] = [
-        ["", "drops an incline", "sessions", "KS", "p < 0.05", "p > 0.95", "|Eₙ| > 1"]
-    ]
-    record: dict[str, Any] = {}
+        ["", "drops an incline", "sessions", "KS", "p < 0.01", "p < 0.05", "p < 0.5", "p > 0.95",
+         "|Eₙ| > 1", ""]
+    ]  # fmt: skip
+    rows += [
+        [
+            MEASURANDS[line["quantity"]].symbol, str(line["drops"]), str(line["sessions"]),
+            f"{line['ks_p']:.2f}", f"{line['p_below_0.01']:.0%}", f"{line['p_below_0.05']:.0%}",
+            f"{line['p_below_0.5']:.0%}", f"{line['p_above_0.95']:.0%}", f"{line['beyond']:.1%}",
+            f"± {line['beyond_se']:.1%}",
+        ]
+        for line in summarize(agreements)
+    ]  # fmt: skip
+    return text_table(rows, left={0}, rule=True)
+
+
+def main(arguments: Namespace) -> int:
+    """Compare sessions of each number of drops with the model; print a table.
+
+    Sessions in the output folder's table are kept: after an interruption the same command goes on.
+    """
+    folder = make_folder(arguments.output) if arguments.output else None
+    table = folder / "agreement.csv" if folder else None
+    agreements: list[SessionAgreement] = []
+    if table is not None and table.exists():
+        with table.open(encoding="utf-8", newline="") as file:
+            agreements = [SessionAgreement.from_row(row) for row in csv.DictReader(file)]
+    present = {(agreement.drops, agreement.seed) for agreement in agreements}
+    calls: list[tuple[Any, ...]] = []
     for drops in arguments.drops:
-        found = compare_sessions(Path(arguments.protocol), drops, range(1, arguments.sessions + 1))
-        record[str(drops)] = {"p": found.p, "normalized_error": found.errors}
-        rows += found.lines(drops)
-        say(f"{drops} drops an incline: done")
-        table = text_table(rows, left={0}, rule=True)
-        if arguments.output:  # what is there when it is stopped
-            write_page(make_folder(arguments.output), "agreement", _HEAD, table)
+        seeds = [drops * _SEEDS + n for n in range(1, arguments.sessions + 1)]
+        seeds = [seed for seed in seeds if (drops, seed) not in present]
+        parts = [seeds[n : n + _CHUNK] for n in range(0, len(seeds), _CHUNK)]
+        calls += [(compare_sessions, Path(arguments.protocol), drops, part) for part in parts]
+    count = progress("sessions")
+    for done, part in enumerate(results(calls, arguments.jobs), 1):
+        agreements += part
+        count(done * _CHUNK, len(calls) * _CHUNK)
+        if table is not None:
+            rows = [agreement.row() for agreement in sorted(agreements, key=_order)]
+            write_atomic(table, csv_text(_COLUMNS, rows))
+    lines = _table(agreements)
+    if folder is not None:
+        write_page(folder, "agreement", _HEAD, lines)
     if arguments.json:
-        print_json(record)
+        print_json({"agreement": [*summarize(agreements)]})
     else:
-        print("\n".join(table))
+        print("\n".join(lines))
     return 0
+
+
+def _order(agreement: SessionAgreement) -> tuple[str, int, int]:
+    return agreement.quantity, agreement.drops, agreement.seed

@@ -13,7 +13,7 @@ from rig.analysis.components import stated
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
 from rig.design.cases import beams_of, cases
-from rig.design.forecast import forecast
+from rig.design.forecast import GateLayout, forecast
 from rig.errors import InputError
 from rig.estimate.session import estimate
 from rig.measurands import MEASURANDS
@@ -130,5 +130,6 @@ def _compared(name: str, protocol: Protocol, analysis: Analysis) -> list[Foretol
 
 def _forecast(protocol: Protocol, components: Components) -> dict[str, float]:
     beams = beams_of(protocol)
-    found = forecast(protocol, cases(protocol, beams, components), range(len(beams)), sure=True)
+    layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
+    found = forecast(protocol, layout, sure=True)
     return found.wanted()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.components import stated
 from rig.commands.output import print_found, say
 from rig.design.cases import beams_of, cases, with_beams
-from rig.design.forecast import forecast
+from rig.design.forecast import GateLayout, forecast
 from rig.design.rewriting import with_heights
 from rig.design.search import better, readable, room
 from rig.design.trials import trials, trials_text
@@ -105,9 +105,8 @@ def _said(
     protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
 ) -> dict[str, Any]:
     assert protocol.gates is not None
-    expected: Forecast = forecast(
-        protocol, cases(protocol, beams, components), range(len(beams)), sure=True
-    )
+    layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
+    expected: Forecast = forecast(protocol, layout, sure=True)
     return {
         "gates": [
             {"channel": gate.channel, "side": side, "height_m": height}

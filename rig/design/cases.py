@@ -47,18 +47,18 @@ BEAM = len(_BEAMS)
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What one beam says of one drop: JᵀWJ in units of prior uncertainties.
+    """What one beam says of one drop: its observation equations in standard deviations.
 
     Attributes
     ----------
     columns
         Unknowns of the drop that it knows of.
-    matrix
-        Over these and the beam's own.
+    slopes
+        By these and the beam's own, in units of prior uncertainties; one row an edge.
     """
 
     columns: Index
-    matrix: Array
+    slopes: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Case:
     by_chance
         Of a drop's own unknowns those that differ from run to run: single impulses, hanging height.
     gradients
-        Of each measurand by all these unknowns: own, common, α.
+        Of each measurand by all these unknowns: own, α, common.
     blocks
         One a beam.
     """
@@ -250,10 +250,10 @@ def _case(
         if name in at:
             beam[at[name]] = True
     alpha = np.arange(at["alpha"].start, at["alpha"].stop) if "alpha" in at else np.zeros(0, int)
-    # Own first, then common, then α, as `Case` has them: eliminated from the front.
+    # Own first, then α, then common, as `Case` has them: eliminated from the front.
     common = mine[kept[here]]
     own = np.setdiff1d(np.flatnonzero(~beam), np.append(common, alpha))
-    order = np.concatenate([own, common, alpha])
+    order = np.concatenate([own, alpha, common])
     place = np.full(len(at), -1)
     place[order] = np.arange(order.size)
     blocks: dict[int, Block] = {}
@@ -272,7 +272,7 @@ def _case(
     )
 
 
-_BLIND = Block(np.zeros(0, dtype=np.intp), np.zeros((BEAM, BEAM)))
+_BLIND = Block(np.zeros(0, dtype=np.intp), np.zeros((0, BEAM)))
 
 
 def _blocks(
@@ -293,5 +293,5 @@ def _blocks(
         part = np.zeros((mine.shape[0], columns.size + BEAM))
         part[:, : columns.size] = mine[:, columns]
         part[:, columns.size : columns.size + len(own)] = mine[:, own]
-        found[train.gate] = Block(place[rows.columns[columns]], part.T @ part)
+        found[train.gate] = Block(place[rows.columns[columns]], part)
     return found

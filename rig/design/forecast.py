@@ -1,9 +1,9 @@
-"""What a session with given beams will tell: its normal matrix, and uncertainties from it."""
+"""What a session with given beams will tell: its square root, and uncertainties from it."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,14 +19,65 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.design.cases import Case, Cases
+    from rig.design.cases import Block, Case, Cases
+    from rig.model.chain import Chain
     from rig.protocol.protocol import Condition, Protocol
+    from rig.units import Quantity
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
-_EXACT = 1e18
-"""What is known of a coefficient that the protocol states without ±: 1/u²."""
+
+@dataclass(frozen=True, slots=True)
+class GateLayout:
+    """Some beams, and what they say of every kind of drop.
+
+    Attributes
+    ----------
+    cases
+        Kinds of drop, with what each of many beams would say.
+    beams
+        How many there are.
+    rows
+        Observations of each kind of drop in standard deviations. Columns are those of `Case`, then
+        `BEAM` a beam.
+    """
+
+    cases: Cases
+    beams: int
+    rows: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, cases: Cases, beams: Sequence[int]) -> GateLayout:
+        """Choose beams by their numbers."""
+        return cls(cases, 0, tuple(np.zeros((0, case.core)) for case in cases.cases)).plus(*beams)
+
+    def plus(self, *beams: int) -> GateLayout:
+        """Return the layout with more beams."""
+        pairs = zip(self.cases.cases, self.rows, strict=True)
+        rows = tuple(_stacked(rows, [case.blocks[beam] for beam in beams]) for case, rows in pairs)
+        return GateLayout(self.cases, self.beams + len(beams), rows)
+
+    def triangles(self) -> GateLayout:
+        """Return the same in no more rows than columns: for beams to be added again and again."""
+        return replace(self, rows=tuple(map(_triangle, self.rows)))
+
+
+def _stacked(rows: Array, blocks: Sequence[Block]) -> Array:
+    """Put what beams say below what others said, each beam's own unknowns behind."""
+    height = rows.shape[0] + sum(block.slopes.shape[0] for block in blocks)
+    whole = np.zeros((height, rows.shape[1] + BEAM * len(blocks)))
+    (end, beam), whole[: rows.shape[0], : rows.shape[1]] = rows.shape, rows
+    for block in blocks:
+        begin, end = end, end + block.slopes.shape[0]
+        whole[begin:end, block.columns] = block.slopes[:, :-BEAM]
+        whole[begin:end, beam : beam + BEAM] = block.slopes[:, -BEAM:]
+        beam += BEAM
+    return whole
+
+
+def _triangle(rows: Array) -> Array:
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +114,7 @@ class Forecast:
 @one_thread
 def forecast(
     protocol: Protocol,
-    found: Cases,
-    layout: Sequence[int],
+    layout: GateLayout,
     names: Sequence[str] | None = None,
     *,
     sure: bool = False,
@@ -73,156 +123,183 @@ def forecast(
 
     Parameters
     ----------
-    found
-        Kinds of drop, with what each of many beams would say.
     layout
-        Which of these beams there are.
+        The beams that there are.
     names
         Only these measurands, if given.
     sure
         Whether also coefficients are kept that the edges hardly tell.
     """
-    size = found.shared + BEAM * len(layout)
-    parts = [_Part.of(case, found.shared, layout, names) for case in found.cases]
-    total = np.eye(size)
-    for part in parts:
-        total[part.grid] += part.case.count * part.without_alpha
-    covariance = np.linalg.inv(total)  # once a layout, then asked by every measurand and incline
+    size = layout.cases.shared + BEAM * layout.beams
+    drops = [
+        _Drop.of(case, rows, layout.cases.shared)
+        for case, rows in zip(layout.cases.cases, layout.rows, strict=True)
+    ]
+    kept, stated = _described(protocol, drops)
+    # What needs no α of a drop is common to coefficients and measurands.
+    known = [drop.given_alpha() for drop, said in zip(drops, kept, strict=True) if said]
+    root = _session(known, np.eye(size))
+    rest = [drop.given_alpha() for drop, said in zip(drops, kept, strict=True) if not said]
+    alone = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
+    inverse = np.linalg.inv(alone)  # once a layout, then asked by every measurand and incline
     single: dict[str, dict[Condition, float]] = {}
     mean: dict[str, dict[Condition, float]] = {}
-    for here in by_case(protocol, parts, lambda part: part.case.run):
+    for here in by_case(protocol, drops, lambda drop: drop.case.run):
         at = protocol.condition(here[0].case.run)
-        n = sum(part.case.count for part in here)
-        for name in here[0].spreads:
-            alone, together, common = 0.0, 0.0, np.zeros(size)
-            for part in here:
-                share = part.case.count / n
-                # Own variance and slopes by what the session has in common, at this layout.
-                own, slopes = part.spreads[name]
-                shared = np.zeros(size)
-                shared[part.place] = slopes
-                chance = part.case.gradients[name][part.case.by_chance]
-                alone += share * (own + float(shared @ covariance @ shared))
-                together += share * (own + float(chance @ chance)) / n
+        n = sum(drop.case.count for drop in here)
+        for name in names or here[0].case.gradients:
+            if name not in here[0].case.gradients:
+                continue
+            by_one, by_mean, common = 0.0, 0.0, np.zeros(size)
+            for drop in here:
+                share = drop.case.count / n
+                own, slopes = drop.spread(name)
+                shared = slopes @ inverse[drop.place]
+                chance = drop.case.gradients[name][drop.case.by_chance]
+                by_one += share * (own + float(shared @ shared))
+                by_mean += share * (own + float(chance @ chance)) / n
                 common += share * shared
-            single.setdefault(name, {})[at] = math.sqrt(alone)
-            both = together + float(common @ covariance @ common)
-            mean.setdefault(name, {})[at] = math.sqrt(both)
-    coefficients, held = _coefficients(protocol, parts, size)
-    kept = {name: u for name, u in coefficients.items() if sure or name not in held}
-    return Forecast(single, mean, kept, held)
+            single.setdefault(name, {})[at] = math.sqrt(by_one)
+            mean.setdefault(name, {})[at] = math.sqrt(by_mean + float(common @ common))
+    tied = [drop for drop, said in zip(drops, kept, strict=True) if said]
+    coefficients, held = _coefficients(protocol, tied, stated, root) if stated else ({}, set())
+    told = {name: u for name, u in coefficients.items() if sure or name not in held}
+    return Forecast(single, mean, told, frozenset(held))
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _Drop:
     """One kind of drop, with all that is its own eliminated.
 
     Attributes
     ----------
-    place, grid
-        Where its unknowns are in the session's vector and matrix, beams included.
-    matrix, cross, square
-        What it says of them, of them with α, and of α; the latter are zero where nothing is struck.
-    spreads
-        Of each measurand: its variance given the session's unknowns, and its slopes by them.
+    place
+        Where its other unknowns are in the session's vector, beams included.
+    inverse, cross
+        R⁻¹ of its own unknowns and α, their priors included; and what the same rows say of others.
+    alpha
+        What the edges say of α (0 where nothing is struck), and of others with it.
+    rest
+        What they say of others with α known.
     """
 
     case: Case
     place: Index
-    grid: tuple[Index, ...]
-    matrix: Array
+    inverse: Array
     cross: Array
-    square: float
-    spreads: dict[str, tuple[float, Array]]
+    alpha: Array
+    rest: Array
 
     @classmethod
-    def of(
-        cls, case: Case, shared: int, layout: Sequence[int], names: Sequence[str] | None
-    ) -> _Part:
-        """Add up what the beams say, then eliminate."""
-        core, own = case.core, case.own
-        size = core + BEAM * len(layout)
-        whole = np.zeros((size, size))
-        for slot, n in enumerate(layout):
-            block = case.blocks[n]
-            beam = core + BEAM * slot
-            place = np.append(block.columns, np.arange(beam, beam + BEAM))
-            whole[place[:, None], place] += block.matrix
-        inverse = np.linalg.inv(whole[:own, :own] + np.eye(own))
-        gain = inverse @ whole[:own, own:]
-        left = whole[own:, own:] - whole[own:, :own] @ gain
-        alpha = case.here.size
-        kept = np.delete(np.arange(left.shape[0]), slice(alpha, alpha + case.struck))
-        matrix = left[kept[:, None], kept]
-        cross = left[kept, alpha] if case.struck else np.zeros(kept.size)
-        square = float(left[alpha, alpha]) if case.struck else 0.0
-        spreads = {}
-        for name in names or case.gradients:
-            if name not in case.gradients:
-                continue
-            gradient = np.zeros(size)
-            gradient[:core] = case.gradients[name]
-            solved = inverse @ gradient[:own]
-            rest = gradient[own:] - gain.T @ gradient[:own]
-            by_alpha = float(rest[alpha]) if case.struck else 0.0
-            spreads[name] = (
-                float(gradient[:own] @ solved) + by_alpha**2 / (1.0 + square),
-                rest[kept] - cross * (by_alpha / (1.0 + square)),
-            )
-        place = np.append(case.here, shared + np.arange(BEAM * len(layout)))
-        return cls(case, place, np.ix_(place, place), matrix, cross, square, spreads)
+    def of(cls, case: Case, rows: Array, shared: int) -> _Drop:
+        """Eliminate a drop's own unknowns, and α as far as its prior goes."""
+        own, ends = case.own, case.own + case.struck
+        # A last row of zeros: α has a row also where there is no edge.
+        stack = np.zeros((rows.shape[0] + own + 1, rows.shape[1]))
+        stack[: rows.shape[0]] = rows
+        stack[rows.shape[0] + np.arange(own), np.arange(own)] = 1.0
+        whole = _triangle(stack)
+        alpha = whole[own, own:].copy() if case.struck else np.zeros(whole.shape[1] - own + 1)
+        root = whole[:ends].copy()
+        if case.struck:  # turned against the row of its prior, 1
+            length = math.hypot(1.0, alpha[0])
+            root[own, own + 1 :] *= alpha[0] / length
+            root[own, own] = length
+        beams = np.arange(shared, shared + rows.shape[1] - case.core)
+        return cls(
+            case,
+            np.append(case.here, beams),
+            np.linalg.inv(root[:, :ends]).astype(np.float64, copy=False),
+            root[:, ends:],
+            alpha,
+            whole[ends:, ends:],
+        )
 
-    @property
-    def without_alpha(self) -> Array:
-        """What the drop says of the session's unknowns by itself, with an α of its own."""
-        found: Array = self.matrix - np.outer(self.cross, self.cross) / (1.0 + self.square)
-        return found
+    def given_alpha(self) -> tuple[Array, Index]:
+        """Return what all such drops say of the session's unknowns with α known."""
+        return math.sqrt(self.case.count) * self.rest, self.place
+
+    def own_alpha(self) -> tuple[Array, Index]:
+        """Return what they say besides, each with an α of its own."""
+        scale = math.sqrt(self.case.count) / math.hypot(1.0, self.alpha[0])
+        return scale * self.alpha[None, 1:], self.place
+
+    def tied_alpha(self, slopes: Array, behind: int) -> tuple[Array, Index]:
+        """Return what they say besides where α follows from coefficients with these slopes."""
+        row = np.append(self.alpha[1:], self.alpha[0] * slopes)
+        return math.sqrt(self.case.count) * row[None], np.append(
+            self.place, behind + np.arange(slopes.size)
+        )
+
+    def spread(self, name: str) -> tuple[float, Array]:
+        """Variance of a measurand given the session's unknowns, and its slopes by them."""
+        ends = self.inverse.shape[0]
+        gradient = np.zeros(ends + self.place.size)
+        gradient[: self.case.core] = self.case.gradients[name]
+        own = gradient[:ends] @ self.inverse
+        return float(own @ own), gradient[ends:] - own @ self.cross
+
+
+def _session(observations: Sequence[tuple[Array, Index]], root: Array) -> Array:
+    """Return the square root of observations of some unknowns each, above that of all."""
+    height = sum(rows.shape[0] for rows, _ in observations)
+    stack = np.zeros((height + root.shape[0], root.shape[1]))
+    end = 0
+    for rows, columns in observations:
+        begin, end = end, end + rows.shape[0]
+        stack[begin:end, columns] = rows
+    stack[end:] = root
+    return _triangle(stack)
+
+
+def _described(
+    protocol: Protocol, drops: Sequence[_Drop]
+) -> tuple[list[bool], dict[str, Quantity]]:
+    """Return which drops the model describes, and what is stated of its coefficients."""
+    if protocol.surface is None:
+        return [False] * len(drops), {}
+    kept, stated, _ = described(protocol, [_impact(protocol, drop.case) for drop in drops])
+    return kept, stated
+
+
+def _impact(protocol: Protocol, case: Case) -> tuple[Chain, float]:
+    return protocol.chains[case.run.impact or ""].chain, case.run.incline_deg
 
 
 def _coefficients(
-    protocol: Protocol, parts: Sequence[_Part], size: int
-) -> tuple[dict[str, float], frozenset[str]]:
+    protocol: Protocol, drops: Sequence[_Drop], stated: Mapping[str, Quantity], root: Array
+) -> tuple[dict[str, float], set[str]]:
     """Standard uncertainties of β, μ and a pile's β, and those that edges do not tell."""
-    surface = protocol.surface
-    if surface is None:
-        return {}, frozenset()
-    drops = [
-        (protocol.chains[part.case.run.impact or ""].chain, part.case.run.incline_deg)
-        for part in parts
-    ]
-    kept, stated, _ = described(protocol, drops)
-    if not stated:
-        return {}, frozenset()
+    assert protocol.surface is not None
     now = {name: quantity.value for name, quantity in stated.items()}
     given = given_alphas(protocol)
-    total = np.eye(size + len(now))  # ±1 of a coefficient is as good as nothing known
-    for part, (chain, incline), said in zip(parts, drops, kept, strict=True):
-        if not said:
-            continue
-        slopes = alphas(surface, chain, incline, now, given.get(chain))[1].mean(axis=0)
-        n = part.case.count
-        total[part.grid] += n * part.matrix
-        mixed = n * np.outer(part.cross, slopes)
-        total[part.place, size:] += mixed
-        total[size:, part.place] += mixed.T
-        total[size:, size:] += n * part.square * np.outer(slopes, slopes)
-    places = {name: size + n for n, name in enumerate(now)}
+    size, count = root.shape[0], len(now)
+    whole = np.eye(size + count)  # ±1 of a coefficient is as good as nothing known
+    whole[:size, :size] = root
+    tied = []
+    for drop in drops:
+        chain, incline = _impact(protocol, drop.case)
+        slopes = alphas(protocol.surface, chain, incline, now, given.get(chain))[1].mean(axis=0)
+        tied.append(drop.tied_alpha(slopes, size))
+    edges = _session(tied, whole)[size:, size:]
 
-    def uncertainties() -> dict[str, float]:
-        variances = np.diag(np.linalg.inv(total))
-        return {name: math.sqrt(variances[place]) for name, place in places.items()}
+    def uncertainties(priors: Mapping[str, float]) -> dict[str, float]:
+        """With some held within these uncertainties; 0 is exact, which is no unknown."""
+        free = [n for n, name in enumerate(now) if priors.get(name) != 0.0]
+        weights = [1.0 / priors[name] if priors.get(name) else 0.0 for name in now]
+        inverse = np.linalg.inv(_triangle(np.vstack([edges, np.diag(weights)])[:, free]))
+        known = dict(zip(free, np.linalg.norm(inverse, axis=1).tolist(), strict=True))
+        return {name: known.get(n, 0.0) for n, name in enumerate(now)}
 
-    by_edges = found = uncertainties()
-    held: set[str] = set()
+    by_edges = present = uncertainties({})
+    held: dict[str, float] = {}
     for name in first_held(now):  # as the estimate does
-        unsure = {one for one, u in found.items() if u > KNOWN}
+        unsure = {other for other, u in present.items() if u > KNOWN}
         if not unsure:
             break
         if name == MU and not unsure & {MU, BETA}:
             continue
-        held.add(name)
-        u = stated[name].u
-        total[places[name], places[name]] += u**-2 if u else _EXACT
-        found = uncertainties()
-    held |= {one for one, u in found.items() if u > KNOWN}
-    return found | {one: by_edges[one] for one in held}, frozenset(held)
+        held[name] = stated[name].u
+        present = uncertainties(held)
+    unknown = held.keys() | {name for name, u in present.items() if u > KNOWN}
+    return present | {name: by_edges[name] for name in unknown}, unknown

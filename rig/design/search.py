@@ -15,7 +15,7 @@ from rig.analysis.components import stated
 from rig.analysis.identify import identify
 from rig.analysis.verdict import LEAD
 from rig.design.cases import CLOCK_U, cases, perfect, with_beams
-from rig.design.forecast import forecast
+from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import misread
 from rig.measurands import averaged
 from rig.protocol.plan import runs
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.components import Components
-    from rig.design.cases import Cases
     from rig.protocol.protocol import Protocol, Side
 
     Index = NDArray[np.intp]
@@ -131,11 +130,13 @@ def better(
     layout = list(range(len(gates)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
     floor = min(MARGIN, margin(protocol, beams[: len(gates)]))
-    best = score(protocol, found, layout)
+    best = score(protocol, GateLayout.of(found, layout))
     for sweep in range(1, _SWEEPS + 1):
         before = best
         for slot, gate in enumerate(gates):
-            others = [beams[n] for other, n in enumerate(layout) if other != slot]
+            stay = [n for other, n in enumerate(layout) if other != slot]
+            others = [beams[n] for n in stay]
+            fixed = GateLayout.of(found, stay).triangles()
             mine = [
                 n
                 for n in range(len(gates), len(beams))
@@ -145,7 +146,7 @@ def better(
                 centre = mine.index(layout[slot]) if layout[slot] in mine else len(mine) // 2
                 near = [n for n in mine[::stride] if abs(mine.index(n) - centre) <= reach]
                 for n in near:
-                    trial = score(protocol, found, [*layout[:slot], n, *layout[slot + 1 :]])
+                    trial = score(protocol, fixed.plus(n))
                     if trial >= best - _WORTH:
                         continue
                     # Only now: whether it can be read takes a few drops to be read.
@@ -215,10 +216,10 @@ def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
     return margin(protocol, beams) >= MARGIN
 
 
-def score(protocol: Protocol, found: Cases, layout: Sequence[int]) -> float:
+def score(protocol: Protocol, layout: GateLayout) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    wanted = forecast(protocol, found, layout, goals, sure=True).wanted()
+    wanted = forecast(protocol, layout, goals, sure=True).wanted()
     values = [math.log(wanted[name]) for name in goals if name in wanted]
     return sum(values) / len(values)
 

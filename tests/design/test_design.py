@@ -11,7 +11,7 @@ import pytest
 from rig.analysis.components import Components
 from rig.analysis.session import Analysis
 from rig.design.cases import beams_of, cases, with_beams
-from rig.design.forecast import forecast
+from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, candidates, readable, room, score
 from rig.design.trials import Trials, trials, trials_text
 from rig.errors import InputError
@@ -43,6 +43,13 @@ def placed(protocol: Protocol, heights: list[float], **plan) -> Protocol:
     )
 
 
+def foretold(protocol: Protocol, components: Components, *names: str) -> Forecast:
+    """What the protocol's own beams will tell."""
+    beams = beams_of(protocol)
+    layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
+    return forecast(protocol, layout, names or None)
+
+
 @cache
 def dropped(protocol_heights: tuple[float, ...]) -> tuple[tuple[Case, ...], Analysis]:
     """Sixteen drops of one chain before beams at these heights."""
@@ -61,9 +68,8 @@ def expected():
         friction=replace(surface.friction, value=DIALS.friction),
     )
     protocol = replace(UNIFORM, surface=true, plan=Plan(INCLINES, 2))
-    beams = beams_of(protocol)
     learned = analysis(INCLINES).joint.components
-    return forecast(protocol, cases(protocol, beams, learned), range(len(beams)))
+    return foretold(protocol, learned)
 
 
 def test_the_forecast_is_what_a_session_then_states(expected):
@@ -82,10 +88,8 @@ def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected)
 
 
 def test_more_runs_tell_more_but_not_of_what_is_common():
-    beams = beams_of(UNIFORM)
     one, many = (
-        forecast(p, cases(p, beams, TRUE), range(len(beams)))
-        for p in (replace(UNIFORM, plan=Plan(INCLINES, n)) for n in (2, 32))
+        foretold(p, TRUE) for p in (replace(UNIFORM, plan=Plan(INCLINES, n)) for n in (2, 32))
     )
     for name in ("restitution", "friction"):
         assert many.coefficients[name] < 0.5 * one.coefficients[name]
@@ -102,8 +106,7 @@ def test_unlike_chains_have_forecasts_of_their_own():
     b = UNIFORM.chains["B"]
     given = replace(b, chain=replace(b.chain, alpha=Quantity(0.25, 0.02)))
     protocol = replace(UNIFORM, chains={**UNIFORM.chains, "B": given}, plan=Plan((50.0,), 4))
-    beams = beams_of(protocol)
-    found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)))
+    found = foretold(protocol, TRUE)
     for by_striker in (found.single["speed_m_s"], found.mean["speed_m_s"]):
         assert set(by_striker) == {(50.0, "A"), (50.0, "B")}
         assert by_striker[50.0, "B"] > by_striker[50.0, "A"]
@@ -112,9 +115,8 @@ def test_unlike_chains_have_forecasts_of_their_own():
 def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
     """As `rig estimate` has it of such a session."""
     protocol = replace(UNIFORM, plan=Plan((40.0,), 4))
-    beams = beams_of(protocol)
     learned = analysis((40.0,), 4).joint.components
-    found = forecast(protocol, cases(protocol, beams, learned), range(len(beams)))
+    found = foretold(protocol, learned)
     problem = coefficient_problem(protocol, merged(forms((40.0,), 4)))
     assert found.held == set(problem.held) == {"friction"}
     assert set(found.coefficients) == {"restitution"}
@@ -141,8 +143,7 @@ def speed_errors(layout: tuple[float, ...]) -> np.ndarray:
 def predicted_speed_u(layout: tuple[float, ...]) -> float:
     protocol = placed(SINGLE, list(layout), repeats=16)
     protocol = replace(protocol, priors=replace(protocol.priors, strings=0.0))  # as TRUE has it
-    beams = beams_of(protocol)
-    found = forecast(protocol, cases(protocol, beams, TRUE), range(len(beams)), ("speed_m_s",))
+    found = foretold(protocol, TRUE, "speed_m_s")
     return found.typical("speed_m_s")
 
 
@@ -191,7 +192,9 @@ def test_proposals_respect_limits_and_are_never_worse():
     moved = [h for h in heights if h not in there]
     assert all(np.abs(hanging - h).min() >= 0.0127 / 2 for h in moved)
     every = cases(protocol, [*beams_of(protocol), *found], TRUE)
-    assert score(protocol, every, range(4, 8)) <= score(protocol, every, range(4)) + 1e-9
+    assert score(protocol, GateLayout.of(every, range(4, 8))) <= (
+        score(protocol, GateLayout.of(every, range(4))) + 1e-9
+    )
 
 
 def test_candidates_are_where_a_protocol_may_have_a_gate():
