@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.components import above
-from rig.analysis.discrepancy import STRETCHES
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
 from rig.analysis.result import Deviation
+from rig.analysis.unknowns import Side
 from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
@@ -55,20 +54,13 @@ class Supposed(NamedTuple):
 
 def supposed(model: DropModel) -> Supposed:
     """Say what the prediction supposes of a drop."""
-    at, struck = model.unknowns, "impact" in model.records
+    at = model.unknowns
     known, absent = np.zeros(len(at), dtype=np.bool_), np.zeros(len(at))
-    for name in ("impact release", "free release", "alpha" if struck else "gravity"):
-        if name in at:
-            known[at[name]] = True
-    if model.protocol.drag is None and "drag" in at:
-        absent[at["drag"]] = 1.0
-    if struck:
-        for name in ("late", "strings", *STRETCHES):
-            absent[at[name]] = 1.0
-        alpha, block = abs(model.guesses["impact"].alpha), at["impulses"]
-        bounces = model.components.bounce * alpha / above(block.stop - block.start)
-        sd = at.sd[block]  # zero where impulses are known exactly: then none bounce either
-        absent[block] = np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2
+    measured = "alpha" if "impact" in model.records else "gravity"
+    for name, row in at.rows.items():
+        known[at[name]] = row.name in {"release", measured}
+        record = model.records["impact" if row.of == "impact" else next(iter(model.records))]
+        absent[at[name]] = row.absent(Side(model, record))
     return Supposed(known, absent)
 
 

@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.align import Pairing
-from rig.analysis.components import Components, above, stated
-from rig.analysis.discrepancy import (
-    LOWEST_START,
-    MODES,
-    STRETCHES,
-    Discrepancy,
-)
+from rig.analysis.components import Components, stated
+from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
-from rig.analysis.swing import drawn, lever, swing_sd
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
-from rig.analysis.unknowns import ANY_GRAVITY, ANYTHING, SideColumns, Unknowns, side_columns
+from rig.analysis.trajectory import (
+    COMMON,
+    DRAG,
+    GRAVITY,
+    RELEASE,
+    START,
+    free_trajectory,
+    struck_trajectory,
+)
+from rig.analysis.unknowns import Unknowns, effects
 from rig.predictions import air_of
 from rig.units import Quantity
 
@@ -72,11 +74,13 @@ class DropModel:
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
-        self._kappa, self._kappa_u = prior_air(protocol)
+        self._kappa: float
+        self.kappa_u: float
+        self._kappa, self.kappa_u = prior_air(protocol)
         self.records: dict[str, ChainRecord] = {record.role: record for record in records}
         self.guesses = guesses
-        self.clock_u = clock_u
-        self.components = components or stated(protocol)
+        self.clock_u: float = clock_u
+        self.components: Components = components or stated(protocol)
         made: dict[str, DropModel] = {role: one for one in sides for role in one.records}
         self.expected: dict[str, Expected] = {
             role: made[role].expected[role] if role in made else Expected.of(record, protocol)
@@ -92,95 +96,12 @@ class DropModel:
         elif "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
             self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
-        slopes: dict[str, float] = {
-            record.role: math.tan(math.radians(record.chain.tilt_deg)) for record in records
-        }
-        posts = protocol.gates.posts
-        self._post = np.array([posts.index(gate.side) for gate in protocol.gates.gates])
-        self._steepest = max(slopes.values(), default=0.0)
-        # A beam is off by as much for a chain of less tilted rods, which shows less.
-        self._tilts: dict[str, float] = {
-            role: slope / (self._steepest or 1.0) for role, slope in slopes.items()
-        }
-        self.unknowns = self._unknowns()
-        self._local = {role: self._columns(role) for role in self.records}
+        self.unknowns = Unknowns(self)
+        self._effects = {role: effects(self, role) for role in self.records}
         # The last path, levels and matches of each side: nothing older is asked for again.
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
         self._levels: dict[str, tuple[bytes, Array]] = {}
         self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
-        self._fixed: dict[str, tuple[Seen, Index, Array]] = {}
-
-    def _unknowns(self) -> Unknowns:
-        """Name everything that is not known, with what is known of it beforehand."""
-        protocol, components = self.protocol, self.components
-        assert protocol.gates is not None
-        gates = len(protocol.gates.gates)
-        free_only = protocol.surface is None
-        unknowns = Unknowns()
-        unknowns.add("clock", "clock", self.clock_u)
-        unknowns.add("gravity", "gravity", ANY_GRAVITY if free_only else protocol.gravity.u)
-        unknowns.add("drop", "drop height", protocol.drop.u)
-        if len(self.records) > 1:
-            unknowns.add("side", "side", protocol.priors.side)
-        unknowns.add("drag", "air", self._kappa_u)
-        datums = [protocol.gates.datum_u] * len(protocol.gates.posts)
-        unknowns.add("datum", "datum", datums)
-        unknowns.add("beams", "beam heights", [components.gates * protocol.gates.height_u] * gates)
-        if self._steepest:
-            unknowns.add("ripple", "beam offsets", [components.beam * self._steepest] * gates)
-        for role, record in self.records.items():
-            chain = record.chain
-            places = [components.rods * chain.position_u] * chain.chain.rods
-            # Told by the edges alone, so its uncertainty counts as theirs.
-            unknowns.add(f"{role} release", "edges", ANYTHING)
-            unknowns.add(f"{role} hang", "start height", components.hang)
-            unknowns.add(f"{role} rods", "spacing", places)
-            if self._steepest:
-                aside = protocol.priors.off_centre * self._tilts[role] * self._steepest
-                unknowns.add(f"{role} off centre", "beam offsets", aside)
-            unknowns.add(f"{role} width", "width", chain.width_u)
-            if not free_only and chain.chain.rods > 1:
-                sd = components.swing * swing_sd(chain.chain, protocol)
-                unknowns.add(f"{role} swing", "swing", sd)
-        if "impact" in self.records:
-            rods = self.records["impact"].chain.chain.rods
-            alpha = abs(self.guesses["impact"].alpha)
-            scatter = components.impulses(alpha, above(rods))
-            unknowns.add("alpha", "edges", ANYTHING)
-            unknowns.add("impulses", "single impulses", scatter)
-            contact = protocol.contact
-            unknowns.add("contact", "contact", contact.level.u)
-            unknowns.add("strike", "contact", contact.strike.u)
-            # It falls on as it was off its chain while two were left.
-            off = math.hypot(components.departure, 0.5 * components.few)
-            unknowns.add("top", "top rod", math.sqrt(2.0) * off)
-            unknowns.add("landed", "contact", components.landed)
-            self._add_discrepancy(unknowns)
-        return unknowns
-
-    def _add_discrepancy(self, unknowns: Unknowns) -> None:
-        """Name what the equations leave out."""
-        priors, components, record = self.protocol.priors, self.components, self.records["impact"]
-        unknowns.add("strings", "single impulses", priors.strings * abs(record.alpha))
-        # A half of its variance is the same in all drops.
-        size = priors.stretch * math.hypot(record.alpha, priors.impulse_floor)
-        size *= components.stretch * record.chain.chain.length
-        for name in STRETCHES:
-            unknowns.add(name, "stretch", [math.sqrt(0.5) * size] * MODES)
-        # No edge tells it; where strings do not bounce, there is none.
-        bounce = components.bounce / priors.last_impulse if priors.last_impulse else 1.0
-        unknowns.add("late", "late pull", bounce * priors.late_pull)
-
-    def _columns(self, role: str) -> SideColumns:
-        """Leave out what the other side alone depends on."""
-        record, gates = self.records[role], self.protocol.gates
-        assert gates is not None
-        here = tuple(train.gate for train in record.trains)
-        rods, lower = 0, ()
-        if role == "impact":
-            rods = record.chain.chain.rods
-            lower = tuple(self._drawn().tolist()) if "impact swing" in self.unknowns else ()
-        return side_columns(self.unknowns.places, role, here, gates.posts, rods, lower)
 
     def stiff(self) -> DropModel:
         """Return the same drop with impulses that are nearly alike, the last one too."""
@@ -190,7 +111,7 @@ class DropModel:
         impulse = min(_ALIKE, self.components.impulse)
         none = dict.fromkeys(("bounce", "landed", "stretch"), 0.0)
         other.components = replace(self.components, impulse=impulse, **none)
-        other.unknowns = other._unknowns()  # other priors, and the same paths
+        other.unknowns = Unknowns(other)  # other priors, and the same paths
         return other
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
@@ -210,7 +131,7 @@ class DropModel:
         # Columns and matched edges stay: only priors and where α is counted from are others.
         other = copy(self)
         other.components, other.clock_u, other.guesses = components, clock_u, guesses
-        other.unknowns = other._unknowns()
+        other.unknowns = Unknowns(other)
         other._paths = {}
         return other
 
@@ -229,20 +150,20 @@ class DropModel:
             contact=replace(mine.contact, level=replace(mine.contact.level, u=level.u)),
             stated=mine.stated,
         )
-        other._kappa, other._kappa_u = prior_air(protocol)
+        other._kappa, other.kappa_u = prior_air(protocol)
         # Widths of rods and their places have priors of their own.
         other.records = {
             role: replace(record, chain=protocol.chains[record.chain.name])
             for role, record in self.records.items()
         }
-        other.unknowns = other._unknowns()
+        other.unknowns = Unknowns(other)
         other._paths = {}
         return other
 
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return the same drop with its edges moved in time, by so many seconds each."""
         other = copy(self)
-        other._paths, other._seen, other._fixed = {}, {}, {}
+        other._paths, other._seen = {}, {}
         other.expected = {
             role: expected._replace(times=expected.times + shifts[role])
             for role, expected in self.expected.items()
@@ -278,27 +199,20 @@ class DropModel:
         return known[1]
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
-        at = self.unknowns
-        release = self.guesses[role].release + float(x[at[f"{role} release"]][0])
-        start = self.protocol.drop.value + float(x[at["drop"]][0] + x[at[f"{role} hang"]][0])
-        if role == "free" and "side" in at:
-            start += float(x[at["side"]][0])
-        gravity = self.protocol.gravity.value + float(x[at["gravity"]][0])
-        kappa, record = self.kappa(x), self.records[role]
+        record, parameters = self.records[role], self._effects[role].path @ x
+        parameters[RELEASE] += self.guesses[role].release
+        parameters[START] += self.protocol.drop.value
+        parameters[GRAVITY] += self.protocol.gravity.value
+        parameters[DRAG] += self._kappa
+        release, start, gravity, kappa = parameters[:COMMON].tolist()
         if not gravity > 0.0:
             gravity = math.nan  # nothing falls: no number, so that no fit ends there
-        if role == "free":
+        if record.ratios is None:
             return free_trajectory(release, start, gravity, kappa, record.air)
-        assert record.ratios is not None
         start = max(start, LOWEST_START)
-        places = record.strikes + x[at["impact rods"]]
-        # Results are at the stated level: where the top rod would be if others struck elsewhere.
-        places[:-1] -= x[at["contact"]]
-        places[-1] += x[at["top"]][0]
-        if "impact swing" in at:
-            places -= x[at["impact swing"]] * self._drawn()
-        gains = self.guesses[role].alpha + x[at["alpha"]] + x[at["impulses"]]
-        gains += x[at["strings"]] / above(places.size) ** 2
+        gains, places = parameters[COMMON:].reshape(2, -1)
+        gains += self.guesses[role].alpha
+        places += record.strikes
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
@@ -316,15 +230,7 @@ class DropModel:
         ndarray
             Shape ``(…, unknowns)``.
         """
-        local = self._local[role]
-        found = np.zeros((*derivatives.shape[:-1], len(self.unknowns)))
-        found[..., local.columns[: local.moving]] = derivatives @ local.path
-        return found
-
-    def _drawn(self) -> Array:
-        """`drawn` of each rod of the chain that strikes, as it strikes."""
-        record = self.records["impact"]
-        return drawn(lever(record.chain.chain), self.protocol, -record.strikes)
+        return derivatives @ self._effects[role].path
 
     def stretch(self, x: Array) -> Array:
         """Size of each mode of the stretch, m."""
@@ -336,25 +242,9 @@ class DropModel:
         asked = x.tobytes()
         known = self._levels.get(role)
         if known is None or known[0] != asked:
-            known = self._levels[role] = asked, self._all_levels(role, x)
+            levels = self.expected[role].levels + self._effects[role].levels @ x
+            known = self._levels[role] = asked, levels
         return known[1]
-
-    def _all_levels(self, role: str, x: Array) -> Array:
-        at, edges = self.unknowns, self.expected[role]
-        found: Array = edges.levels - edges.sign * x[at[f"{role} width"]]
-        found += (x[at["beams"]] + x[at["datum"]][self._post])[edges.gate]
-        found -= x[at[f"{role} rods"]][edges.rods]
-        if "ripple" in at:
-            found -= self._tilts[role] * edges.turn * x[at["ripple"]][edges.gate]
-        if f"{role} off centre" in at:
-            found -= edges.turn * x[at[f"{role} off centre"]]
-        if f"{role} swing" in at:
-            found += x[at[f"{role} swing"]] * edges.drawn
-        if role == "impact":
-            found -= edges.alone * x[at["top"]][0]
-            found -= edges.landed * x[at["landed"]][0]
-            found += self.discrepancy.stretch @ self.stretch(x)
-        return found
 
     def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
         """Collect the matched edges; a matching stays for many steps of an adjustment."""
@@ -425,56 +315,23 @@ class DropModel:
         knew of a stamp's own error would make a slow clock, with which all errors are smaller,
         look likelier.
         """
-        at, local, seen = self.unknowns, self._local[role], self._matched(role, matches)
-        rate, path = 1.0 + float(x[at["clock"]][0]), self.trajectory(role, x)
+        effects, seen = self._effects[role], self._matched(role, matches)
+        rate, path = 1.0 + float(x[self.unknowns["clock"]][0]), self.trajectory(role, x)
         times, late, levels, loose = self._stamps(role, x, seen)
-        height, speed, moved = path.sights(times, local.path)
+        height, speed, moved = path.sights(
+            times, effects.path[:, effects.columns[: effects.moving]]
+        )
         values = height - levels + speed * late
         sigma = self._sigma(seen, speed, loose)
-        slopes = np.zeros((times.size, local.columns.size))
-        places, fixed = self._fixed_slopes(role, seen)
-        slopes.ravel()[places] = fixed
-        slopes[:, : local.moving] += moved
+        slopes = -effects.levels[seen.pick[:, None], effects.columns]
+        slopes[:, : effects.moving] += moved
         # Of a slow clock the true time is later, and the chain lower by then.
-        slopes[:, local.at[at["clock"].start]] -= speed * times / rate
+        slopes[:, effects.clock] -= speed * times / rate
         told = self._part(seen, loose > 0.0, values, sigma)
         second = np.flatnonzero(told)
         slopes[second] -= told[second, None] * slopes[second - 1]
         left = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
-        return Equations(left, told, slopes, local.columns)
-
-    def _fixed_slopes(self, role: str, seen: Seen) -> tuple[Index, Array]:
-        """Return what of the slopes is the same wherever the chain is: flat places, and values."""
-        known = self._fixed.get(role)
-        if known is not None and known[0] is seen:
-            return known[1:]
-        at, of = self.unknowns, self._local[role].at
-        columns: list[tuple[Index | int, Array | float]] = [
-            (at[f"{role} rods"].start + seen.rods, 1.0),
-            (at[f"{role} width"].start, seen.sign),
-            (at["beams"].start + seen.gate, -1.0),
-            (at["datum"].start + self._post[seen.gate], -1.0),
-        ]
-        if "ripple" in at:
-            columns.append((at["ripple"].start + seen.gate, self._tilts[role] * seen.turn))
-        if f"{role} off centre" in at:
-            columns.append((at[f"{role} off centre"].start, seen.turn))
-        if f"{role} swing" in at:
-            columns.append((at[f"{role} swing"].start, -seen.drawn))
-        if role == "impact":
-            columns.append((at["top"].start, seen.alone.astype(np.float64)))
-            columns.append((at["landed"].start, seen.landed))
-            modes = -self.discrepancy.stretch[seen.pick].T
-            for name in STRETCHES:
-                columns += [(at[name].start + n, mode) for n, mode in enumerate(modes)]
-        edges = seen.times.size
-        places = np.empty((len(columns), edges), dtype=np.intp)
-        values = np.empty((len(columns), edges))
-        for n, (column, value) in enumerate(columns):
-            places[n], values[n] = of[column], value
-        places += np.arange(edges) * self._local[role].columns.size
-        self._fixed[role] = seen, places, values
-        return places, values
+        return Equations(left, told, slopes, effects.columns)
 
 
 def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:

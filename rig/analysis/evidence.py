@@ -43,8 +43,6 @@ _EDGES = ("jitter", "floor", "departure", "few")
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
-_KINDS = {"beams": "gates", "ripple": "beam", " rods": "rods", "usual stretch": "stretch"}
-"""By how the name of a block of the session's unknowns ends: which scale its members tell."""
 _BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
@@ -78,29 +76,26 @@ class Evidence:
         self._impulses: list[Array] = []
         self._edges: list[tuple[Array, Array, Array]] = []
 
-    def common(self, name: str, y: Array, v: Array, sd: Array) -> None:
+    def common(self, kind: str, y: Array, v: Array, sd: Array) -> None:
         """Count a block of the session's unknowns.
 
         Parameters
         ----------
+        kind
+            Which scale its members tell; none of what is one number, which has no scatter.
         y, v
             Estimates and variances in units of the prior uncertainties `sd`.
         """
-        # Clock, gravity, drop and air are one number each: one number has no scatter to estimate.
-        block = name.partition(" at ")[0]
-        kind = next((kind for end, kind in _KINDS.items() if block.endswith(end)), None)
-        if kind is not None:
+        if kind:
             self._count(kind, y[sd > 0.0], v[sd > 0.0])
 
     def drop(self, model: DropModel, y: Array, v: Array) -> None:
         """Count the unknowns of one drop, in units of their prior uncertainties."""
         at = model.unknowns
-        for role in model.records:
-            self._count("hang", y[at[f"{role} hang"]], v[at[f"{role} hang"]])
-        if "free swing" in at:  # once rods have struck, what a chain does else looks like it
-            self._count("swing", y[at["free swing"]], v[at["free swing"]])
-        if "stretch" in at:
-            self._count("stretch", y[at["stretch"]], v[at["stretch"]])
+        for name, row in at.rows.items():
+            # Once rods have struck, what a chain does else looks like its swing.
+            if row.shared == "drop" and row.scale and name in at and name != "impact swing":
+                self._count(row.scale, y[at[name]], v[at[name]])
         if "impulses" in at:
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
             # Back to α², for drops of different α have different units.

@@ -258,7 +258,8 @@ def _weigh(
     new = Evidence(evidence.components, evidence.stated)
     remaining = np.sum(inverse**2, axis=1)
     for name, block in shared.blocks.items():
-        new.common(name, scaled(x, sd)[block], remaining[block], sd[block])
+        scale = shared.rows[name].scale
+        new.common(scale, scaled(x, sd)[block], remaining[block], sd[block])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     struck = 0.0
     for drop in drops:

@@ -1,210 +1,545 @@
-"""Everything that is not known about a drop, with what is known of it beforehand.
+"""Everything that is not known about a drop: one table, from which all else follows.
 
-Some of it is the rig's and the chains' own, the same in every drop (`SharedUnknowns`).
+A row of `TABLE` says what an unknown is called, its line of the uncertainty budget, what is known
+of it beforehand, who has it in common, and what it does to the path of a chain and to the levels at
+which edges are expected. Priors, observation equations, budget and joint fit are read from it; a
+scene that lacks something lacks its row.
 """
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from rig.analysis.components import above
-from rig.analysis.discrepancy import STRETCHES
+from rig.analysis.discrepancy import MODES
+from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord
+    from rig.analysis.components import Components
     from rig.analysis.drop_model import DropModel
+    from rig.analysis.equations import Expected
+    from rig.protocol.protocol import Gates, Protocol
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
+    Effect = Callable[["Side"], Array]
 
 ANYTHING = 1.0
 """Prior of release times (s) and α: nothing is known."""
 ANY_GRAVITY = 5.0
 """Prior of gravity where it is what a scene measures, m/s²."""
 
-_RIG = ("clock", "gravity", "drop", "side", "drag", "datum", "beams", "ripple")
-_CHAIN = ("rods", "width")
 
+class Side(NamedTuple):
+    """A chain of a drop, as the rows of the table look at it."""
 
-class Unknowns:
-    """Named blocks of one long vector of unknowns, each with its prior standard uncertainty.
+    model: DropModel
+    record: ChainRecord
 
-    All values are deviations from the nominal scene, so the prior mean is zero everywhere.
-    """
+    @property
+    def protocol(self) -> Protocol:
+        """Of the scene."""
+        return self.model.protocol
 
-    def __init__(self) -> None:
-        self._blocks: dict[str, slice] = {}
-        self._groups: dict[str, list[slice]] = {}
-        self._sd: list[float] = []
+    @property
+    def gates(self) -> Gates:
+        """Of the scene."""
+        assert self.protocol.gates is not None
+        return self.protocol.gates
 
-    def add(self, name: str, group: str, sd: float | Sequence[float] | Array) -> None:
-        """Add a block.
+    @property
+    def edges(self) -> Expected:
+        """Of its gates."""
+        return self.model.expected[self.record.role]
+
+    @property
+    def rods(self) -> int:
+        """How many it has."""
+        return self.record.chain.chain.rods
+
+    @property
+    def alpha(self) -> float:
+        """Of its impacts, as it is guessed."""
+        return abs(self.model.guesses["impact"].alpha)
+
+    @property
+    def slope(self) -> float:
+        """Tangent of the tilt of its rods."""
+        return math.tan(math.radians(self.record.chain.tilt_deg))
+
+    @property
+    def steepest(self) -> float:
+        """That of the drop's more tilted chain."""
+        return max(Side(self.model, record).slope for record in self.model.records.values())
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers its trajectory has; see `rig.analysis.trajectory.struck_trajectory`."""
+        return COMMON if self.record.ratios is None else COMMON + 2 * self.record.ratios.size
+
+    def path_slopes(self, first: int, slopes: Array) -> Array:
+        """Derivatives of all parameters from those of some of them.
 
         Parameters
         ----------
-        name
-            To find it.
-        group
-            The line of the uncertainty budget it belongs to.
-        sd
-            Prior standard uncertainties.
+        first
+            Of these in the trajectory's parameters.
+        slopes
+            Shape ``(some,)`` or ``(some, members)``.
         """
-        values = [sd] if isinstance(sd, int | float) else [*sd]
-        block = slice(len(self._sd), len(self._sd) + len(values))
-        self._blocks[name] = block
-        self._groups.setdefault(group, []).append(block)
-        self._sd += values
+        slopes = slopes.reshape(slopes.shape[0], -1)
+        found = np.zeros((self.parameters, slopes.shape[1]))
+        found[first : first + slopes.shape[0]] = slopes
+        return found
 
-    def __len__(self) -> int:
-        return len(self._sd)
+    def gain_slopes(self, slopes: Array) -> Array:
+        """Derivatives of all parameters from those of each impact's α."""
+        return self.path_slopes(COMMON, slopes)
 
-    def __getitem__(self, name: str) -> slice:
-        return self._blocks[name]
-
-    def __contains__(self, name: object) -> bool:
-        """Whether anything of a block is unknown: what is known exactly is as if it were not."""
-        block = self._blocks.get(str(name))
-        return block is not None and any(self._sd[block])
-
-    @property
-    def blocks(self) -> dict[str, slice]:
-        """Place of each block in the vector, by name."""
-        return self._blocks
-
-    @property
-    def places(self) -> tuple[tuple[str, int, int], ...]:
-        """Name, beginning and end of each block."""
-        return tuple((name, block.start, block.stop) for name, block in self._blocks.items())
-
-    @cached_property
-    def sd(self) -> Array:
-        """Prior standard uncertainties once all are added, shape ``(unknowns,)``."""
-        return np.array(self._sd)
-
-    @property
-    def groups(self) -> dict[str, list[slice]]:
-        """Blocks of each line of the uncertainty budget."""
-        return self._groups
+    def place_slopes(self, slopes: Array) -> Array:
+        """Derivatives of all parameters from those of the rods' places as they strike."""
+        if self.record.ratios is None:  # of a free chain no rod strikes
+            return np.zeros((COMMON, 1))
+        return self.path_slopes(COMMON + self.record.ratios.size, slopes)
 
 
-class SideColumns(NamedTuple):
-    """The unknowns that one side knows of, by their places in its own equations.
+@dataclass(frozen=True)
+class Unknown:
+    """A row of the table: a block of unknowns of a drop.
 
     Attributes
     ----------
-    columns
-        Places in the drop's vector, shape ``(columns,)``; first those that move its trajectory.
-    at
-        Where each is among them, by the place in the drop's vector.
-    moving
-        How many move its trajectory.
+    name
+        To find it; after a role where each chain has its own.
+    line
+        Of the uncertainty budget.
+    sd
+        Prior standard uncertainties of its members, but for `scale`; `None` where a scene has no
+        such unknown.
+    of
+        Whose it is: ``impact`` or ``free`` for what only that chain knows of, ``each`` where each
+        chain has its own, ``all`` for what both have in common.
+    shared
+        In which drops it is the same.
     path
-        Derivatives of the trajectory's parameters by these, shape ``(parameters, moving)``.
+        Derivatives of a side's trajectory, shape ``(parameters, members)``.
+    level
+        Derivatives of the levels of its expected edges, shape ``(edges, members)``.
+    scale
+        Of `rig.analysis.components.Components`, which multiplies the prior and which its members
+        tell in turn.
+    absent
+        Share of its prior variance that is none where a prediction's equations hold.
     """
 
-    columns: Index
-    at: Index
-    moving: int
-    path: Array
+    name: str
+    line: str
+    sd: Callable[[Side], float | Sequence[float] | Array | None]
+    of: Literal["all", "each", "impact", "free"] = "all"
+    shared: Literal["rig", "chain", "condition", "drop"] = "drop"
+    path: Effect | None = None
+    level: Effect | None = None
+    scale: str = ""
+    absent: Callable[[Side], float | Array] = lambda _side: 0.0
+
+    def prior(self, side: Side) -> Array | None:
+        """Prior standard uncertainties of its members where there are any, shape ``(members,)``."""
+        sd = self.sd(side)
+        if sd is None:
+            return None
+        scale = float(getattr(side.model.components, self.scale)) if self.scale else 1.0
+        prior: Array = scale * np.atleast_1d(sd)
+        return prior
 
 
-@lru_cache(maxsize=64)  # a session asks for the same few again and again
-def side_columns(
-    places: tuple[tuple[str, int, int], ...],
-    role: str,
-    gates: tuple[int, ...],
-    posts: tuple[str, ...],
-    rods: int,
-    drawn: tuple[float, ...],
-) -> SideColumns:
-    """Leave out what the other side alone depends on.
+def _parameter(place: int) -> Effect:
+    """Move one of the parameters that every trajectory has."""
+    return lambda side: side.path_slopes(place, np.ones(1))
 
-    Parameters
+
+def _by_gate(side: Side) -> Array:
+    gates: Array = np.eye(len(side.gates.gates))[side.edges.gate]
+    return gates
+
+
+def _by_post(side: Side) -> Array:
+    post = [gate.side == np.array(side.gates.posts) for gate in side.gates.gates]
+    posts: Array = np.array(post, dtype=np.float64)[side.edges.gate]
+    return posts
+
+
+def _ripple_sd(side: Side) -> list[float] | None:
+    return [side.steepest] * len(side.gates.gates) if side.steepest else None
+
+
+def _rippled(side: Side) -> Array:
+    """A beam is off by as much for a chain of less tilted rods, which shows less."""
+    return -side.slope / side.steepest * side.edges.turn[:, None] * _by_gate(side)
+
+
+def _swing_sd(side: Side) -> float | None:
+    if side.protocol.surface is None or side.rods < 2:
+        return None
+    return swing_sd(side.record.chain.chain, side.protocol)
+
+
+def _swung(side: Side) -> Array:
+    """How much lower each rod is as it strikes."""
+    levers = lever(side.record.chain.chain)
+    return side.place_slopes(-drawn(levers, side.protocol, -side.record.strikes))
+
+
+def _impulse_sd(side: Side) -> Array:
+    components: Components = side.model.components
+    return components.impulses(side.alpha, above(side.rods))
+
+
+def _bounces(side: Side) -> Array:
+    """Share of the variance of impulses that strings make by bouncing."""
+    sd = _impulse_sd(side)
+    bounces = side.model.components.bounce * side.alpha / above(sd.size)
+    # Zero where impulses are known exactly: then none bounce either.
+    share: Array = np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2
+    return share
+
+
+def _top_sd(side: Side) -> float:
+    """It falls on as it was off its chain while two were left."""
+    components = side.model.components
+    return math.sqrt(2.0) * math.hypot(components.departure, 0.5 * components.few)
+
+
+def _stretch_sd(side: Side) -> list[float]:
+    """A half of its variance is the same in all drops."""
+    priors = side.protocol.priors
+    size = priors.stretch * math.hypot(side.record.alpha, priors.impulse_floor)
+    return [math.sqrt(0.5) * size * side.record.chain.chain.length] * MODES
+
+
+def _late_sd(side: Side) -> float:
+    """No edge tells it; where strings do not bounce, there is none."""
+    priors = side.protocol.priors
+    bounce = side.model.components.bounce / priors.last_impulse if priors.last_impulse else 1.0
+    return bounce * priors.late_pull
+
+
+def _contact(side: Side) -> Array:
+    """Results are at the stated level: where the top rod would be if others struck elsewhere."""
+    return side.place_slopes(np.append(-np.ones(side.rods - 1), 0.0))
+
+
+def _top(side: Side) -> Array:
+    return side.place_slopes(np.append(np.zeros(side.rods - 1), 1.0))
+
+
+def _all(_: Side) -> float:
+    return 1.0
+
+
+TABLE = (
+    Unknown("clock", "clock", lambda side: side.model.clock_u, shared="rig"),
+    Unknown(
+        "gravity",
+        "gravity",
+        lambda side: None if side.protocol.surface is None else side.protocol.gravity.u,
+        shared="rig",
+        path=_parameter(GRAVITY),
+    ),
+    Unknown(  # Where gravity is the result, each drop measures it for itself.
+        "gravity",
+        "gravity",
+        lambda side: ANY_GRAVITY if side.protocol.surface is None else None,
+        path=_parameter(GRAVITY),
+    ),
+    Unknown(
+        "drop",
+        "drop height",
+        lambda side: side.protocol.drop.u,
+        shared="rig",
+        path=_parameter(START),
+    ),
+    Unknown(
+        "side",
+        "side",
+        lambda side: side.protocol.priors.side if len(side.model.records) > 1 else None,
+        of="free",
+        shared="rig",
+        path=_parameter(START),
+    ),
+    Unknown(
+        "drag",
+        "air",
+        lambda side: side.model.kappa_u,
+        shared="rig",
+        path=_parameter(DRAG),
+        absent=lambda side: float(side.protocol.drag is None),
+    ),
+    Unknown(
+        "datum",
+        "datum",
+        lambda side: [side.gates.datum_u] * len(side.gates.posts),
+        shared="rig",
+        level=_by_post,
+    ),
+    Unknown(
+        "beams",
+        "beam heights",
+        lambda side: [side.gates.height_u] * len(side.gates.gates),
+        shared="rig",
+        level=_by_gate,
+        scale="gates",
+    ),
+    Unknown("ripple", "beam offsets", _ripple_sd, shared="rig", level=_rippled, scale="beam"),
+    Unknown(  # Told by the edges alone, so its uncertainty counts as theirs.
+        "release", "edges", lambda _: ANYTHING, of="each", path=_parameter(RELEASE)
+    ),
+    Unknown("hang", "start height", _all, of="each", path=_parameter(START), scale="hang"),
+    Unknown(
+        "rods",
+        "spacing",
+        lambda side: [side.record.chain.position_u] * side.rods,
+        of="each",
+        shared="chain",
+        path=lambda side: side.place_slopes(np.eye(side.rods)),
+        level=lambda side: -np.eye(side.rods)[side.edges.rods],
+        scale="rods",
+    ),
+    Unknown(
+        "off centre",
+        "beam offsets",
+        lambda side: side.protocol.priors.off_centre * side.slope if side.steepest else None,
+        of="each",
+        level=lambda side: -side.edges.turn,
+    ),
+    Unknown(
+        "width",
+        "width",
+        lambda side: side.record.chain.width_u,
+        of="each",
+        shared="chain",
+        level=lambda side: -side.edges.sign,
+    ),
+    Unknown(
+        "swing",
+        "swing",
+        _swing_sd,
+        of="each",
+        path=_swung,
+        level=lambda side: side.edges.drawn,
+        scale="swing",
+    ),
+    Unknown(
+        "alpha",
+        "edges",
+        lambda _: ANYTHING,
+        of="impact",
+        path=lambda side: side.gain_slopes(np.ones(side.rods)),
+    ),
+    Unknown(
+        "impulses",
+        "single impulses",
+        _impulse_sd,
+        of="impact",
+        path=lambda side: side.gain_slopes(np.eye(side.rods)),
+        absent=_bounces,
+    ),
+    Unknown(
+        "contact",
+        "contact",
+        lambda side: side.protocol.contact.level.u,
+        of="impact",
+        shared="condition",
+        path=_contact,
+    ),
+    Unknown("strike", "contact", lambda side: side.protocol.contact.strike.u, of="impact"),
+    Unknown(
+        "top",
+        "top rod",
+        _top_sd,
+        of="impact",
+        path=_top,
+        level=lambda side: -side.edges.alone.astype(np.float64),
+    ),
+    Unknown(
+        "landed",
+        "contact",
+        lambda side: side.model.components.landed,
+        of="impact",
+        level=lambda side: -side.edges.landed,
+    ),
+    Unknown(
+        "strings",
+        "single impulses",
+        lambda side: side.protocol.priors.strings * abs(side.record.alpha),
+        of="impact",
+        shared="condition",
+        path=lambda side: side.gain_slopes(above(side.rods) ** -2.0),
+        absent=_all,
+    ),
+    Unknown(
+        "stretch",
+        "stretch",
+        _stretch_sd,
+        of="impact",
+        level=lambda side: side.model.discrepancy.stretch,
+        scale="stretch",
+        absent=_all,
+    ),
+    Unknown(
+        "usual stretch",
+        "stretch",
+        _stretch_sd,
+        of="impact",
+        shared="condition",
+        level=lambda side: side.model.discrepancy.stretch,
+        scale="stretch",
+        absent=_all,
+    ),
+    Unknown("late", "late pull", _late_sd, of="impact", absent=_all),
+)
+"""In the order of a drop's vector. The clock acts on stamps, `strike` and `late` on results alone.
+"""
+
+
+class Unknowns:
+    """Named blocks of one long vector of a drop's unknowns, as the table has them.
+
+    All values are deviations from the nominal scene, so the prior mean is zero everywhere.
+
+    Attributes
     ----------
-    places
-        As in `Unknowns`.
-    gates
-        Numbers of those beside this side's chain.
-    posts
-        Sides that have a post, in order.
-    rods
-        Of the chain that strikes; 0 for the free side.
-    drawn
-        See `rig.analysis.swing.drawn`, of each of these rods as it strikes; none where it does not
-        swing.
+    rows
+        Of the table, by the name of the block: that of the row, after the role of the chain where
+        each has its own.
+    blocks
+        Place of each block in the vector, by name.
+    groups
+        Blocks of each line of the uncertainty budget.
+    sd
+        Prior standard uncertainties, shape ``(unknowns,)``.
     """
-    at = {name: slice(begin, end) for name, begin, end in places}
-    others = ["impact " if role == "free" else "free "]
-    if role == "free":
-        others += ["alpha", "impulses", "contact", "strike", "top", "landed", "late"]
-        others += ["strings", *STRETCHES]
-    mine = np.ones(places[-1][2], dtype=np.bool_)
-    for name, block in at.items():
-        mine[block] = not name.startswith(tuple(others)) and (name, role) != ("side", "impact")
-    for name in ("beams", "ripple"):
-        if name in at:
-            mine[at[name]] &= np.isin(np.arange(at[name].stop - at[name].start), gates)
-    mine[at["datum"]] &= np.array(posts) == role
-    path = _path(at, role, mine.size, rods, drawn)
-    moves = mine & path.any(axis=0)
-    moving = np.flatnonzero(moves)
-    columns = np.concatenate([moving, np.flatnonzero(mine & ~moves)])
-    place = np.zeros(mine.size, dtype=np.intp)
-    place[columns] = np.arange(columns.size)
-    return SideColumns(columns, place, moving.size, path[:, moving])
+
+    def __init__(self, model: DropModel) -> None:
+        self.rows: dict[str, Unknown] = {}
+        self.blocks: dict[str, slice] = {}
+        self.groups: dict[str, list[slice]] = {}
+        priors: list[Array] = []
+        size = 0
+        for name, row, side in _named(model):
+            prior = row.prior(side)
+            if prior is None:
+                continue
+            self.rows[name] = row
+            self.blocks[name] = block = slice(size, size + prior.size)
+            self.groups.setdefault(row.line, []).append(block)
+            priors.append(prior)
+            size = block.stop
+        self.sd: Array = np.concatenate(priors)
+
+    def __len__(self) -> int:
+        return self.sd.size
+
+    def __getitem__(self, name: str) -> slice:
+        return self.blocks[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether anything of a block is unknown: what is known exactly is as if it were not."""
+        block = self.blocks.get(str(name))
+        return block is not None and bool(self.sd[block].any())
 
 
-def _path(
-    at: Mapping[str, slice], role: str, size: int, rods: int, drawn: tuple[float, ...]
-) -> Array:
-    """Derivatives of a trajectory's parameters by all unknowns."""
-    found = np.zeros((COMMON + 2 * rods, size))
-    found[RELEASE, at[f"{role} release"]] = found[GRAVITY, at["gravity"]] = 1.0
-    found[DRAG, at["drag"]] = 1.0
-    found[START, at["drop"]] = found[START, at[f"{role} hang"]] = 1.0
-    if role == "free" and "side" in at:
-        found[START, at["side"]] = 1.0
-    if role == "impact":
-        gains, places = slice(COMMON, COMMON + rods), slice(COMMON + rods, COMMON + 2 * rods)
-        row = np.arange(rods)
-        found[gains, at["alpha"]] = 1.0
-        found[COMMON + row, at["impulses"].start + row] = 1.0
-        found[gains, at["strings"].start] = above(rods) ** -2.0
-        found[COMMON + rods + row, at["impact rods"].start + row] = 1.0
-        found[COMMON + rods + row[:-1], at["contact"].start] = -1.0
-        found[-1, at["top"]] = 1.0
-        if drawn:
-            found[places, at["impact swing"].start] = -np.array(drawn)
-    return found
+def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
+    """Go through the rows for the chains that there are."""
+    sides = {role: Side(model, record) for role, record in model.records.items()}
+    for own, rows in groupby(TABLE, lambda row: row.of == "each"):
+        if own:
+            each = [*rows]
+            for role, side in sides.items():
+                yield from ((f"{role} {row.name}", row, side) for row in each)
+        else:
+            first = next(iter(sides.values()))
+            for row in rows:
+                if row.of == "all" or row.of in sides:
+                    yield row.name, row, sides.get(row.of, first)
+
+
+class Effects(NamedTuple):
+    """What all unknowns of a drop do to one side, to which path and levels are linear in them.
+
+    Attributes
+    ----------
+    path
+        Derivatives of the trajectory's parameters, shape ``(parameters, unknowns)``.
+    levels
+        Derivatives of the levels of expected edges, shape ``(edges, unknowns)``.
+    columns
+        Unknowns that this side knows of, by their places in the drop's vector; first those that
+        move its trajectory. Shape ``(columns,)``.
+    moving
+        How many do.
+    clock
+        Which of the columns is the clock.
+    """
+
+    path: Array
+    levels: Array
+    columns: Index
+    moving: int
+    clock: int
+
+
+def effects(model: DropModel, role: str) -> Effects:
+    """Put together what the rows of the table do to one side."""
+    at, side = model.unknowns, Side(model, model.records[role])
+    path = np.zeros((side.parameters, len(at)))
+    levels = np.zeros((side.edges.rods.size, len(at)))
+    for name, row in at.rows.items():
+        if row.of in {"all", role} or (row.of == "each" and name.startswith(role)):
+            if row.path is not None:
+                path[:, at[name]] = row.path(side)
+            if row.level is not None:
+                levels[:, at[name]] = row.level(side).reshape(len(levels), -1)
+    moving = np.flatnonzero(path.any(axis=0))
+    known = np.append(np.flatnonzero(levels.any(axis=0)), at["clock"].start)
+    columns = np.append(moving, np.setdiff1d(known, moving))
+    (clock,) = np.flatnonzero(columns == at["clock"].start)
+    return Effects(path, levels, columns, moving.size, int(clock))
 
 
 class SharedUnknowns:
     """One vector of everything that the drops of a session have in common.
 
     A chain's rods are the same whether it strikes or falls freely, which is what tells them from
-    beam heights: chains change sides, beams do not. Gravity is common too, unless it is what is
-    measured: then each drop has its own.
+    beam heights: chains change sides, beams do not.
 
     Attributes
     ----------
     blocks
         Place of each block in the vector, by name.
+    rows
+        Of the table, by the same names.
     """
 
     def __init__(self, models: Iterable[DropModel]) -> None:
         self.blocks: dict[str, slice] = {}
+        self.rows: dict[str, Unknown] = {}
         self._size = 0
         for model in models:
-            for name, block in _names(model).items():
+            at = model.unknowns
+            for name, own in _common(model).items():
                 if name not in self.blocks:
-                    size = block.stop - block.start
+                    self.rows[name], size = at.rows[own], at[own].stop - at[own].start
                     self.blocks[name] = slice(self._size, self._size + size)
                     self._size += size
 
@@ -213,21 +548,23 @@ class SharedUnknowns:
 
     def places(self, model: DropModel) -> tuple[Index, Index]:
         """Where a drop's common unknowns are, in its own vector and in this one."""
-        names = _names(model)
-        own = [np.arange(block.start, block.stop) for block in names.values()]
-        here = [np.arange(self.blocks[n].start, self.blocks[n].stop) for n in names]
-        return np.concatenate(own), np.concatenate(here)
+        places: list[Index] = []
+        here: list[Index] = []
+        for name, own in _common(model).items():
+            block, common = model.unknowns[own], self.blocks[name]
+            places.append(np.arange(block.start, block.stop))
+            here.append(np.arange(common.start, common.stop))
+        return np.concatenate(places), np.concatenate(here)
 
 
-def _names(model: DropModel) -> dict[str, slice]:
-    """Blocks of one drop that are common, by the name they have for all."""
-    at = model.unknowns
-    # Where gravity is the result, each drop measures it for itself, and runs are averaged.
-    measured = {"gravity"} if model.protocol.surface is None else set()
-    found = {name: at[name] for name in _RIG if name in at and name not in measured}
-    for role, record in model.records.items():
-        if role == "impact":
-            for name in ("contact", "usual stretch", "strings"):
-                found[f"{name} at {record.condition}"] = at[name]
-        found |= {f"{record.chain.name} {what}": at[f"{role} {what}"] for what in _CHAIN}
-    return found
+def _common(model: DropModel) -> dict[str, str]:
+    """Return the names of a drop's common blocks in its own vector, by those they have for all."""
+    names: dict[str, str] = {}
+    for own, row in model.unknowns.rows.items():
+        if row.shared == "rig":
+            names[own] = own
+        elif row.shared == "chain":
+            names[f"{model.records[own.partition(' ')[0]].chain.name} {row.name}"] = own
+        elif row.shared == "condition":
+            names[f"{own} at {model.records['impact'].condition}"] = own
+    return names

@@ -100,7 +100,7 @@ def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
         jacobian = whole(found, x.size)
         np.testing.assert_allclose(jacobian[smooth], expected[smooth], rtol=1e-7, atol=2e-9)
         moving |= (jacobian != 0.0).any(axis=0)
-    idle = {name for name in model.unknowns._blocks if not moving[model.unknowns[name]].any()}
+    idle = {name for name in model.unknowns.blocks if not moving[model.unknowns[name]].any()}
     assert idle == ({"strike", "late"} if "impact" in model.records else set())
 
 
@@ -167,10 +167,10 @@ def test_a_scene_yields_what_it_has(protocol, names):
 
 def test_what_a_scene_lacks_is_no_unknown():
     uniform, single, fence = (case(p).model()[0].unknowns for p in (UNIFORM, SINGLE, FENCE))
-    assert {"alpha", "impulses", "impact release", "free release", "ripple"} <= set(uniform._blocks)
-    assert not {name for name in single._blocks if name.startswith("free")}
-    assert not {name for name in fence._blocks if name.startswith("impact")}
-    assert not {"alpha", "impulses", "ripple"} & set(fence._blocks)  # its bars are level
+    assert {"alpha", "impulses", "impact release", "free release", "ripple"} <= set(uniform.blocks)
+    assert not {name for name in single.blocks if name.startswith("free")}
+    assert not {name for name in fence.blocks if name.startswith("impact")}
+    assert not {"alpha", "impulses", "ripple"} & set(fence.blocks)  # its bars are level
 
 
 def test_a_beam_off_the_middle_counts_as_the_rods_are_tilted():
