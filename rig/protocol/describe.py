@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rig.boards import BOARDS
 from rig.model.chain import XI
 from rig.protocol.contact import touching_heights
+from rig.protocol.keys import DEFAULTS, SECTIONS, range_of
 from rig.protocol.measurable import (
     lacking,
     longest_fall,
@@ -19,11 +20,11 @@ from rig.protocol.measurable import (
     unmeasurable,
 )
 from rig.protocol.plan import runs
-from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Priors
+from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from rig.protocol.protocol import Drag, InclinedTrack, Protocol, RodChain
 
@@ -166,49 +167,34 @@ def _gates(protocol: Protocol) -> list[str]:
     return lines
 
 
-_EVERYWHERE = {"edge_floor", "jitter", "hang"}
-"""Priors of every scene; of those that are not named apart only what strikes something has any."""
+SCENES: dict[str, Callable[[Protocol], bool]] = {
+    "": lambda _: True,
+    "surface": lambda protocol: protocol.surface is not None,
+    "two chains": lambda protocol: protocol.two_chains,
+    "rods that strike": lambda protocol: protocol.surface is not None and not protocol.one_object,
+    "tilted rods": lambda protocol: any(rods.tilt_deg for rods in protocol.chains.values()),
+    "no drag": lambda protocol: protocol.drag is None,
+}
+"""What a scene may need for a key to matter, see `rig.protocol.keys.Key`."""
 
 
 def _priors(protocol: Protocol) -> list[str]:
     """List what is assumed where nothing was measured, as standard deviations."""
     if protocol.gates is None:
         return []
-    from rig.protocol.priors import PRIORS  # noqa: PLC0415 - only where something is measured
-
-    usual, unused, lines = Priors(), _unused(protocol, PRIORS), list[str]()
-    for name, row in PRIORS.items():
-        if name in unused:
-            continue
-        value = getattr(protocol.priors, name)
-        text = _number(value, row.accepted.unit)
-        stated = "" if value == getattr(usual, name) else " (stated)"
-        lines.append(f"{name:14} {text:>8}{stated}  {row.words}")
+    lines = []
+    for name, key in SECTIONS["priors"].items():
+        if SCENES[key.scene](protocol):
+            value = getattr(protocol.priors, name)
+            stated = "" if value == DEFAULTS[key.path] else " (stated)"
+            text = _number(value, range_of(key.path).unit)
+            lines.append(f"{name:14} {text:>8}{stated}  {key.meaning}")
     if protocol.surface is not None:
-        level, strike = (
-            format_quantity(one, "mm") for one in (protocol.contact.level, protocol.contact.strike)
-        )
-        lines += _touching(protocol, level)
+        contact = protocol.contact
+        lines += _touching(protocol, format_quantity(contact.level, "mm"))
+        strike = format_quantity(contact.strike, "mm")
         lines.append(f"the top rod strikes {strike} above it, on the rods below")
     return lines
-
-
-def _unused(protocol: Protocol, priors: Iterable[str]) -> set[str]:
-    """Name the priors that nothing in a scene depends on."""
-    chains = protocol.chains.values()
-    struck = protocol.surface is not None
-    needed = (
-        dict.fromkeys(priors, struck)
-        | dict.fromkeys(_EVERYWHERE, True)
-        | {
-            "side": protocol.two_chains,
-            "drag": protocol.drag is None,
-            "beam_offset": any(one.tilt_deg for one in chains),
-            "off_centre": any(one.tilt_deg for one in chains),
-            "swing": struck and any(one.chain.rods > 1 for one in chains),
-        }
-    )
-    return {name for name, is_needed in needed.items() if not is_needed}
 
 
 def _touching(protocol: Protocol, level: str) -> list[str]:

@@ -1,25 +1,45 @@
-"""Reading the fields of a mapping: each value checked at its place, every fault kept.
+"""Reading a mapping by the table of keys: each value checked at its place, every fault kept.
 
-A reader asks a `Section` for each key with a converter. A converter returns the value, or notes a
-fault and returns ``None``; so one pass over a file finds everything that is wrong with it.
+A `Section` reads all its keys at once: what is faulty, or missing though it is required, is noted
+and becomes ``None``. So one pass over a file finds everything that is wrong with it, and what
+follows checks only what keys have to do with each other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import Problem
-from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
-from rig.units import Dimension, Quantity, UnitError, format_quantity, parse, quoted
+from rig.protocol.keys import (
+    BOOLEANS,
+    DEFAULTS,
+    EACH,
+    SECTIONS,
+    Either,
+    Key,
+    ListOf,
+    Mapped,
+    OneOf,
+    OneOrMore,
+    Range,
+    Text,
+    Whole,
+    example,
+)
+from rig.protocol.yamltree import Mapping, ScalarNode, Sequence
+from rig.units import UnitError, parse, quoted
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rig.protocol.keys import Accepted
+    from rig.protocol.yamltree import Node, Place
 
 
 @dataclass(slots=True)
 class FieldFaults:
-    """The problems found so far in one file."""
+    """The problems noted so far in one file."""
 
     source: str
     problems: dict[tuple[int, int, str], Problem] = field(default_factory=dict)
@@ -30,90 +50,104 @@ class FieldFaults:
         self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, message))
 
 
-Converter = Callable[[Node, str, FieldFaults], T | None]
-
-
 class Section:
-    """One mapping of the file.
+    """One mapping of the file, read by the keys that the table has for it.
 
     Parameters
     ----------
     node
         The mapping.
     path
-        Its key path, empty for the root.
+        Its key path in the file, empty for the root.
+    general
+        The same in the table, see `rig.protocol.keys.ANY`.
     faults
         Where problems go.
-    accepted
-        All keys it may have; others, and repeated ones, are noted at once.
     lenient
         Do not note missing keys (used when the chain named by `like` is itself faulty).
 
     Attributes
     ----------
-    strange
-        Whether any key is not accepted: what seems to be missing may be that one, misspelt.
+    values
+        By key: as read, or the default; `None` where it is faulty, or missing without a default.
+    misspelt
+        Whether any key is not accepted: what seems to be missing may be that one.
     """
 
     def __init__(
-        self,
-        node: Mapping,
-        path: str,
-        faults: FieldFaults,
-        accepted: tuple[str, ...],
-        *,
-        lenient: bool = False,
+        self, node: Mapping, path: str, general: str, faults: FieldFaults, *, lenient: bool = False
     ) -> None:
         self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
-        self.keys, self.values = unique_entries(node, path, faults)
-        self.strange = not self.keys.keys() <= set(accepted)
-        for key, place in self.keys.items():
-            if key not in accepted:
-                word, colon, _ = key.partition(":")
-                message = f"unknown key; {did_you_mean(key, accepted)}"
-                message += f"accepted here: {', '.join(accepted)}"
-                if colon and word in accepted:  # {channel:0} is one key without a value
-                    message = f"a blank is missing after the colon of {word}"
-                faults.add(place, self.key(key), message)
+        self.keys, self.nodes = unique_entries(node, path, faults)
+        table = SECTIONS[general]
+        self._table = table
+        self._faulty: set[str] = set()
+        self.misspelt = not self.keys.keys() <= table.keys()
+        for name in self.keys.keys() - table.keys():
+            self.fault(name, _unknown_key(name, table), at_key=True)
+        self.values = {name: self._read(name, key) for name, key in table.items()}
 
-    def __contains__(self, key: str) -> bool:
-        return key in self.values
+    def __contains__(self, name: str) -> bool:
+        return name in self.nodes
 
-    def key(self, key: str) -> str:
+    def __getitem__(self, name: str) -> Any:
+        return self.values[name]
+
+    def _read(self, name: str, key: Key) -> Any:
+        if name in self.nodes:
+            value = read_value(
+                key.accepted, self.nodes[name], self.key(name), key.path, self.faults
+            )
+            if not _is_sound(value):
+                self._faulty.add(name)
+            return value
+        if key.required:
+            self.need(name)
+        return DEFAULTS[key.path]
+
+    def is_sound(self, *names: str) -> bool:
+        """Whether nothing is faulty or missing: of these keys, or of all."""
+        return self._faulty.isdisjoint(names) if names else not self._faulty
+
+    def need(self, name: str) -> bool:
+        """Return whether a key is there; note that it is missing otherwise."""
+        if name not in self.nodes:
+            self._faulty.add(name)
+            if not self.lenient:
+                message = f"missing; write for example {name}: {example(self._table[name])}"
+                self.faults.add(self.node.place, self.key(name), message)
+        return name in self.nodes
+
+    def key(self, name: str) -> str:
         """Return the full path of one of its keys."""
-        return join(self.path, key)
+        return join(self.path, name)
 
-    def place(self, key: str) -> Place:
-        """Return where the value of `key` stands, or the mapping itself if it is missing."""
-        return self.values[key].place if key in self.values else self.node.place
+    def place(self, name: str) -> Place:
+        """Return where the value of a key stands, or the mapping itself if it is missing."""
+        return self.nodes[name].place if name in self.nodes else self.node.place
 
-    def fault(self, key: str, message: str, *, at_key: bool = False) -> None:
-        """Note a problem with the value of `key` (or with the key's being there)."""
-        place = self.keys[key] if at_key else self.place(key)
-        self.faults.add(place, self.key(key), message)
+    def fault(self, name: str, message: str, *, at_key: bool = False) -> None:
+        """Note a problem with the value of a key (or with the key's being there)."""
+        place = self.keys[name] if at_key else self.place(name)
+        self.faults.add(place, self.key(name), message)
 
     def refuse(self, message: str) -> None:
         """Note a problem with the mapping as a whole."""
         self.faults.add(self.node.place, self.path, message)
 
-    def take(
-        self,
-        key: str,
-        convert: Converter[T],
-        default: T | None = None,
-        *,
-        required: str = "",
-    ) -> T | None:
-        """Return the value of a key, `default` if it is missing, ``None`` if it is faulty.
 
-        `required` is an example of the key; when given, a missing key is a fault.
-        """
-        if key in self.values:
-            return convert(self.values[key], self.key(key), self.faults)
-        if required and not self.lenient:
-            message = f"missing; write for example {key}: {required}"
-            self.faults.add(self.node.place, self.key(key), message)
-        return default
+def _is_sound(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_sound, value))
+    return value.is_sound() if isinstance(value, Section) else value is not None
+
+
+def _unknown_key(name: str, accepted: Iterable[str]) -> str:
+    """Say what may be meant by a key that is not accepted."""
+    word, colon, _ = name.partition(":")
+    if colon and word in accepted:  # {channel:0} is one key without a value
+        return f"a blank is missing after the colon of {word}"
+    return f"unknown key; {did_you_mean(name, accepted)}accepted here: {', '.join(accepted)}"
 
 
 def join(path: str, key: str) -> str:
@@ -122,11 +156,11 @@ def join(path: str, key: str) -> str:
     return f"{path}.{shown}" if path else shown
 
 
-def did_you_mean(word: str, known: tuple[str, ...]) -> str:
-    """Return ``did you mean …? `` for the nearest known word, or nothing."""
+def did_you_mean(word: str, accepted: Iterable[str]) -> str:
+    """Return ``did you mean …? `` for the nearest accepted word, or nothing."""
     import difflib  # noqa: PLC0415 - only a mistake needs it
 
-    folded = {name.casefold(): name for name in known}
+    folded = {name.casefold(): name for name in accepted}
     close = difflib.get_close_matches(word[:40].casefold(), folded, n=1)
     return f"did you mean {folded[close[0]]}? " if close else ""
 
@@ -150,142 +184,99 @@ def unique_entries(
     return keys, values
 
 
-def mapping(node: Node, key: str, faults: FieldFaults) -> Mapping | None:
-    """Convert to a mapping."""
+def mapping(node: Node, path: str, faults: FieldFaults) -> Mapping | None:
+    """Return a node that is a mapping, or note a fault."""
     if isinstance(node, Mapping):
         return node
-    faults.add(node.place, key, f"found {node}; accepted: a mapping {{key: value, …}}")
+    faults.add(node.place, path, f"found {node}; accepted: {_form(Mapped())}")
     return None
 
 
-def of_keys(*accepted: str) -> Callable[[Callable[[Section], T | None]], Converter[T]]:
-    """Make the converter of a mapping from what reads its section, which may have these keys."""
+def read_value(accepted: Accepted, node: Node, path: str, general: str, faults: FieldFaults) -> Any:
+    """Return a value of the file in base units, or note a fault and return ``None``.
 
-    def make(read: Callable[[Section], T | None]) -> Converter[T]:
-        def convert(node: Node, key: str, faults: FieldFaults) -> T | None:
-            inner = mapping(node, key, faults)
-            return None if inner is None else read(Section(inner, key, faults, accepted))
-
-        return convert
-
-    return make
-
-
-def sequence(node: Node, key: str, faults: FieldFaults) -> Sequence | None:
-    """Convert to a list with something in it."""
-    if isinstance(node, Sequence) and node.items:
-        return node
-    found = "an empty list" if isinstance(node, Sequence) else str(node)
-    faults.add(node.place, key, f"found {found}; accepted: a list [ … , … ]")
+    A mapping becomes a `Section` (or stays a node, where the file chooses its names), and a list a
+    tuple of values, of which faulty ones are ``None``.
+    """
+    if isinstance(accepted, Either):
+        is_list, is_map = isinstance(node, Sequence), isinstance(node, Mapping)
+        for kind in accepted.kinds:
+            if (isinstance(kind, ListOf), isinstance(kind, Mapped)) == (is_list, is_map):
+                return read_value(kind, node, path, general, faults)
+    elif isinstance(accepted, Mapped):
+        inner = mapping(node, path, faults)
+        is_table = inner is not None and general in SECTIONS
+        return Section(inner, path, general, faults) if inner and is_table else inner
+    elif isinstance(accepted, ListOf | OneOrMore) and isinstance(node, Sequence) and node.items:
+        each, general = accepted.each or Mapped(), f"{general}.{EACH}"
+        return tuple(
+            read_value(each, item, f"{path}[{n}]", general, faults)
+            for n, item in enumerate(node.items)
+        )
+    elif isinstance(accepted, OneOrMore) and isinstance(node, ScalarNode):
+        value = read_value(accepted.each, node, path, general, faults)
+        return None if value is None else (value,)
+    try:
+        if isinstance(node, ScalarNode) and not isinstance(accepted, Either | ListOf):
+            return _read_scalar(accepted, node)
+        empty = isinstance(node, Sequence) and not node.items
+        message = f"found {'an empty list' if empty else node}; accepted: {_form(accepted)}"
+    except UnitError as error:
+        message = str(error)
+    faults.add(node.place, path, message)
     return None
 
 
-def string(node: Node, key: str, faults: FieldFaults) -> str | None:
-    """Convert to text."""
-    if isinstance(node, ScalarNode) and node.kind == "text":
-        # An escape sequence in a title would act on the terminal that shows it.
-        if all(character.isprintable() or character == "\n" for character in node.text):
-            return node.text
-        faults.add(node.place, key, f"found {node} with control characters; accepted: plain text")
-        return None
-    if isinstance(node, ScalarNode) and node.kind != "nothing":
-        wanted = f'accepted: text, in quotes: "{node}"'
-        faults.add(node.place, key, f"found {node}, which is {node.kind}; {wanted}")
-    else:
-        faults.add(node.place, key, f"found {node}; accepted: text")
-    return None
+def _read_scalar(accepted: Accepted, node: ScalarNode) -> Any:
+    """Return the value of a scalar in base units.
 
-
-def choice(*accepted: str) -> Converter[str]:
-    """Return a converter to one of a few words."""
-
-    def convert(node: Node, key: str, faults: FieldFaults) -> str | None:
-        if isinstance(node, ScalarNode) and node.text in accepted:
-            return node.text
-        close = did_you_mean(node.text, accepted) if isinstance(node, ScalarNode) else ""
-        faults.add(node.place, key, f"found {node}; {close}accepted: {', '.join(accepted)}")
-        return None
-
-    return convert
-
-
-BOOLEANS = dict.fromkeys(("true", "True", "TRUE"), True)
-BOOLEANS |= dict.fromkeys(("false", "False", "FALSE"), False)
-"""As YAML 1.2 writes them (core schema, section 10.3.2)."""
-
-
-def boolean(node: Node, key: str, faults: FieldFaults) -> bool | None:
-    """Convert to true or false."""
-    word = choice(*BOOLEANS)(node, key, faults)
-    return None if word is None else BOOLEANS[word]
-
-
-def whole(low: int, high: int) -> Converter[int]:
-    """Return a converter to a whole number from `low` to `high`."""
-
-    def convert(node: Node, key: str, faults: FieldFaults) -> int | None:
-        if isinstance(node, ScalarNode) and node.kind == "a whole number" and len(node.text) <= 30:
+    Raises
+    ------
+    UnitError
+        If it is not accepted: says what was found and what is accepted.
+    """
+    refusal, close = f"found {node}", ""
+    match accepted:
+        case Range():
+            if node.kind in {"nothing", "a boolean"}:
+                raise UnitError(f"{refusal}; accepted: {_form(accepted)}")
+            quantity = parse(node.text, accepted.dimension)
+            if quantity.value not in accepted:
+                refusal = f"found {node.text}"
+            elif accepted.exact and quantity.u > 0:
+                raise UnitError(f"{refusal}; {accepted.exact}")
+            else:
+                return quantity.value if accepted.exact else quantity
+        case Whole(low, high) if node.kind == "a whole number" and len(node.text) <= 30:
             sign, digits = (-1, node.text[1:]) if node.text[0] == "-" else (1, node.text)
-            base = {"0o": 8, "0x": 16}.get(digits[:2], 10)
-            number = sign * int(digits, base)
+            number = sign * int(digits, {"0o": 8, "0x": 16}.get(digits[:2], 10))
             if low <= number <= high:
                 return number
-        faults.add(node.place, key, f"found {node}; accepted: a whole number from {low} to {high}")
-        return None
-
-    return convert
-
-
-@dataclass(frozen=True, slots=True)
-class Range:
-    """Accepted values in base units, and the unit in which to say so."""
-
-    dimension: Dimension
-    low: float
-    high: float
-    unit: str
-    open_low: bool = False
-
-    def __contains__(self, value: float) -> bool:
-        return self.low <= value <= self.high and not (self.open_low and value == self.low)
-
-    def __str__(self) -> str:
-        low, high = (format_quantity(Quantity(x), self.unit) for x in (self.low, self.high))
-        return f"above {low}, up to {high}" if self.open_low else f"{low} to {high}"
+        case OneOf(words):
+            if node.text in words:
+                return BOOLEANS.get(node.text, node.text)
+            close = did_you_mean(node.text, words)
+        case Text() if node.kind == "text":
+            # An escape sequence in a title would act on the terminal that shows it.
+            if all(character.isprintable() or character == "\n" for character in node.text):
+                return node.text
+            raise UnitError(f"{refusal} with control characters; accepted: plain text")
+        case Text() if node.kind != "nothing":
+            raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
+    raise UnitError(f"{refusal}; {close}accepted: {accepted}")
 
 
-def quantity(accepted: Range) -> Converter[Quantity]:
-    """Return a converter to a quantity, with its uncertainty if one is written."""
-
-    def convert(node: Node, key: str, faults: FieldFaults) -> Quantity | None:
-        if not isinstance(node, ScalarNode) or node.kind in {"nothing", "a boolean"}:
-            wanted = f"accepted: {accepted.dimension.noun}, such as {accepted.dimension.example}"
-            faults.add(node.place, key, f"found {node}; {wanted}")
-            return None
-        try:
-            read = parse(node.text, accepted.dimension)
-        except UnitError as error:
-            faults.add(node.place, key, str(error))
-            return None
-        if read.value not in accepted:
-            faults.add(node.place, key, f"found {node.text}; accepted: {accepted}")
-            return None
-        return read
-
-    return convert
-
-
-def exact(accepted: Range, hint: str = "no uncertainty is accepted here") -> Converter[float]:
-    """Return a converter to a bare value; a written uncertainty is refused, not dropped."""
-    inner = quantity(accepted)
-
-    def convert(node: Node, key: str, faults: FieldFaults) -> float | None:
-        read = inner(node, key, faults)
-        if read is None:
-            return None
-        if read.u > 0:
-            faults.add(node.place, key, f"found {node}; {hint}")
-            return None
-        return read.value
-
-    return convert
+def _form(accepted: Accepted) -> str:
+    """Say how a value is written, where something else than that is found."""
+    match accepted:
+        case Range():
+            return f"{accepted.dimension.noun}, {accepted}"
+        case ListOf():
+            return f"{accepted} [ … , … ]"
+        case Mapped():
+            return "a mapping {key: value, …}"
+        case Either(kinds):
+            return "; or ".join(map(_form, kinds))
+        case OneOrMore(each):
+            return f"{_form(each)}; one or a list"
+    return str(accepted)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from math import cos, hypot, nan, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from rig.protocol.keys import DEFAULTS
 from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
@@ -22,17 +23,8 @@ if TYPE_CHECKING:
 Side = Literal["impact", "free"]
 Order = Literal["ABBA", "alternate", "fixed"]
 AT_REST = Quantity(0.0)
-STANDARD_GRAVITY = Quantity(9.80665, 0.025)
-"""m/s², where none is stated: that of the CGPM of 1901; on the ground anywhere g is from 9.764 to
-9.834 (C. Hirt et al., 2013), so at most 0.043 off and evenly likely so (GUM 4.3.7)."""
-PPS_U = 1e-7
-"""Of a GPS receiver's pulse per second, relative: modules state 0.1 ppm or better with a fix."""
-DATUM_U = 0.3e-3
-"""Of a post's zero, m: read off a ruler to the nearest mm, ±0.5 mm evenly likely (GUM 4.3.7)."""
-LEVEL = Quantity(0.0, 1e-3)
-STRIKE = Quantity(0.0, 10e-3)
-"""Of a contact where nothing is said: gates are set to a millimetre above where a rod touches, and
-the last rods of 25 strike up to 20 mm above it on a board at 40° and more, on those before them."""
+STANDARD_GRAVITY: Quantity = DEFAULTS["gravity"]
+PPS_U: float = DEFAULTS["reference"]
 SIDES: tuple[Side, ...] = ("impact", "free")
 
 
@@ -65,9 +57,9 @@ class RodChain:
     name: str
     chain: Chain
     widths: tuple[float, ...]
-    tilt_deg: float = 0.0
-    position_u: float = 0.0003
-    width_u: float = 0.0001
+    tilt_deg: float = DEFAULTS["chains.*.tilt"]
+    position_u: float = DEFAULTS["chains.*.position_uncertainty"]
+    width_u: float = DEFAULTS["chains.*.width_uncertainty"]
     diameters: tuple[float, ...] = ()
     rod_length: float = nan
     weighed: bool = False
@@ -118,7 +110,7 @@ class Gates:
 
     gates: tuple[Gate, ...]
     height_u: float
-    datum_u: float = DATUM_U
+    datum_u: float = DEFAULTS["gates.datum_uncertainty"]
 
     def on(self, side: Side) -> tuple[Gate, ...]:
         """Gates of one side, in file order."""
@@ -151,8 +143,8 @@ class Contact:
         are like, and `level` is what that leaves out.
     """
 
-    level: Quantity = LEVEL
-    strike: Quantity = STRIKE
+    level: Quantity = DEFAULTS["contact.level"]
+    strike: Quantity = DEFAULTS["contact.strike"]
     from_board: bool = False
 
 
@@ -169,7 +161,7 @@ class InclinedTrack:
     """
 
     incline_deg: Quantity
-    rolling_inertia: float = 0.0
+    rolling_inertia: float = DEFAULTS["track.rolling_inertia"]
 
     def along(self, gravity: Quantity) -> Quantity:
         """Acceleration without friction, g sin θ/(1 + I/(m r²)), m/s²."""
@@ -195,7 +187,7 @@ class Drag:
     """
 
     coefficient: Quantity | None = None
-    air_density: float = 1.204  # dry, 20 °C, 1013.25 hPa
+    air_density: float = DEFAULTS["drag.air_density"]
     terminal_speed: Quantity | None = None
 
     @property
@@ -210,20 +202,20 @@ class Drag:
 class ReleasePulse:
     """The actuator: its channel and the length of the pulse in seconds."""
 
-    channel: int = 0
-    pulse: float = 0.080
+    channel: int = DEFAULTS["release.channel"]
+    pulse: float = DEFAULTS["release.pulse"]
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
     """How the runs are laid out; `rig.protocol.plan.runs` expands it."""
 
-    inclines: tuple[float, ...] = (0.0,)
-    repeats: int = 1
-    order: Order = "ABBA"
-    randomize: Literal["none", "incline", "all"] = "none"
-    seed: int = 0
-    settle: float = 10.0
+    inclines: tuple[float, ...] = DEFAULTS["plan.incline"]
+    repeats: int = DEFAULTS["plan.repeats"]
+    order: Order = DEFAULTS["plan.order"]
+    randomize: Literal["none", "incline", "all"] = DEFAULTS["plan.randomize"]
+    seed: int = DEFAULTS["plan.seed"]
+    settle: float = DEFAULTS["plan.settle"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,9 +232,9 @@ class Accept:
         Share of the received edges that may belong to no rod and to no known disturbance.
     """
 
-    release_skew: float = 0.005
-    missed_edges: float = 0.05
-    unexplained_edges: float = 0.10
+    release_skew: float = DEFAULTS["accept.release_skew"]
+    missed_edges: float = DEFAULTS["accept.missed_edges"]
+    unexplained_edges: float = DEFAULTS["accept.unexplained_edges"]
 
 
 GUESSED = 8.0
@@ -253,25 +245,25 @@ GUESSED = 8.0
 class Priors:
     """What is known beforehand of what nobody measures, as standard deviations in SI units.
 
-    `rig.protocol.priors.PRIORS` says of each what it is, and where it comes from.
+    `rig.protocol.keys.KEYS` says of each what it is, and where it comes from.
     """
 
-    edge_floor: float = 0.1e-3
-    jitter: float = 2e-6
-    hang: float = 0.3e-3
-    side: float = 0.5e-3
-    beam_offset: float = 1.0e-3
-    off_centre: float = 1.0e-3
-    swing: float = 0.1
-    departure: float = 0.25e-3
-    last_rods: float = 0.5e-3
-    impulses: float = 0.2
-    impulse_floor: float = 0.003
-    last_impulse: float = 0.3
-    strings: float = 0.5
-    stretch: float = 0.02
-    late_pull: float = 0.25
-    drag: float = 0.05
+    edge_floor: float = DEFAULTS["priors.edge_floor"]
+    jitter: float = DEFAULTS["priors.jitter"]
+    hang: float = DEFAULTS["priors.hang"]
+    side: float = DEFAULTS["priors.side"]
+    beam_offset: float = DEFAULTS["priors.beam_offset"]
+    off_centre: float = DEFAULTS["priors.off_centre"]
+    swing: float = DEFAULTS["priors.swing"]
+    departure: float = DEFAULTS["priors.departure"]
+    last_rods: float = DEFAULTS["priors.last_rods"]
+    impulses: float = DEFAULTS["priors.impulses"]
+    impulse_floor: float = DEFAULTS["priors.impulse_floor"]
+    last_impulse: float = DEFAULTS["priors.last_impulse"]
+    strings: float = DEFAULTS["priors.strings"]
+    stretch: float = DEFAULTS["priors.stretch"]
+    late_pull: float = DEFAULTS["priors.late_pull"]
+    drag: float = DEFAULTS["priors.drag"]
 
 
 @dataclass(frozen=True, slots=True)

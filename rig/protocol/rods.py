@@ -1,26 +1,19 @@
-"""The ``rods`` of a chain: a number of like rods, or single rods and groups from the bottom up."""
+"""The rods of a chain: which there are, and where they hang."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
-from rig.protocol import fields
-from rig.protocol.fields import Range, Section
-from rig.protocol.yamltree import ScalarNode
-from rig.units import Dimension
+from rig.protocol.keys import MOST_RODS
+from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import FieldFaults
-    from rig.protocol.yamltree import Node, Sequence
-
-DIAMETER = Range(Dimension.LENGTH, 1e-6, 1.0, "mm")
-MASS = Range(Dimension.MASS, 1e-9, 1000.0, "kg")
-MOST_RODS = 1000
+    from rig.protocol.fields import Section
 
 
-@dataclass(frozen=True, slots=True)
-class Rods:
+class Rods(NamedTuple):
     """Diameter (m; 0 where unknown) and mass of each rod, bottom up.
 
     `weighed` says that masses are in kg; else only their ratios mean something.
@@ -31,29 +24,18 @@ class Rods:
     weighed: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
-    """Like rods, with NaN-free optionals: ``None`` where the file says nothing."""
-
-    count: int
-    diameter: float | None
-    mass: float | None
-
-
-def read_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods | None:
-    """Read ``rods``, and ``diameter`` and ``mass`` common to them, from a chain's section.
+def list_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods | None:
+    """Return the rods of a chain by its ``rods``, ``diameter`` and ``mass``.
 
     Masses are those given, else proportional to the cross-section (like material) with the
     bottom rod's as 1, else all 1. One rod alone is any object, which may fall and never strikes.
     """
-    common = section.take("diameter", fields.exact(DIAMETER))
-    each = section.take("mass", fields.exact(MASS))
-    groups = section.take("rods", _groups, required="25")
-    if groups is None or ("diameter" in section and common is None):
+    if not section.is_sound("rods", "diameter", "mass"):
         return None
-    if "mass" in section and each is None:
-        return None
-    total = sum(group.count for group in groups)
+    groups = section["rods"]
+    if isinstance(groups, int):
+        groups = [{"count": groups, "diameter": None, "mass": None}]
+    total = sum(group["count"] for group in groups)
     if total > MOST_RODS:
         section.fault("rods", f"found {total} rods; at most {MOST_RODS} are accepted")
         return None
@@ -61,50 +43,90 @@ def read_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods | 
         message = "found 1 rod; a chain that strikes a surface has at least 2"
         section.fault("rods", f"{message}; for one object leave surface out")
         return None
-    weights = [each if group.mass is None else group.mass for group in groups]
-    if len({mass is None for mass in weights}) > 1:
+    diameters, masses = (
+        [
+            section[key] if group[key] is None else group[key]
+            for group in groups
+            for _ in range(group["count"])
+        ]
+        for key in ("diameter", "mass")
+    )
+    weighed = None not in masses
+    if not weighed and any(mass is not None for mass in masses):
         section.fault("rods", "mass is given for some groups only; state it for all or none")
         return None
-    known = [common if group.diameter is None else group.diameter for group in groups]
-    if None in known and (seen_by_gates or any(d is not None for d in known)):
-        section.take("diameter", fields.exact(DIAMETER), required="12.7 mm")
-        return None
-    diameters = [0.0 if d is None else d for d in known]
-    masses = [
-        mass if mass is not None else (d / diameters[0]) ** 2 if diameters[0] else 1.0
-        for mass, d in zip(weights, diameters, strict=True)
-    ]
-    counts = [group.count for group in groups]
-    return Rods(_spread(diameters, counts), _spread(masses, counts), None not in weights)
+    if None in diameters:
+        if seen_by_gates or any(diameter is not None for diameter in diameters):
+            section.need("diameter")
+            return None
+        diameters = [0.0] * total
+    if not weighed:
+        masses = [(d / diameters[0]) ** 2 if diameters[0] else 1.0 for d in diameters]
+    return Rods(tuple(diameters), tuple(masses), weighed)
 
 
-def _spread(values: list[float], counts: list[int]) -> tuple[float, ...]:
-    """Repeat each group's value for each of its rods."""
-    return tuple(v for v, count in zip(values, counts, strict=True) for _ in range(count))
+def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, ...] | None:
+    """Return the heights of the rods' middles above the bottom rod's, m.
+
+    Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, the gap being whatever
+    makes the whole chain as long as stated.
+
+    Parameters
+    ----------
+    section
+        The chain, with its ``length`` and ``spacing``.
+    diameters
+        Of the rods, m, bottom up; shape ``(rods,)``.
+
+    Returns
+    -------
+    tuple of float or None
+        Shape ``(rods,)``; `None` if a wrong number of distances is listed, which is noted.
+    """
+    last, length, spacing = len(diameters) - 1, section["length"], section["spacing"]
+    if last == 0:
+        return (0.0,)
+    if isinstance(spacing, tuple):
+        if len(spacing) != last:
+            message = f"found {len(spacing)} distances; {last} are between {last + 1} rods"
+            section.fault("spacing", message)
+            return None
+        return tuple(accumulate(spacing, initial=0.0))
+    if spacing == "equal-pitch":
+        return tuple(length * rod / last for rod in range(last + 1))
+    halves = [(lower + upper) / 2 for lower, upper in pairwise(diameters)]
+    gap = (length - math.fsum(halves)) / last
+    # The top is set, not summed, so that the length is exactly what the file says.
+    return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)
 
 
-def _groups(node: Node, key: str, faults: FieldFaults) -> list[_Group] | None:
-    """Convert a number of rods, or a list of groups."""
-    if isinstance(node, ScalarNode):
-        count = fields.whole(1, MOST_RODS)(node, key, faults)
-        return None if count is None else [_Group(count, None, None)]
-    items: Sequence | None = fields.sequence(node, key, faults)
-    if items is None:
-        return None
-    groups = [_group(item, f"{key}[{i}]", faults) for i, item in enumerate(items.items)]
-    found = [group for group in groups if group is not None]
-    return found if len(found) == len(groups) else None
+def are_apart(
+    section: Section, heights: tuple[float, ...], widths: tuple[float, ...], rise: float
+) -> bool:
+    """Check that no two neighbours overlap as seen from the side, nor touch with their ends.
 
-
-@fields.of_keys("count", "diameter", "mass")
-def _group(section: Section) -> _Group | None:
-    """Convert one group."""
-    count = section.take("count", fields.whole(1, MOST_RODS), 1)
-    diameter = section.take("diameter", fields.exact(DIAMETER))
-    mass = section.take("mass", fields.exact(MASS))
-    if count is None or any(
-        name in section and value is None
-        for name, value in (("diameter", diameter), ("mass", mass))
+    Parameters
+    ----------
+    section
+        The chain, where a fault is noted.
+    heights, widths
+        Of the rods, m, bottom up; shape ``(rods,)``.
+    rise
+        Of one end of a tilted rod over the other, m; NaN where unknown.
+    """
+    key = "length" if "length" in section else "spacing"
+    for rod, ((low, high), (lower, upper)) in enumerate(
+        zip(pairwise(heights), pairwise(widths), strict=True), start=1
     ):
-        return None
-    return _Group(count, diameter, mass)
+        pitch, needed = high - low, (lower + upper) / 2
+        if not pitch > needed:
+            apart, thick = (format_quantity(Quantity(x), "mm") for x in (pitch, needed))
+            message = f"rods {rod} and {rod + 1} overlap: {apart} apart but {thick} thick"
+            section.fault(key, message)
+            return False
+        if rise >= pitch:  # never true of an unknown rod length, which is a NaN
+            shown = format_quantity(Quantity(rise), "mm")
+            message = f"tilted ends rise {shown}, so rods {rod} and {rod + 1} would touch"
+            section.fault("rod_length", message)
+            return False
+    return True

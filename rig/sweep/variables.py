@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.model.chain import XI
-from rig.protocol.chains import ALPHA, GAMMA, INERTIA
-from rig.protocol.reader import DROP, GRAVITY, INITIAL_SPEED
-from rig.protocol.settings import INCLINE
-from rig.protocol.surface import FRICTION, RESTITUTION
+from rig.protocol.keys import range_of
 
 if TYPE_CHECKING:
-    from rig.protocol.fields import Range
+    from rig.protocol.keys import Range
     from rig.protocol.protocol import Protocol
 
 
@@ -37,15 +34,19 @@ class Variable:
 
 
 VARIABLES = {
-    "incline": Variable(INCLINE, "incline_deg", "inclination of the surface (°)"),
-    "restitution": Variable(RESTITUTION, "restitution", "restitution β"),
-    "friction": Variable(FRICTION, "friction", "friction μ"),
-    "inertia": Variable(INERTIA, "inertia", "moment of inertia of the rods, I/(m L²)"),
-    "alpha": Variable(ALPHA, "alpha", "impact coefficient α"),
-    "gamma": Variable(GAMMA, "gamma", "impact coefficient γ"),
-    "drop": Variable(DROP, "drop_m", "drop (m)"),
-    "initial_speed": Variable(INITIAL_SPEED, "initial_speed_m_s", "initial speed (m/s)"),
-    "gravity": Variable(GRAVITY, "gravity_m_s2", "gravity (m/s²)"),
+    "incline": Variable(range_of("plan.incline"), "incline_deg", "inclination of the surface (°)"),
+    "restitution": Variable(range_of("surface.restitution"), "restitution", "restitution β"),
+    "friction": Variable(range_of("surface.friction"), "friction", "friction μ"),
+    "inertia": Variable(
+        range_of("chains.*.inertia"), "inertia", "moment of inertia of the rods, I/(m L²)"
+    ),
+    "alpha": Variable(range_of("chains.*.alpha"), "alpha", "impact coefficient α"),
+    "gamma": Variable(range_of("chains.*.gamma"), "gamma", "impact coefficient γ"),
+    "drop": Variable(range_of("drop"), "drop_m", "drop (m)"),
+    "initial_speed": Variable(
+        range_of("initial_speed"), "initial_speed_m_s", "initial speed (m/s)"
+    ),
+    "gravity": Variable(range_of("gravity"), "gravity_m_s2", "gravity (m/s²)"),
 }
 
 

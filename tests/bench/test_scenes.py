@@ -22,16 +22,12 @@ from tests.model.chains import even_chain
 NAMES = [scene.name for scene in ladder()]
 ALL = set(NAMES)
 STRUCK = ALL - {"free fall"}
-INCLINED = STRUCK - {"α given, level", "level surface"}
 HAVE = {
     "rig.model.fall": ALL,
     "rig.model.impact": STRUCK,
     "rig.model.predict": STRUCK,
     "rig.model.surface": STRUCK,
-    "rig.protocol.surface": STRUCK,
-    "rig.protocol.settings": INCLINED,
     "rig.protocol.gates": {"gates"},
-    "rig.protocol.drag": {"drag, no gates"},
     "rig.model.drag": {"drag, no gates"},
 }
 NEVER = {

@@ -13,6 +13,7 @@ from rig.cli import main
 from rig.errors import InputError
 from rig.model.fall import free_fall
 from rig.protocol.describe import describe
+from rig.protocol.keys import MOST_RODS
 from rig.protocol.measurable import (
     LEAST_RECORD_MS,
     check_measurable,
@@ -22,7 +23,6 @@ from rig.protocol.measurable import (
     record_ms,
 )
 from rig.protocol.reader import parse, read
-from rig.protocol.rods import MOST_RODS
 from rig.protocol.yamltree import load, place_of
 from tests.protocol.test_protocol_reader import GOOD, READY
 

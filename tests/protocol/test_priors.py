@@ -9,10 +9,12 @@ import pytest
 from rig.analysis.components import stated
 from rig.errors import InputError
 from rig.protocol.describe import describe
-from rig.protocol.priors import PRIORS
+from rig.protocol.keys import SECTIONS
 from rig.protocol.protocol import Priors
 from rig.protocol.reader import parse
 from tests.analysis.drops import FENCE, UNIFORM, case
+
+PRIORS = SECTIONS["priors"]
 
 
 def scene(priors: str):
@@ -46,9 +48,9 @@ def test_what_is_no_prior_is_refused_at_its_place(text, said):
 
 def test_rig_check_lists_them_all_and_marks_those_of_the_protocol():
     lines = describe(scene("{hang: 1 mm}")).splitlines()
-    for name, row in PRIORS.items():
+    for name, key in PRIORS.items():
         (line,) = [one for one in lines if one.split()[:1] == [name]]
-        assert line.endswith(row.words)
+        assert line.endswith(key.meaning)
         assert ("(stated)" in line) == (name == "hang")
 
 

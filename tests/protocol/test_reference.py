@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import re
-from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,9 +12,9 @@ import pytest
 import yaml
 
 from rig.errors import InputError
-from rig.protocol import fields
+from rig.protocol.keys import KEYS
 from rig.protocol.reader import parse, read
-from rig.protocol.reference import KEYS, page, schema
+from rig.protocol.reference import page, schema
 from tests.protocol.keys import BARE, around, put, value
 
 ROOT = Path(__file__).parents[2]
@@ -73,28 +71,6 @@ def test_a_default_written_is_as_left_out(key):
 
 def test_a_default_in_words_is_said_of_keys_that_have_it():
     assert {path: BY_PATH[path].default for path in IN_WORDS} == IN_WORDS
-
-
-def test_every_key_that_the_reader_knows_is_there(monkeypatch):
-    """And none besides: whatever a section accepts, where a file of examples leads to it."""
-    seen = defaultdict(set)
-    make = fields.Section.__init__
-
-    def noting(self, node, path, faults, accepted, **more):
-        general = re.sub(r"\[[0-9]+\]", ".[]", re.sub(r"^chains\.[^.]+", "chains.*", path))
-        seen[general] |= set(accepted)
-        make(self, node, path, faults, accepted, **more)
-
-    monkeypatch.setattr(fields.Section, "__init__", noting)
-    for key in VALUED:
-        data = around(key.path)
-        put(data, key.path, value(key.example))
-        parse(text(data))
-    told = defaultdict(set)
-    for path in BY_PATH:
-        parent, _, name = path.rpartition(".")
-        told[parent].add(name)
-    assert seen == told
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 import rig
-from rig.protocol.priors import PRIORS
+from rig.protocol.keys import SECTIONS
 from rig.protocol.reader import parse
 from sim.dials import Dials
 from tests.analysis.drops import case
@@ -15,6 +15,7 @@ from tests.analysis.sessions import analysis
 from tests.scenes.draw import Scene
 from tests.scenes.through import faults
 
+PRIORS = SECTIONS["priors"]
 pytestmark = pytest.mark.usefixtures("analysed_once")
 GATES = (
     "[{channel: %d, height: 25 mm}, {channel: %d, height: 80 mm}, {channel: %d, height: 130 mm}]"
@@ -50,7 +51,7 @@ def protocol(kind: str, zero: tuple[str, ...]) -> str:
     text += f"{scene}gates:\n{gates}"
     text += "".join(f"  {key}: 0 mm\n" for key in OF_GATES if key in zero)
     text += "reference: 0 ppm\n" if "reference" in zero else ""
-    units = {name: row.accepted.unit.replace("1", "") for name, row in PRIORS.items()}
+    units = {name: key.accepted.unit.replace("1", "") for name, key in PRIORS.items()}
     text += (
         f"priors: {{{', '.join(f'{name}: 0 {units[name]}' for name in PRIORS if name in zero)}}}\n"
     )

@@ -11,8 +11,8 @@ import yaml
 
 from rig.errors import InputError
 from rig.link.messages import pack_label
+from rig.protocol.keys import KEYS
 from rig.protocol.reader import parse
-from rig.protocol.reference import KEYS
 from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.resolved_dials import read_resolved_dials

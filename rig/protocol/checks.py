@@ -1,0 +1,133 @@
+"""What the keys of a protocol have to do with each other, each rule once.
+
+What a single key may be is in `rig.protocol.keys`; how the rods of a chain fit together in
+`rig.protocol.chains`, and the gates to the rods in `rig.protocol.gates`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rig.protocol.keys import DEFAULTS, example, key_at
+from rig.protocol.yamltree import Sequence
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rig.protocol.fields import Section
+    from rig.protocol.protocol import RodChain
+
+MOST_RUNS = 100_000
+
+
+def check_scene(
+    top: Section, chains: dict[str, RodChain] | None, *, count: int, kept: bool
+) -> None:
+    """Note whatever in a file does not suit the scene that it describes.
+
+    Parameters
+    ----------
+    top
+        The root of the file.
+    chains
+        As read; `None` if any is faulty.
+    count
+        How many the file names.
+    kept
+        Whether a session keeps this file, see `rig.protocol.reader.parse`.
+    """
+    struck = "surface" in top
+    rods = tuple((chains or {}).values())
+    _check_gravity(top, struck=struck)
+    if struck or "gates" in top:
+        top.need("drop")
+    if not struck and count > 1:
+        top.fault("chains", f"found {count} chains; without a surface one is accepted")
+    # Of a chain that could not be read nobody knows whether it gives its α.
+    if top["surface"] and any(chain.chain.alpha is None for chain in rods):
+        top["surface"].need("restitution")
+    if "track" in top and (struck or any(chain.chain.rods > 1 for chain in rods)):
+        top.fault("track", "a track is for one object without a surface; leave track out")
+    if top["drag"]:
+        _check_drag(top["drag"], rods)
+    if "contact" in top and not struck:
+        top.fault("contact", "the scene has no surface; leave contact out")
+    if top["plan"]:
+        _check_plan(top["plan"], struck=struck, turns=kept or count > 1)
+    on_board = _is_on_board(top["contact"], rods)
+    if top["gates"]:
+        from rig.protocol.gates import check_clear, check_gates  # noqa: PLC0415 - see the reader
+
+        check_gates(top["gates"], surface=struck, chains=count)
+        if rods and "drop" in top and top.is_sound("drop"):
+            inclines = top["plan"]["incline"] if top["plan"] else DEFAULTS["plan.incline"]
+            inclines = [angle for angle in inclines or () if on_board and angle is not None]
+            check_clear(top["gates"], rods, top["drop"], surface=struck, inclines=inclines)
+
+
+def _check_gravity(top: Section, *, struck: bool) -> None:
+    """Note two sources of gravity, or none; a scene without a surface measures it."""
+    if "gravity" in top and "site" in top:
+        first, second = sorted(("gravity", "site"), key=lambda key: top.keys[key])
+        message = f"{first} is also given, on line {top.keys[first].line}; keep one of them"
+        top.fault(second, message, at_key=True)
+    elif struck and "gravity" not in top and "site" not in top:
+        sources = (f"{name}: {example(key_at(name))}" for name in ("gravity", "site"))
+        top.fault("gravity", f"missing; write {', or '.join(sources)}")
+
+
+def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
+    """Note drag stated twice or not at all, and rods too little known for a coefficient."""
+    if ("coefficient" in drag) == ("terminal_speed" in drag):
+        keys = ("coefficient", "terminal_speed")
+        examples = (f"{name}: {example(key_at(f'drag.{name}'))}" for name in keys)
+        if not drag.misspelt:
+            drag.refuse(f"state either {' or '.join(examples)}")
+    elif "terminal_speed" in drag:
+        if "air_density" in drag:
+            message = "not used with terminal_speed; leave air_density out"
+            drag.fault("air_density", message, at_key=True)
+    else:
+        for rods in chains:
+            lacking = {
+                "mass": not rods.weighed,
+                "diameter": min(rods.diameters) == 0.0,
+                "rod_length": math.isnan(rods.rod_length),
+            }
+            missing = ", ".join(key for key, lacks in lacking.items() if lacks)
+            if missing:
+                message = f"needs {missing} of {rods.name}; state it, or terminal_speed instead"
+                drag.fault("coefficient", message)
+
+
+def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
+    """Note inclines and turns that a scene does not have, repeated inclines, and too many runs."""
+    if "incline" in plan and not struck:
+        plan.fault("incline", "the scene has no surface; leave incline out", at_key=True)
+    if "order" in plan and plan["order"] in {"ABBA", "alternate"} and not turns:
+        message = f"found {plan['order']}, which needs two chains; leave order out"
+        plan.fault("order", message)
+    inclines, node = plan["incline"] or (), plan.nodes.get("incline")
+    lines: dict[float, int] = {}
+    for n, item in enumerate(node.items if isinstance(node, Sequence) else ()):
+        if inclines[n] in lines:
+            message = f"found {item} again (line {lines[inclines[n]]}); use repeats for more drops"
+            plan.faults.add(item.place, f"{plan.key('incline')}[{n}]", message)
+        elif inclines[n] is not None:
+            lines[inclines[n]] = item.place.line
+    if plan.is_sound("incline", "repeats") and len(inclines) * plan["repeats"] > MOST_RUNS:
+        runs = len(inclines) * plan["repeats"]
+        plan.fault("repeats", f"found {runs} runs; at most {MOST_RUNS} are accepted")
+
+
+def _is_on_board(contact: Section | None, chains: Iterable[RodChain]) -> bool:
+    """Whether heights are measured from a board; note what chains then lack."""
+    if contact is None or contact["datum"] != "board":
+        return False
+    from rig.protocol.contact import lacking_geometry  # noqa: PLC0415 - see the reader
+
+    lacking = {rods.name: keys for rods in chains if (keys := lacking_geometry(rods))}
+    for name, keys in lacking.items():
+        contact.fault("datum", f"datum: board needs chains.{name}.{keys[0]}; state it")
+    return not lacking
