@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import TYPE_CHECKING, Literal
 
 from rig.errors import InputError
+from rig.protocol.keys import key_at
 from rig.protocol.reader import parse
 
 if TYPE_CHECKING:
@@ -75,99 +76,103 @@ def draft_text(draft: Draft) -> str:
     InputError
         Where no protocol can be made of these answers: with what is wrong with each.
     """
-    without = "\n".join(_lines(draft, ["gates: {}"]))
     try:
-        bare = parse(without.replace("gates: {}\n", ""), draft.title)
+        bare = parse(_text(draft, ""), draft.title)
     except InputError as error:
         messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
         raise InputError("; ".join(messages) or str(error), "rig new --help") from None
-    text = "\n".join(_lines(draft, _gates(bare, draft))) + "\n"
+    text = _text(draft, _gates(bare, draft))
     parse(text, draft.title)
     return text
 
 
-def _lines(draft: Draft, gates: list[str]) -> list[str]:
+def _text(draft: Draft, gates: str) -> str:
+    """Write the file around its gates; what is usual is as in the table of keys."""
     struck = draft.scene in STRUCK
-    lines = [
-        "# Written by rig new. Replace the values by yours; rig check FILE shows plan and limits.",
-        "# A quantity may have its standard uncertainty, such as 900 mm ± 2 mm.",
-        "protocol: 1",
-        f"title: {json.dumps(draft.title, ensure_ascii=False)}",
-        "",
-        *_chains(draft),
-        "",
-    ]
-    if struck:
-        lines += [
-            "surface:                 # guesses; rig estimate SESSION measures them",
-            "  restitution: 0.50 ± 0.10",
-            "  friction: 0.20 ± 0.10",
-            "",
-        ]
-    if draft.scene == "track":
-        lines += [
-            f"track: {{incline: {draft.inclines}}}   # rolling_inertia: 0.4 if a ball rolls",
-            "# Gates and drop are lengths along the track, from a mark below all gates.",
-        ]
-    else:
-        where = "above the contact point" if struck else "above one level below the gates"
-        middle = {"object": "object's", "picket-fence": "lowest bar's"}.get(
-            draft.scene, "lowest rod's"
-        )
-        lines.append(f"# Heights are {where}; drop: that of the {middle} middle before release.")
-    lines += [
-        f"drop: {draft.drop}",
-        "gravity: 9.81 m/s^2      # or  site: {latitude: 50 deg, height: 100 m}",
-        "",
-        *gates,
-        "",
-        "release: {channel: 0, pulse: 80 ms}",
-    ]
-    if not struck:
-        example = "   # a steel ball of 20 mm" if draft.scene == "object" else ""
-        lines += [
-            "# The fit estimates the drag of the air. If you know the terminal speed, state it:",
-            f"# drag: {{terminal_speed: 60 m/s ± 6 m/s}}{example}",
-        ]
     incline = f"incline: [{draft.inclines}], " if struck else ""
-    order = ", order: ABBA" if draft.scene == "two-chains" else ""
-    lines += [
-        f"plan: {{{incline}repeats: {draft.repeats}{order}, settle: 10 s}}",
-        "# Limits of a valid drop, stated before any result is known.",
-        f"accept: {{missed_edges: {5 if struck else 15} %}}",
-    ]
-    return lines
+    order = f", {_usual('plan.order')}" if draft.scene == "two-chains" else ""
+    return f"""{_HEAD}
+title: {json.dumps(draft.title, ensure_ascii=False)}
+
+{_chains(draft)}
+{_SURFACE if struck else ""}\
+{_heights(draft)}
+drop: {draft.drop}
+gravity: 9.81 m/s^2      # or  site: {{latitude: 50 deg, height: 100 m}}
+
+{gates}
+release: {{{_usual("release.channel")}, {_usual("release.pulse")}}}
+{"" if struck else _air(draft)}\
+plan: {{{incline}repeats: {draft.repeats}{order}, {_usual("plan.settle")}}}
+# Limits of a valid drop, stated before any result is known.
+accept: {{missed_edges: {5 if struck else 15} %}}
+"""
 
 
-def _chains(draft: Draft) -> list[str]:
+_HEAD = """\
+# Written by rig new. Replace the values by yours; rig check FILE shows plan and limits.
+# A quantity may have its standard uncertainty, such as 900 mm ± 2 mm.
+protocol: 1"""
+_SURFACE = """\
+surface:                 # guesses; rig estimate SESSION measures them
+  restitution: 0.50 ± 0.10
+  friction: 0.20 ± 0.10
+
+"""
+
+
+def _usual(path: str) -> str:
+    """Write a key with its default."""
+    return f"{path.rpartition('.')[2]}: {key_at(path).default}"
+
+
+def _heights(draft: Draft) -> str:
+    """Say from where heights are measured."""
+    if draft.scene == "track":
+        return f"""\
+track: {{incline: {draft.inclines}}}   # rolling_inertia: 0.4 if a ball rolls
+# Gates and drop are lengths along the track, from a mark below all gates."""
+    zero = "the contact point" if draft.scene in STRUCK else "one level below the gates"
+    bodies = {"object": "object's", "picket-fence": "lowest bar's"}
+    body = bodies.get(draft.scene, "lowest rod's")
+    return f"# Heights are above {zero}; drop: that of the {body} middle before release."
+
+
+def _air(draft: Draft) -> str:
+    example = "   # a steel ball of 20 mm" if draft.scene == "object" else ""
+    return f"""\
+# The fit estimates the drag of the air. If you know the terminal speed, state it:
+# drag: {{terminal_speed: 60 m/s ± 6 m/s}}{example}
+"""
+
+
+def _chains(draft: Draft) -> str:
     if draft.scene in {"object", "track"}:
-        return ["chains:", f"  body: {{rods: 1, diameter: {draft.diameter}}}  # length in a beam"]
+        return f"chains:\n  body: {{rods: 1, diameter: {draft.diameter}}}  # length in a beam\n"
     rods = f"rods: {draft.rods}, length: {draft.length}, diameter: {draft.diameter}"
-    part = "bar" if draft.scene == "picket-fence" else "rod"
-    lines = [
-        f"chains:                  # length: middle of the lowest {part} to that of the highest"
-    ]
-    if draft.scene == "picket-fence":
-        return [*lines, f"  fence: {{{rods}, position_uncertainty: 0.1 mm}}"]  # they are printed
-    lines.append(f"  A: {{{rods}}}")
-    return [*lines, "  B: {like: A}"] if draft.scene == "two-chains" else lines
+    part, chains = "rod", f"  A: {{{rods}}}\n"
+    if draft.scene == "two-chains":
+        chains += "  B: {like: A}\n"
+    if draft.scene == "picket-fence":  # its bars are printed
+        part, chains = "bar", f"  fence: {{{rods}, position_uncertainty: 0.1 mm}}\n"
+    lengths = f"# length: middle of the lowest {part} to that of the highest"
+    return f"chains:                  {lengths}\n{chains}"
 
 
-def _gates(protocol: Protocol, draft: Draft) -> list[str]:
+def _gates(protocol: Protocol, draft: Draft) -> str:
     """Put the gates where hanging rods leave their beams clear."""
-    sides = _shared_out(draft)
-    lines, channel = ["gates:"], 0
-    for side, number in sides.items():
-        heights = _struck(protocol, side, number) if protocol.surface else _even(protocol, number)
-        lines.append(f"  {side}:")
+    text, channels = "gates:\n", count()
+    for side, number in _share_gates(draft).items():
+        heights = (
+            _low_and_high(protocol, side, number) if protocol.surface else _even(protocol, number)
+        )
+        text += f"  {side}:\n"
         for height in sorted(heights):
-            lines.append(f"    - {{channel: {channel}, height: {height * 1e3:.1f} mm}}")
-            channel += 1
-    lines.append("  height_uncertainty: 0.5 mm   # of each beam")
-    return lines
+            text += f"    - {{channel: {next(channels)}, height: {height * 1e3:.1f} mm}}\n"
+    return text + "  height_uncertainty: 0.5 mm   # of each beam\n"
 
 
-def _shared_out(draft: Draft) -> dict[Side, int]:
+def _share_gates(draft: Draft) -> dict[Side, int]:
     """How many gates each side gets: of few, most where the free chain is seen."""
     if draft.scene == "one-chain":
         return {"impact": draft.gates}
@@ -181,7 +186,7 @@ def _shared_out(draft: Draft) -> dict[Side, int]:
     return {"impact": impact, "free": draft.gates - impact}
 
 
-def _struck(protocol: Protocol, side: Side, number: int) -> list[float]:
+def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
     """Low gates for the end, and some between hanging rods for the beginning."""
     (rods, *_), drop = protocol.chains.values(), protocol.drop
     half = max(rods.widths) / 2.0

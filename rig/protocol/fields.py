@@ -11,29 +11,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import Problem
-from rig.protocol.keys import (
-    BOOLEANS,
-    DEFAULTS,
-    EACH,
-    SECTIONS,
-    Either,
-    Key,
-    ListOf,
-    Mapped,
-    OneOf,
-    OneOrMore,
-    Range,
-    Text,
-    Whole,
-    example,
-)
+from rig.protocol import keys
 from rig.protocol.yamltree import Mapping, ScalarNode, Sequence
 from rig.units import UnitError, parse, quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rig.protocol.keys import Accepted
     from rig.protocol.yamltree import Node, Place
 
 
@@ -79,7 +63,7 @@ class Section:
     ) -> None:
         self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
         self.keys, self.nodes = unique_entries(node, path, faults)
-        table = SECTIONS[general]
+        table = keys.SECTIONS[general]
         self._table = table
         self._faulty: set[str] = set()
         self.misspelt = not self.keys.keys() <= table.keys()
@@ -93,7 +77,7 @@ class Section:
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
 
-    def _read(self, name: str, key: Key) -> Any:
+    def _read(self, name: str, key: keys.Key) -> Any:
         if name in self.nodes:
             value = read_value(
                 key.accepted, self.nodes[name], self.key(name), key.path, self.faults
@@ -103,7 +87,7 @@ class Section:
             return value
         if key.required:
             self.need(name)
-        return DEFAULTS[key.path]
+        return keys.DEFAULTS[key.path]
 
     def is_sound(self, *names: str) -> bool:
         """Whether nothing is faulty or missing: of these keys, or of all."""
@@ -114,7 +98,7 @@ class Section:
         if name not in self.nodes:
             self._faulty.add(name)
             if not self.lenient:
-                message = f"missing; write for example {name}: {example(self._table[name])}"
+                message = f"missing; write for example {name}: {keys.example(self._table[name])}"
                 self.faults.add(self.node.place, self.key(name), message)
         return name in self.nodes
 
@@ -169,65 +153,67 @@ def unique_entries(
     node: Mapping, path: str, faults: FieldFaults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
     """Return the places and values of a mapping's keys, noting repeated keys and odd ones."""
-    keys: dict[str, Place] = {}
+    places: dict[str, Place] = {}
     values: dict[str, Node] = {}
     for key, value in node.entries:
         if not isinstance(key, ScalarNode):
             faults.add(key.place, path, f"found {key} as a key; a word is accepted")
-        elif key.text in keys:
-            first = keys[key.text].line
+        elif key.text in places:
+            first = places[key.text].line
             message = f"repeated key, first given on line {first}; keep one of them"
             faults.add(key.place, join(path, key.text), message)
         else:
-            keys[key.text] = key.place
+            places[key.text] = key.place
             values[key.text] = value
-    return keys, values
+    return places, values
 
 
 def mapping(node: Node, path: str, faults: FieldFaults) -> Mapping | None:
     """Return a node that is a mapping, or note a fault."""
-    if isinstance(node, Mapping):
-        return node
-    faults.add(node.place, path, f"found {node}; accepted: {_form(Mapped())}")
-    return None
+    if not isinstance(node, Mapping):
+        faults.add(node.place, path, f"found {node}; accepted: {_form(keys.Mapped())}")
+    return node if isinstance(node, Mapping) else None
 
 
-def read_value(accepted: Accepted, node: Node, path: str, general: str, faults: FieldFaults) -> Any:
+def read_value(
+    accepted: keys.Accepted, node: Node, path: str, general: str, faults: FieldFaults
+) -> Any:
     """Return a value of the file in base units, or note a fault and return ``None``.
 
     A mapping becomes a `Section` (or stays a node, where the file chooses its names), and a list a
     tuple of values, of which faulty ones are ``None``.
     """
-    if isinstance(accepted, Either):
-        is_list, is_map = isinstance(node, Sequence), isinstance(node, Mapping)
-        for kind in accepted.kinds:
-            if (isinstance(kind, ListOf), isinstance(kind, Mapped)) == (is_list, is_map):
-                return read_value(kind, node, path, general, faults)
-    elif isinstance(accepted, Mapped):
-        inner = mapping(node, path, faults)
-        is_table = inner is not None and general in SECTIONS
-        return Section(inner, path, general, faults) if inner and is_table else inner
-    elif isinstance(accepted, ListOf | OneOrMore) and isinstance(node, Sequence) and node.items:
-        each, general = accepted.each or Mapped(), f"{general}.{EACH}"
-        return tuple(
-            read_value(each, item, f"{path}[{n}]", general, faults)
-            for n, item in enumerate(node.items)
-        )
-    elif isinstance(accepted, OneOrMore) and isinstance(node, ScalarNode):
-        value = read_value(accepted.each, node, path, general, faults)
-        return None if value is None else (value,)
-    try:
-        if isinstance(node, ScalarNode) and not isinstance(accepted, Either | ListOf):
+    match accepted, node:
+        case keys.Either(kinds), _:
+            shape = isinstance(node, Sequence), isinstance(node, Mapping)
+            for kind in kinds:
+                if (isinstance(kind, keys.ListOf), isinstance(kind, keys.Mapped)) == shape:
+                    return read_value(kind, node, path, general, faults)
+        case keys.Mapped(), Mapping():
+            return Section(node, path, general, faults) if general in keys.SECTIONS else node
+        case ((keys.ListOf(each) | keys.OneOrMore(each)), Sequence(items=[_, *_] as items)):
+            kind, general = each or keys.Mapped(), f"{general}.{keys.EACH}"
+            return tuple(
+                read_value(kind, item, f"{path}[{n}]", general, faults)
+                for n, item in enumerate(items)
+            )
+        case keys.OneOrMore(each), ScalarNode():
+            value = read_value(each, node, path, general, faults)
+            return None if value is None else (value,)
+    empty = isinstance(node, Sequence) and not node.items
+    message = f"found {'an empty list' if empty else node}; accepted: {_form(accepted)}"
+    if isinstance(node, ScalarNode) and not isinstance(
+        accepted, keys.Either | keys.ListOf | keys.Mapped
+    ):
+        try:
             return _read_scalar(accepted, node)
-        empty = isinstance(node, Sequence) and not node.items
-        message = f"found {'an empty list' if empty else node}; accepted: {_form(accepted)}"
-    except UnitError as error:
-        message = str(error)
+        except UnitError as error:
+            message = str(error)
     faults.add(node.place, path, message)
     return None
 
 
-def _read_scalar(accepted: Accepted, node: ScalarNode) -> Any:
+def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     """Return the value of a scalar in base units.
 
     Raises
@@ -237,9 +223,9 @@ def _read_scalar(accepted: Accepted, node: ScalarNode) -> Any:
     """
     refusal, close = f"found {node}", ""
     match accepted:
-        case Range():
-            if node.kind in {"nothing", "a boolean"}:
-                raise UnitError(f"{refusal}; accepted: {_form(accepted)}")
+        case keys.Range() if node.kind in {"nothing", "a boolean"}:
+            raise UnitError(f"{refusal}; accepted: {_form(accepted)}")
+        case keys.Range():
             quantity = parse(node.text, accepted.dimension)
             if quantity.value not in accepted:
                 refusal = f"found {node.text}"
@@ -247,36 +233,36 @@ def _read_scalar(accepted: Accepted, node: ScalarNode) -> Any:
                 raise UnitError(f"{refusal}; {accepted.exact}")
             else:
                 return quantity.value if accepted.exact else quantity
-        case Whole(low, high) if node.kind == "a whole number" and len(node.text) <= 30:
+        case keys.Whole(low, high) if node.kind == "a whole number" and len(node.text) <= 30:
             sign, digits = (-1, node.text[1:]) if node.text[0] == "-" else (1, node.text)
             number = sign * int(digits, {"0o": 8, "0x": 16}.get(digits[:2], 10))
             if low <= number <= high:
                 return number
-        case OneOf(words):
+        case keys.OneOf(words):
             if node.text in words:
-                return BOOLEANS.get(node.text, node.text)
+                return keys.BOOLEANS.get(node.text, node.text)
             close = did_you_mean(node.text, words)
-        case Text() if node.kind == "text":
+        case keys.Text() if node.kind == "text":
             # An escape sequence in a title would act on the terminal that shows it.
             if all(character.isprintable() or character == "\n" for character in node.text):
                 return node.text
             raise UnitError(f"{refusal} with control characters; accepted: plain text")
-        case Text() if node.kind != "nothing":
+        case keys.Text() if node.kind != "nothing":
             raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
     raise UnitError(f"{refusal}; {close}accepted: {accepted}")
 
 
-def _form(accepted: Accepted) -> str:
+def _form(accepted: keys.Accepted) -> str:
     """Say how a value is written, where something else than that is found."""
     match accepted:
-        case Range():
+        case keys.Range():
             return f"{accepted.dimension.noun}, {accepted}"
-        case ListOf():
+        case keys.ListOf():
             return f"{accepted} [ … , … ]"
-        case Mapped():
+        case keys.Mapped():
             return "a mapping {key: value, …}"
-        case Either(kinds):
+        case keys.Either(kinds):
             return "; or ".join(map(_form, kinds))
-        case OneOrMore(each):
+        case keys.OneOrMore(each):
             return f"{_form(each)}; one or a list"
     return str(accepted)

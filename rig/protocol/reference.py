@@ -7,22 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rig.protocol.keys import (
-    ANY,
-    BOOLEANS,
-    EACH,
-    KEYS,
-    SECTIONS,
-    Accepted,
-    Either,
-    Key,
-    ListOf,
-    Mapped,
-    OneOf,
-    OneOrMore,
-    Range,
-    Whole,
-)
+from rig.protocol import keys
 from rig.units import Dimension
 
 
@@ -42,7 +27,7 @@ def page() -> str:
         "| key | accepted | without it | meaning | example |",
         "|---|---|---|---|---|",
     ]
-    for key in KEYS:
+    for key in keys.KEYS:
         name = f"**`{key.path}`**" if key.required else f"`{key.path}`"
         example = f"`{key.example}`" if key.example else ""
         lines.append(f"| {name} | {key.accepted} | {key.default} | {key.meaning} | {example} |")
@@ -53,7 +38,7 @@ def page() -> str:
         "| key | source |",
         "|---|---|",
     ]
-    lines += [f"| `{name}` | {key.source} |" for name, key in SECTIONS["priors"].items()]
+    lines += [f"| `{name}` | {key.source} |" for name, key in keys.SECTIONS["priors"].items()]
     return "\n".join(lines) + "\n"
 
 
@@ -68,46 +53,48 @@ def _object(path: str, description: str) -> dict[str, Any]:
     head: dict[str, Any] = {"type": "object"}
     if description:
         head["description"] = description
-    if path not in SECTIONS:
-        inner = _object(f"{path}.{ANY}", "a chain")
+    if path not in keys.SECTIONS:
+        inner = _object(f"{path}.{keys.ANY}", "a chain")
         return head | {"additionalProperties": inner, "minProperties": 1, "maxProperties": 2}
-    keys = SECTIONS[path]
-    head["properties"] = {name: _property(key) for name, key in keys.items()}
+    table = keys.SECTIONS[path]
+    head["properties"] = {name: _property(key) for name, key in table.items()}
     head["additionalProperties"] = False
-    required = [name for name, key in keys.items() if key.required]
+    required = [name for name, key in table.items() if key.required]
     # What a chain is like another one in, it need not say again.
-    return head | ({"required": required} if required and not path.endswith(ANY) else {})
+    return head | ({"required": required} if required and not path.endswith(keys.ANY) else {})
 
 
-def _property(key: Key) -> dict[str, Any]:
+def _property(key: keys.Key) -> dict[str, Any]:
     """Return the schema of a key."""
-    words = [key.meaning] if isinstance(key.accepted, Mapped) else [key.meaning, str(key.accepted)]
+    words = (
+        [key.meaning] if isinstance(key.accepted, keys.Mapped) else [key.meaning, str(key.accepted)]
+    )
     if key.default:
         words.append(f"without it: {key.default}")
     examples = {"examples": [key.example]} if key.example else {}
     return {"description": "; ".join(words), **_values(key.path, key.accepted), **examples}
 
 
-def _values(path: str, accepted: Accepted) -> dict[str, Any]:
+def _values(path: str, accepted: keys.Accepted) -> dict[str, Any]:
     """Return the schema of what a key may be."""
     match accepted:
-        case Range(dimension):
+        case keys.Range(dimension):
             # A text with a unit, or a number where none is needed.
             plain = dimension is Dimension.NUMBER
             return {"type": ["string", "number"] if plain else ["string"]}
-        case Whole(low, high):
+        case keys.Whole(low, high):
             return {"type": "integer", "minimum": low, "maximum": high}
-        case OneOf(words):
+        case keys.OneOf(words):
             # YAML reads a bare true as a boolean.
-            booleans = dict.fromkeys(BOOLEANS[word] for word in words if word in BOOLEANS)
+            booleans = dict.fromkeys(keys.BOOLEANS[word] for word in words if word in keys.BOOLEANS)
             return {"enum": [*words, *booleans]}
-        case OneOrMore(each):
-            return {"anyOf": [_values(path, each), _values(path, ListOf(each))]}
-        case Either(kinds):
+        case keys.OneOrMore(each):
+            return {"anyOf": [_values(path, each), _values(path, keys.ListOf(each))]}
+        case keys.Either(kinds):
             return {"anyOf": [_values(path, kind) for kind in kinds]}
-        case ListOf(each):
-            items = _values(path, each) if each else _object(f"{path}.{EACH}", "an item")
+        case keys.ListOf(each):
+            items = _values(path, each) if each else _object(f"{path}.{keys.EACH}", "an item")
             return {"type": "array", "items": items, "minItems": 1}
-        case Mapped():
+        case keys.Mapped():
             return _object(path, "")
     return {"type": "string"}
