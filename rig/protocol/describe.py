@@ -19,14 +19,14 @@ from rig.protocol.measurable import (
     too_long,
     unmeasurable,
 )
-from rig.protocol.plan import runs
+from rig.protocol.plan import PATTERNS, runs
 from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rig.protocol.protocol import Drag, InclinedTrack, Protocol, RodChain
+    from rig.protocol.protocol import Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
 
@@ -60,63 +60,48 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     return "\n\n".join(blocks)
 
 
-def _number(value: float, unit: str) -> str:
-    return format_quantity(Quantity(value), unit)
+def _number(value: float | Quantity, unit: str) -> str:
+    return format_quantity(value if isinstance(value, Quantity) else Quantity(value), unit)
 
 
 def _scene(protocol: Protocol) -> list[str]:
     """Say what is there."""
-    names = " and ".join(protocol.chains)
-    if protocol.track is not None:
+    names, surface, track = " and ".join(protocol.chains), protocol.surface, protocol.track
+    if track is not None:
         lines = [f"{names} goes down a track"]
-    elif protocol.surface is None:
+    elif surface is None:
         lines = [f"{names} falls freely"]
     elif protocol.two_chains:
         lines = [f"two chains, {names}: one strikes the surface, the other falls beside it"]
     else:
         lines = [f"one chain, {names}, strikes the surface"]
-    struck = protocol.surface is not None
-    part = protocol.vocabulary.part
+    part, struck = protocol.vocabulary.part, surface is not None
     lines += [_chain(chain, part, struck=struck) for chain in protocol.chains.values()]
-    surface = protocol.surface
     if surface is not None and _uses_surface(protocol):
-        restitution = format_quantity(surface.restitution, "1")
-        text = (
-            f"surface: restitution {restitution}, friction {format_quantity(surface.friction, '1')}"
-        )
+        coefficients = f"restitution {_number(surface.restitution, '1')}"
+        lines.append(f"surface: {coefficients}, friction {_number(surface.friction, '1')}")
         if surface.pile is not None:
-            pile = format_quantity(surface.pile.restitution, "1")
-            text += f"; below {_number(surface.pile.below_deg, 'deg')} a pile, restitution {pile}"
-        lines.append(text)
-    if protocol.track is not None:
-        lines.append(_track(protocol.track))
-    pull = "gravity" if protocol.track is None else "acceleration without friction"
-    lines.append(f"{pull}: {format_quantity(protocol.gravity, 'm/s^2')}")
-    along = protocol.track.along(STANDARD_GRAVITY) if protocol.track else STANDARD_GRAVITY
-    if protocol.gravity == along:
+            below = f"; below {_number(surface.pile.below_deg, 'deg')} a pile"
+            lines[-1] += f"{below}, restitution {_number(surface.pile.restitution, '1')}"
+    if track is not None:
+        share = track.rolling_inertia
+        rolls = f", rolling: I/(m r²) = {share:g}" if share else ""
+        lines.append(f"track: {_number(track.incline_deg, 'deg')}{rolls}; heights are along it")
+    pull = "gravity" if track is None else "acceleration without friction"
+    lines.append(f"{pull}: {_number(protocol.gravity, 'm/s^2')}")
+    if protocol.gravity == (track.along(STANDARD_GRAVITY) if track else STANDARD_GRAVITY):
         lines[-1] += ", standard gravity: only the start value of the fit"
-    if surface is not None or protocol.gates is not None:
-        lines.append(f"drop: {format_quantity(protocol.drop, 'mm')} {protocol.drop_from}")
+    if struck or protocol.gates is not None:
+        lines.append(f"drop: {_number(protocol.drop, 'mm')} {protocol.drop_from}")
     if protocol.initial_speed != AT_REST:
-        lines.append(f"initial speed: {format_quantity(protocol.initial_speed, 'm/s')} downward")
-    if protocol.drag is not None:
-        lines.append(f"drag: {_drag(protocol.drag)}")
+        lines.append(f"initial speed: {_number(protocol.initial_speed, 'm/s')} downward")
+    drag = protocol.drag
+    if drag is not None and drag.terminal_speed is not None:
+        lines.append(f"drag: terminal speed {_number(drag.terminal_speed, 'm/s')}")
+    elif drag is not None and drag.coefficient is not None:
+        density = _number(drag.air_density, "kg/m^3")
+        lines.append(f"drag: coefficient {_number(drag.coefficient, '1')} in air of {density}")
     return lines
-
-
-def _track(track: InclinedTrack) -> str:
-    """Say what an object goes down."""
-    rolls = f", rolling: I/(m r²) = {track.rolling_inertia:g}" if track.rolling_inertia else ""
-    return f"track: {format_quantity(track.incline_deg, 'deg')}{rolls}; heights are along it"
-
-
-def _drag(drag: Drag) -> str:
-    """Say what the air does."""
-    if drag.terminal_speed is not None:
-        return f"terminal speed {format_quantity(drag.terminal_speed, 'm/s')}"
-    assert drag.coefficient is not None
-    density = _number(drag.air_density, "kg/m^3")
-    return f"coefficient {format_quantity(drag.coefficient, '1')} in air of {density}"
 
 
 def _chain(rods: RodChain, part: str, *, struck: bool) -> str:
@@ -139,7 +124,7 @@ def _chain(rods: RodChain, part: str, *, struck: bool) -> str:
         ratio = max(chain.masses) / min(chain.masses)
         text += f", graded: heaviest {part} {ratio:.3g} times the lightest"
     if chain.alpha is not None:
-        text += f", α given as {format_quantity(chain.alpha, '1')}"
+        text += f", α given as {_number(chain.alpha, '1')}"
     elif struck:
         text += f", inertia {chain.inertia / XI:.3g} m L²"
     return text
@@ -147,24 +132,21 @@ def _chain(rods: RodChain, part: str, *, struck: bool) -> str:
 
 def _gates(protocol: Protocol) -> list[str]:
     """List the gates with the rods that pass each."""
-    lines, words = [], protocol.vocabulary
-    for gate in protocol.gates.gates if protocol.gates else ():
-        rods = []
-        for name, number in passing_rods(protocol, gate).items():
-            if protocol.one_object:
-                continue
-            total = protocol.chains[name].chain.rods
-            rods.append(f"{name} {total - number + 1}–{total}")
+    gates, words = protocol.gates, protocol.vocabulary
+    if gates is None or not gates.gates:
+        return []
+    lines = []
+    for gate in gates.gates:
         side = f"{gate.side:6}  " if words.two_sides else ""
-        place = f"{side}channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm"
-        lines.append(f"{place}  {words.part}s {', '.join(rods)}" if rods else place)
-    if protocol.gates is not None and lines:
-        height, datum = (
-            _number(u, "mm") for u in (protocol.gates.height_u, protocol.gates.datum_u)
-        )
-        each = " on each side" if words.two_sides else ""
-        lines.append(f"each height ± {height}; the zero of the heights ± {datum}{each}")
-    return lines
+        lines.append(f"{side}channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm")
+        if not protocol.one_object:
+            totals = {name: rods.chain.rods for name, rods in protocol.chains.items()}
+            passing = passing_rods(protocol, gate).items()
+            rods = (f"{name} {totals[name] - n + 1}–{totals[name]}" for name, n in passing)
+            lines[-1] += f"  {words.part}s {', '.join(rods)}"
+    height, datum = _number(gates.height_u, "mm"), _number(gates.datum_u, "mm")
+    each = " on each side" if words.two_sides else ""
+    return [*lines, f"each height ± {height}; the zero of the heights ± {datum}{each}"]
 
 
 SCENES: dict[str, Callable[[Protocol], bool]] = {
@@ -191,8 +173,8 @@ def _priors(protocol: Protocol) -> list[str]:
             lines.append(f"{name:14} {text:>8}{stated}  {key.meaning}")
     if protocol.surface is not None:
         contact = protocol.contact
-        lines += _touching(protocol, format_quantity(contact.level, "mm"))
-        strike = format_quantity(contact.strike, "mm")
+        lines += _touching(protocol, _number(contact.level, "mm"))
+        strike = _number(contact.strike, "mm")
         lines.append(f"the top rod strikes {strike} above it, on the rods below")
     return lines
 
@@ -204,11 +186,13 @@ def _touching(protocol: Protocol, level: str) -> list[str]:
     lines = []
     for incline in dict.fromkeys(protocol.plan.inclines):
         for name in protocol.strikers:
-            found = touching_heights(protocol.chains[name], incline)
-            low, high = (_number(round(one, 4), "mm") for one in (min(found), max(found)))
+            heights = touching_heights(protocol.chains[name], incline)
+            low, high = (_number(round(z, 4), "mm") for z in (min(heights), max(heights)))
             rod = "a rod" if not protocol.unlike_chains else f"a rod of {name}"
-            text = high if low == high else f"{low} to {high}"
-            lines.append(f"at {incline:g}° {rod} touches when its middle is {text} above the board")
+            middle = high if low == high else f"{low} to {high}"
+            lines.append(
+                f"at {incline:g}° {rod} touches when its middle is {middle} above the board"
+            )
     return [*lines, f"further offset of the contact level: {level}"]
 
 
@@ -223,7 +207,7 @@ def _plan(protocol: Protocol) -> list[str]:
         first = next(iter(protocol.chains))
         share = sum(run.impact == first for run in planned)
         lines.append(f"order {plan.order}: chain {first} strikes in {share} of {len(planned)} runs")
-        period = {"ABBA": 4, "alternate": 2, "fixed": 1}[plan.order]
+        period = len(PATTERNS[plan.order])
         if plan.repeats % period:
             lines.append(
                 f"note: {plan.order} is balanced only if repeats is a multiple of {period}"

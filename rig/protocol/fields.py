@@ -258,7 +258,7 @@ def _form(accepted: keys.Accepted) -> str:
         case keys.Range():
             return f"{accepted.dimension.noun}, {accepted}"
         case keys.ListOf():
-            return f"{accepted} [ … , … ]"
+            return str(accepted).replace("a list", "a list [ … , … ]")
         case keys.Mapped():
             return "a mapping {key: value, …}"
         case keys.Either(kinds):

@@ -45,6 +45,9 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
         return None
     if "table" in masses:
         return _interpolate(masses, heights)
+    if rods == 1:
+        masses.fault("exponential", "one object has one mass; state it as mass", at_key=True)
+        return None
     bottom, top = masses["exponential"]["bottom"], masses["exponential"]["top"]
     between = ((top / bottom) ** (rod / (rods - 1)) for rod in range(1, rods - 1))
     return (bottom, *(bottom * share for share in between), top)

@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 # Which chain is on the impact side, repeating. ABBA cancels a drift that is linear in time.
-_PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0, 1), "fixed": (0,)}
+PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0, 1), "fixed": (0,)}
 
 
 def runs(protocol: Protocol) -> tuple[Run, ...]:
@@ -40,7 +40,7 @@ def runs(protocol: Protocol) -> tuple[Run, ...]:
     inclines = list(plan.inclines)
     if plan.randomize == "incline":
         inclines = _shuffled(inclines, plan.seed)
-    pattern = _PATTERNS[plan.order]
+    pattern = PATTERNS[plan.order]
     drops = [
         (incline, *_sides(protocol, pattern[repeat % len(pattern)]))
         for incline in inclines

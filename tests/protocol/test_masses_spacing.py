@@ -130,6 +130,9 @@ def test_what_a_chain_says_itself_displaces_what_it_inherits():
          "f:3:72: chains.A.masses.table[1]: heights must increase"),
         ("rods: 2, length: 1 m, masses: {table: [{height: 0 m, mass: 1 g}]}",
          "f:3:45: chains.A.masses.table: runs from 0 m to 0 m; the rods are from 0 m to 1 m"),
+        ("rods: 2, length: 1 m, "
+         "masses: {exponential: {bottom: 2 g, top: 1 g}, table: [{height: 0 m, mass: 1 g}]}",
+         "f:3:37: chains.A.masses: state one profile, exponential: {bottom: 12 g, top: 3 g} or "),
         ("rods: 2, length: 1 m, mass: 1 g, masses: [1 g, 2 g]",
          "f:3:40: chains.A.masses: mass is also given"),
         ("rods: [{mass: 1 g}, {count: 2}], length: 1 m", "f:3:13: chains.A.rods: mass is given"),
@@ -145,6 +148,23 @@ def test_each_fault_is_found_at_its_place(a, start):
     found = problems(a)
     assert len(found) == 1, found
     assert found[0].startswith(start)
+
+
+def test_one_object_has_no_profile():
+    with pytest.raises(InputError) as caught:
+        parse(
+            "protocol: 1\nchains: {A: {rods: 1, masses: {exponential: {bottom: 2 g, top: 1 g}}}}",
+            "f",
+        )
+    (problem,) = caught.value.problems
+    assert str(problem).startswith("f:2:32: chains.A.masses.exponential: one object has one mass")
+
+
+def test_rods_and_masses_are_checked_whatever_else_is_wrong():
+    found = problems("rods: 3, length: 1 m, masses: [1 mm, 2 g], tilt: x, spacing: [1 m]")
+    assert [line.partition(": ")[2].partition(":")[0] for line in found] == [
+        "chains.A.length", "chains.A.masses[0]", "chains.A.tilt", "chains.A.spacing"
+    ]  # fmt: skip
 
 
 def test_check_describes_it():

@@ -12,9 +12,11 @@ import pytest
 import yaml
 
 from rig.errors import InputError
+from rig.protocol import fields, keys
 from rig.protocol.keys import KEYS
 from rig.protocol.reader import parse, read
 from rig.protocol.reference import page, schema
+from rig.protocol.yamltree import load
 from tests.protocol.keys import BARE, around, put, value
 
 ROOT = Path(__file__).parents[2]
@@ -67,6 +69,28 @@ def test_a_default_written_is_as_left_out(key):
     assert repr(replace(parse(text(written)), text="")) == repr(
         replace(parse(text(plain)), text="")
     )
+
+
+def test_a_row_of_the_table_is_all_that_a_key_needs(monkeypatch):
+    """The reader, its hints, the page and the schema follow."""
+    delay = keys.Key("release.delay", keys.range_of("plan.settle"), "2 s", "of the pulse", "5 s")
+    monkeypatch.setattr(keys, "KEYS", (*KEYS, delay))
+    monkeypatch.setitem(keys.SECTIONS["release"], "delay", delay)
+    monkeypatch.setitem(keys.DEFAULTS, delay.path, 2.0)
+
+    def release(written: str):
+        faults = fields.FieldFaults("f")
+        section = fields.Section(load(written, "f"), "release", "release", faults)
+        return section["delay"], [str(problem) for problem in faults.problems.values()]
+
+    assert release("{delay: 1 min}") == (60.0, [])
+    assert release("{}") == (2.0, [])
+    value, (problem,) = release("{delay: -1 s}")
+    assert value is None
+    assert problem == "f:1:9: release.delay: found -1 s; accepted: 0 s to 3600 s"
+    assert "did you mean delay? accepted here: channel, pulse, delay" in release("{dealy: 1}")[1][0]
+    assert "| `release.delay` | 0 s to 3600 s | 2 s | of the pulse | `5 s` |" in page()
+    assert "delay" in schema()["properties"]["release"]["properties"]
 
 
 def test_a_default_in_words_is_said_of_keys_that_have_it():
