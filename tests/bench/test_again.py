@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.waiting import PATIENCE_S
+
 RUN = Path(__file__).parents[2] / "run"
 
 
@@ -33,7 +35,8 @@ def _again(folder: Path, runs: object, tests: str) -> tuple[int, str]:
         start_new_session=True,
     ) as process:
         try:
-            told = process.communicate(timeout=60)[0]  # a loop that stays holds the pipe open
+            # A loop that stays holds the pipe open.
+            told = process.communicate(timeout=PATIENCE_S)[0]
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             raise

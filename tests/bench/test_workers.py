@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from bench.workers import results
-from tests.waiting import until
+from tests.waiting import PATIENCE_S, until
 
 STOPPED = """
 import sys
@@ -57,5 +57,5 @@ def test_nothing_runs_on_after_the_bench_is_stopped(number, tmp_path):
     ) as bench:  # fmt: skip
         until(lambda: len([*folder.iterdir()]) == 4)
         bench.send_signal(number)
-        assert bench.wait(30.0) != 0
+        assert bench.wait(PATIENCE_S) != 0
     until(lambda: not any(alive(int(pid.name)) for pid in folder.iterdir()))
