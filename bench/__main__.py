@@ -47,8 +47,9 @@ def _parser() -> argparse.ArgumentParser:
         help="at each incline",
     )
     agreement.add_argument("--protocol", default=_SCENE, metavar="FILE", help="the scene")
+    agreement.add_argument("-o", "--output", metavar="DIR", help="folder for page and CSV")
     agreement.add_argument(
-        "-o", "--output", metavar="DIR", help="folder for page and CSV; sessions in it are kept"
+        "--more", action="store_true", help="go on with the sessions of that folder"
     )
     agreement.add_argument("--jobs", type=_count, default=1, metavar="N", help="side by side")
 

@@ -172,12 +172,12 @@ def _table(agreements: Sequence[SessionAgreement]) -> list[str]:
 def main(arguments: Namespace) -> int:
     """Compare sessions of each number of drops with the model; print a table.
 
-    Sessions in the output folder's table are kept: after an interruption the same command goes on.
+    With ``--more`` it goes on with the sessions of the output folder's table.
     """
     folder = make_folder(arguments.output) if arguments.output else None
     table = folder / "agreement.csv" if folder else None
     agreements: list[SessionAgreement] = []
-    if table is not None and table.exists():
+    if arguments.more and table is not None and table.exists():
         with table.open(encoding="utf-8", newline="") as file:
             agreements = [SessionAgreement.from_row(row) for row in csv.DictReader(file)]
     present = {(agreement.drops, agreement.seed) for agreement in agreements}

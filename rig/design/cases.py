@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.components import Components
+    from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol
     from rig.protocol.protocol import Side as Role
 
@@ -190,20 +191,44 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
     """
     found = []
     protocol = at_contact(protocol, run.incline_deg, run.impact)
-    start, gravity = protocol.drop.value - lower, protocol.gravity.value
-    kappa = prior_air(protocol)[0]
-    for record in chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0):
-        path, alphas = free_trajectory(RELEASE_S, start, gravity, kappa, record.air), np.zeros(0)
-        if record.ratios is not None:
-            assert protocol.surface is not None
-            impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
-            alphas = np.array([one.alpha for one in impacts])
-            path = struck_trajectory(
-                RELEASE_S, start, gravity, alphas, record.ratios, record.strikes, kappa, record.air
-            )
+    for record in records_of(protocol, run):
+        alphas = model_alphas(protocol, record, run)
+        path = trajectory(protocol, record, RELEASE_S, protocol.drop.value - lower, alphas)
         trains = tuple(_seen(train, path.times(train.levels)) for train in record.trains)
         found.append((replace(record, trains=trains), alphas))
     return found
+
+
+def records_of(protocol: Protocol, run: Run) -> list[ChainRecord]:
+    """Return the chains of a drop that no beam has seen yet."""
+    return chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
+
+
+def model_alphas(protocol: Protocol, record: ChainRecord, run: Run) -> Array:
+    """α of each rod by the model, shape ``(rods,)``; empty for a free chain."""
+    if record.ratios is None:
+        return np.zeros(0)
+    assert protocol.surface is not None
+    impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
+    return np.array([impact.alpha for impact in impacts])
+
+
+def trajectory(
+    protocol: Protocol,
+    record: ChainRecord,
+    release: float,
+    start: float,
+    alphas: Array,
+    rods: Array | float = 0.0,
+) -> Trajectory:
+    """Let a chain fall whose rods hang so much higher than stated, m."""
+    gravity, kappa = protocol.gravity.value, prior_air(protocol)[0]
+    if record.ratios is None:
+        return free_trajectory(release, start, gravity, kappa, record.air)
+    strikes = record.strikes + rods
+    return struck_trajectory(
+        release, start, gravity, alphas, record.ratios, strikes, kappa, record.air
+    )
 
 
 def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:

@@ -137,8 +137,8 @@ def forecast(
     ]
     kept, stated = _described(protocol, drops)
     # What needs no α of a drop is common to coefficients and measurands.
-    known = [drop.given_alpha() for drop, said in zip(drops, kept, strict=True) if said]
-    root = _session(known, np.eye(size))
+    tied = [drop for drop, said in zip(drops, kept, strict=True) if said]
+    root = _session([drop.given_alpha() for drop in tied], np.eye(size))
     rest = [drop.given_alpha() for drop, said in zip(drops, kept, strict=True) if not said]
     alone = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
     inverse = np.linalg.inv(alone)  # once a layout, then asked by every measurand and incline
@@ -161,7 +161,6 @@ def forecast(
                 common += share * shared
             single.setdefault(name, {})[at] = math.sqrt(by_one)
             mean.setdefault(name, {})[at] = math.sqrt(by_mean + float(common @ common))
-    tied = [drop for drop, said in zip(drops, kept, strict=True) if said]
     coefficients, held = _coefficients(protocol, tied, stated, root) if stated else ({}, set())
     told = {name: u for name, u in coefficients.items() if sure or name not in held}
     return Forecast(single, mean, told, frozenset(held))
@@ -193,27 +192,19 @@ class _Drop:
     @classmethod
     def of(cls, case: Case, rows: Array, shared: int) -> _Drop:
         """Eliminate a drop's own unknowns, and α as far as its prior goes."""
-        own, ends = case.own, case.own + case.struck
+        own, size = case.own, rows.shape[1]
         # A last row of zeros: α has a row also where there is no edge.
-        stack = np.zeros((rows.shape[0] + own + 1, rows.shape[1]))
-        stack[: rows.shape[0]] = rows
-        stack[rows.shape[0] + np.arange(own), np.arange(own)] = 1.0
-        whole = _triangle(stack)
-        alpha = whole[own, own:].copy() if case.struck else np.zeros(whole.shape[1] - own + 1)
-        root = whole[:ends].copy()
+        whole = _triangle(np.vstack([rows, np.eye(own, size), np.zeros((1, size))]))
+        alpha = whole[own, own:] if case.struck else np.zeros(1 + size - own)
+        others = whole[: own + case.struck, own + case.struck :].copy()
+        root = whole[: own + case.struck, : own + case.struck].copy()
         if case.struck:  # turned against the row of its prior, 1
-            length = math.hypot(1.0, alpha[0])
-            root[own, own + 1 :] *= alpha[0] / length
-            root[own, own] = length
-        beams = np.arange(shared, shared + rows.shape[1] - case.core)
-        return cls(
-            case,
-            np.append(case.here, beams),
-            np.linalg.inv(root[:, :ends]).astype(np.float64, copy=False),
-            root[:, ends:],
-            alpha,
-            whole[ends:, ends:],
-        )
+            root[own, own] = math.hypot(1.0, alpha[0])
+            others[own] *= alpha[0] / root[own, own]
+        inverse = np.linalg.inv(root).astype(np.float64, copy=False)
+        place = np.append(case.here, np.arange(shared, shared + size - case.core))
+        rest = whole[own + case.struck :, own + case.struck :]
+        return cls(case, place, inverse, others, alpha, rest)
 
     def given_alpha(self) -> tuple[Array, Index]:
         """Return what all such drops say of the session's unknowns with α known."""

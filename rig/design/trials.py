@@ -13,18 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.chain_records import chain_records
 from rig.analysis.components import above, stated
 from rig.analysis.deciding import deciding_gate
-from rig.analysis.drop_model import prior_air
 from rig.analysis.identify import MISSED, identify
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.verdict import pattern_faults
-from rig.design.cases import CLOCK_U, RELEASE_S
-from rig.model.rods import rod_impacts
+from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, records_of, trajectory
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
-from rig.records import Drop
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -83,7 +78,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     for run in islice(cycle(kinds.values()), drops):
         here = at_contact(protocol, run.incline_deg, run.impact)
         start = here.drop.value + here.drop.u * rng.standard_normal()
-        fallen = [_fallen(here, one, run, start, rng) for one in _blank(here, run)]
+        fallen = [_fallen(here, one, run, start, rng) for one in records_of(here, run)]
         found = identify(here, [one for one, _ in fallen], CLOCK_U, stated(here), _WINDOW)
         wrong = misread(found, {record.role: truth for record, truth in fallen})
         if not wrong:
@@ -93,10 +88,6 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         if wrong and wanted is None and found.fit is not None and found.other is not None:
             wanted = deciding_gate(found.fit, found.other)
     return Trials(drops, read, tuple(failing.items()), wanted)
-
-
-def _blank(protocol: Protocol, run: Run) -> list[ChainRecord]:
-    return chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
 
 
 def _fallen(
@@ -138,18 +129,11 @@ def _path(
     """Where a chain is that hangs and is let go a little off, with impulses that scatter."""
     start += protocol.priors.hang * rng.standard_normal()
     release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
-    gravity, kappa = protocol.gravity.value, prior_air(protocol)[0]
-    if record.ratios is None:
-        return free_trajectory(release, start, gravity, kappa, record.air)
-    assert protocol.surface is not None
-    impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
-    alphas = np.array([one.alpha for one in impacts])
-    scatter = stated(protocol).impulses(float(alphas.mean()), above(alphas.size))
-    alphas += scatter * rng.standard_normal(alphas.size)
-    places = record.strikes + rods
-    return struck_trajectory(
-        release, start, gravity, alphas, record.ratios, places, kappa, record.air
-    )
+    alphas = model_alphas(protocol, record, run)
+    if alphas.size:
+        scatter = stated(protocol).impulses(float(alphas.mean()), above(alphas.size))
+        alphas += scatter * rng.standard_normal(alphas.size)
+    return trajectory(protocol, record, release, start, alphas, rods)
 
 
 def misread(found: Identification, truth: Mapping[str, Sequence[Index]]) -> list[str]:

@@ -172,15 +172,7 @@ def with_contact(
 
 def with_drag(inner: Hypothesis, prior: tuple[float, float]) -> Hypothesis:
     """Suppose air of a κ that is known so well beforehand."""
-    kappa, u = prior
-    if u > 0.0:
-        return _with(inner, (Parameter(AIR, kappa, prior),), 1, lambda _: 0)
-
-    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        target, slopes = inner.targets(form, values)
-        return target + np.append(np.zeros(target.size - 1), kappa), slopes
-
-    return Hypothesis(inner.parameters, targets)
+    return _with(inner, (Parameter(AIR, prior[0], prior),), 1, lambda _: 0)
 
 
 def _with(

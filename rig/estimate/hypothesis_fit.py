@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import least_squares
-from rig.analysis.equations import Linearization
+from rig.analysis.equations import Linearization, scaled
 from rig.analysis.square_root import EquationRows
 from rig.errors import RigError
 
@@ -37,8 +37,8 @@ class Parameter(NamedTuple):
     start
         Where the search begins.
     prior
-        What is known of it without the edges: mean and standard uncertainty; `None` if nothing
-        (see `ANYTHING`).
+        What is known of it without the edges: mean and standard uncertainty, 0 where it is exact;
+        `None` if nothing (see `ANYTHING`).
     """
 
     name: str
@@ -76,7 +76,7 @@ class HypothesisFit:
     chi2
         Weighted sum of squares, priors included.
     log_volume
-        ½ ln det of the covariance of all that was fitted: what a marginal likelihood has beside
+        ½ ln det of the covariance of all that is not exact: what a marginal likelihood has beside
         −½χ².
     """
 
@@ -113,12 +113,12 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
     parameters = hypothesis.parameters
     shared = 1 + max((int(form.here.max(initial=-1)) for form in forms), default=-1)
     priors = [one.prior or (one.start, ANYTHING) for one in parameters]
-    begin = np.append(np.zeros(shared), [one.start for one in parameters])
     centre = np.append(np.zeros(shared), [mean for mean, _ in priors])
+    begin = np.append(np.zeros(shared), [one.start for one in parameters]) - centre
     sd = np.append(np.ones(shared), [u for _, u in priors])
 
-    def linearize(at: Array, _inflation: float) -> Linearization:
-        blocks = {}
+    def linearize(off: Array, _inflation: float) -> Linearization:
+        at, blocks = centre + off, {}
         for number, form in enumerate(forms):
             target, by_parameters = hypothesis.targets(form, at[shared:])
             slopes, left, _ = form.rows.after(np.append(at[form.here], target))
@@ -130,12 +130,13 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
         chi2 = sum(float(rows.left @ rows.left) for rows in blocks.values())
         return Linearization(blocks, chi2, sum(form.edges for form in forms), chi2)
 
-    found = least_squares(linearize, sd, begin, centre, _DONE, rough=True)
+    found = least_squares(linearize, sd, begin, done=_DONE, rough=True)
     if not found.settled:
         raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")
     chi2 = sum(float(rows.left @ rows.left) for rows in found.rows.values())
-    chi2 += float(np.sum(((found.x - centre) / sd) ** 2))
+    chi2 += float(np.sum(scaled(found.x, sd) ** 2))
     by_root = found.inverse[shared:] * sd[shared:, None]
-    volume = float(np.sum(np.log(sd)) - np.linalg.slogdet(found.root)[1])
+    volume = float(np.sum(np.log(sd[sd > 0.0])) - np.linalg.slogdet(found.root)[1])
     names = tuple(one.name for one in parameters)
-    return HypothesisFit(names, found.x[shared:], by_root @ by_root.T, chi2, volume)
+    values = centre[shared:] + found.x[shared:]
+    return HypothesisFit(names, values, by_root @ by_root.T, chi2, volume)

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 NODES = 41
 _REACH = 6.0  # standard uncertainties on either side
-_EXACT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +105,7 @@ def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisF
     logs, means, sds = [], [], []
     for mu in nodes.tolist():
         # The node holds μ; what was known of it is counted below, not twice.
-        fixed = {**priors, MU: Parameter(MU, mu, (mu, _EXACT))}
+        fixed = {**priors, MU: Parameter(MU, mu, (mu, 0.0))}
         at = fit(found.forms, nuisances(protocol, found, model(protocol, [*fixed.values()])))
         prior = priors[MU].prior
         off = (mu - prior[0]) / prior[1] if prior else 0.0

@@ -279,7 +279,19 @@ def _coefficients(
     drag = Measured(*outcome[AIR]) if AIR in outcome else None
     told = posterior(protocol, found, outcome) if names else None
     return Coefficients(
-        tuple(_coefficient(name, found, outcome, told) for name in names) if told else (),
+        tuple(
+            Coefficient(
+                name,
+                name not in found.held,
+                Measured(*outcome[name]),
+                *told.moments(name),
+                *told.interval(name),
+                found.stated[name],
+            )
+            for name in names
+        )
+        if told
+        else (),
         of.correlation(outcome, names),
         told,
         tuple(
@@ -288,17 +300,4 @@ def _coefficients(
         ),
         drag if drag and drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,
-    )
-
-
-def _coefficient(
-    name: str, found: CoefficientProblem, outcome: HypothesisFit, told: Posterior
-) -> Coefficient:
-    return Coefficient(
-        name,
-        name not in found.held,
-        Measured(*outcome[name]),
-        *told.moments(name),
-        *told.interval(name),
-        found.stated[name],
     )
