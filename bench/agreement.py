@@ -41,11 +41,9 @@ _CHUNK = 5  # sessions for one process of the simulation
 _HEAD = """\
 # Is a true model refuted as rarely as p says?
 
-`./run bench agreement`: simulated sessions whose falls follow Eqs. 8 to 13, on rigs that are off by
-as much as their protocol states, β, μ and single impulses included. Over many sessions p of χ² is
-uniform, and |Eₙ| is above 1 in at most 5 % of the lines. *KS* is the probability that p of a
-uniform distribution would look less uniform than these (Kolmogorov and Smirnov). ± of a share is
-from rig to rig."""
+`./run bench agreement`: simulated sessions by Eqs. 8 to 13, on rigs as wrong as their protocol
+states. p of χ² should be uniform (*KS*: Kolmogorov and Smirnov), and |Eₙ| above 1 in at most 5 %. ±
+is from rig to rig."""
 _COLUMNS = ("quantity", "drops", "seed", "chi2", "degrees", "p", "normalized_errors")
 
 

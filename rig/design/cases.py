@@ -194,7 +194,9 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
     for record in records_of(protocol, run):
         alphas = model_alphas(protocol, record, run)
         path = trajectory(protocol, record, RELEASE_S, protocol.drop.value - lower, alphas)
-        trains = tuple(_seen(train, path.times(train.levels)) for train in record.trains)
+        trains = tuple(
+            observed(train, path.times(train.levels), train.blocks) for train in record.trains
+        )
         found.append((replace(record, trains=trains), alphas))
     return found
 
@@ -249,14 +251,10 @@ def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropMo
     return model, x
 
 
-def _seen(train: EdgeTrain, times: Array) -> EdgeTrain:
-    return replace(
-        train,
-        times=times,
-        blocked=train.blocks,
-        burst=np.zeros(times.size),
-        edge=np.arange(times.size),
-    )
+def observed(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
+    """Return the train of a beam that saw these edges and no flicker."""
+    number = np.arange(times.size)
+    return replace(train, times=times, blocked=blocked, burst=0.0 * times, edge=number)
 
 
 def _case(

@@ -147,9 +147,8 @@ def forecast(
     for here in by_case(protocol, drops, lambda drop: drop.case.run):
         at = protocol.condition(here[0].case.run)
         n = sum(drop.case.count for drop in here)
-        for name in names or here[0].case.gradients:
-            if name not in here[0].case.gradients:
-                continue
+        gradients = here[0].case.gradients
+        for name in (name for name in gradients if name in (names or gradients)):
             by_one, by_mean, common = 0.0, 0.0, np.zeros(size)
             for drop in here:
                 share = drop.case.count / n

@@ -7,6 +7,7 @@ every edge that is given to a rod is that rod's.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from rig.analysis.components import above, stated
 from rig.analysis.deciding import deciding_gate
 from rig.analysis.identify import MISSED, identify
 from rig.analysis.verdict import pattern_faults
-from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, records_of, trajectory
+from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, observed, records_of, trajectory
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -73,7 +74,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     """
     rng = np.random.default_rng(_SEED)
     kinds = {(run.incline_deg, run.impact, run.free): run for run in reversed(runs(protocol))}
-    read, failing = 0, dict[str, int]()
+    read, failing = 0, Counter[str]()
     wanted: tuple[str, float] | None = None
     for run in islice(cycle(kinds.values()), drops):
         here = at_contact(protocol, run.incline_deg, run.impact)
@@ -81,10 +82,8 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         fallen = [_fallen(here, one, run, start, rng) for one in records_of(here, run)]
         found = identify(here, [one for one, _ in fallen], CLOCK_U, stated(here), _WINDOW)
         wrong = misread(found, {record.role: truth for record, truth in fallen})
-        if not wrong:
-            read += 1
-        for side in wrong:
-            failing[side] = failing.get(side, 0) + 1
+        read += not wrong
+        failing.update(wrong)
         if wrong and wanted is None and found.fit is not None and found.other is not None:
             wanted = deciding_gate(found.fit, found.other)
     return Trials(drops, read, tuple(failing.items()), wanted)
@@ -108,12 +107,9 @@ def _fallen(
         seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
         times = path.times(levels[seen]) + protocol.priors.jitter * rng.standard_normal(seen.size)
         order = np.argsort(times, kind="stable")
-        seen = seen[order]
         edges = np.full(levels.size, -1)
-        edges[seen] = np.arange(seen.size)
-        blocked, burst = train.blocks[seen], np.zeros(seen.size)
-        number = np.arange(seen.size)
-        trains.append(replace(train, times=times[order], blocked=blocked, burst=burst, edge=number))
+        edges[seen[order]] = np.arange(seen.size)
+        trains.append(observed(train, times[order], train.blocks[seen[order]]))
         truth.append(edges)
     return replace(record, trains=tuple(trains)), truth
 
