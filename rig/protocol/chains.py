@@ -62,7 +62,7 @@ def read_chains(
             continue
         if name in bases:
             base = bases[name].text
-            message = _unusable_base(base, chains, [other for other in nodes if other != name])
+            message = _base_problem(base, chains, [other for other in nodes if other != name])
             if message:
                 faults.add(bases[name].place, f"{path}.like", message)
             own = _inherit(own, described.get(base) or own)
@@ -86,7 +86,7 @@ def _by_name(chain: Mapping) -> dict[str, Node]:
     }
 
 
-def _unusable_base(base: str, read: Collection[str], others: list[str]) -> str:
+def _base_problem(base: str, read: Collection[str], others: list[str]) -> str:
     """Say why a chain cannot be like another one, or nothing if it can."""
     if base not in others:
         accepted = ", ".join(map(quoted, others)) or "no other chain is there"
@@ -113,14 +113,14 @@ def _build_chain(
 ) -> RodChain | None:
     """Build a chain from its keys, or note what does not fit together."""
     rods = list_rods(section, seen_by_gates=seen_by_gates, struck=struck)
-    alone = rods is not None and len(rods.diameters) == 1  # and is where its drop says
-    listed = isinstance(section.nodes.get("spacing"), Sequence)
-    refused = {"length", "spacing"} if alone else {"length"} if listed else set()
-    for key in sorted(refused & section.keys.keys()):
-        message = f"one object has no {key}" if alone else "follows from the listed spacing"
-        section.fault(key, f"{message}; leave it out", at_key=True)
-    if not alone and not listed:
+    is_object = rods is not None and len(rods.diameters) == 1
+    if is_object:
+        for key in section.keys.keys() & {"length", "spacing"}:
+            section.fault(key, f"one object has no {key}; leave it out", at_key=True)
+    elif not isinstance(section.nodes.get("spacing"), Sequence):
         section.need("length")
+    elif "length" in section:
+        section.fault("length", "follows from the listed spacing; leave it out", at_key=True)
     if rods is None:
         return None
     if "masses" in section and rods.weighed:
@@ -143,14 +143,18 @@ def _build_chain(
     chain = Chain(
         masses, heights, XI * section["inertia"], alpha=section["alpha"], gamma=section["gamma"]
     )
+    position_u = section["position_uncertainty"]
+    if is_object and "position_uncertainty" not in section:
+        position_u = 0.0  # it is where its drop says
+    width_u, weighed = section["width_uncertainty"], rods.weighed or "masses" in section
     return RodChain(
         name,
         chain,
         widths,
         section["tilt"],
-        0.0 if alone and "position_uncertainty" not in section else section["position_uncertainty"],
-        section["width_uncertainty"],
+        position_u,
+        width_u,
         rods.diameters,
         rod_length,
-        weighed=rods.weighed or "masses" in section,
+        weighed,
     )

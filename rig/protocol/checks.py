@@ -55,11 +55,11 @@ def check_scene(
         top.fault("contact", "the scene has no surface; leave contact out")
     if top["plan"]:
         _check_plan(top["plan"], struck=struck, turns=kept or count > 1)
-    on_board = _is_on_board(top["contact"], rods)
+    on_board = struck and _is_on_board(top["contact"], rods)
     if top["gates"]:
-        from rig.protocol.gates import check_clear, check_gates  # noqa: PLC0415 - see the reader
+        from rig.protocol.gates import check_clear, check_sides  # noqa: PLC0415 - see the reader
 
-        check_gates(top["gates"], surface=struck, chains=count)
+        check_sides(top["gates"], surface=struck, chains=count)
         if rods and "drop" in top and top.is_sound("drop"):
             inclines = top["plan"]["incline"] if top["plan"] else DEFAULTS["plan.incline"]
             inclines = [angle for angle in inclines or () if on_board and angle is not None]
@@ -82,7 +82,7 @@ def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
     if ("coefficient" in drag) == ("terminal_speed" in drag):
         keys = ("coefficient", "terminal_speed")
         examples = (f"{name}: {example(key_at(f'drag.{name}'))}" for name in keys)
-        if not drag.misspelt:
+        if not drag.has_unknown_keys:
             drag.refuse(f"state either {' or '.join(examples)}")
     elif "terminal_speed" in drag:
         if "air_density" in drag:

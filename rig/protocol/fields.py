@@ -43,7 +43,7 @@ class Section:
         The mapping.
     path
         Its key path in the file, empty for the root.
-    general
+    table_path
         The same in the table, see `rig.protocol.keys.ANY`.
     faults
         Where problems go.
@@ -54,19 +54,25 @@ class Section:
     ----------
     values
         By key: as read, or the default; `None` where it is faulty, or missing without a default.
-    misspelt
+    has_unknown_keys
         Whether any key is not accepted: what seems to be missing may be that one.
     """
 
     def __init__(
-        self, node: Mapping, path: str, general: str, faults: FieldFaults, *, lenient: bool = False
+        self,
+        node: Mapping,
+        path: str,
+        table_path: str,
+        faults: FieldFaults,
+        *,
+        lenient: bool = False,
     ) -> None:
         self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
         self.keys, self.nodes = unique_entries(node, path, faults)
-        table = keys.SECTIONS[general]
+        table = keys.SECTIONS[table_path]
         self._table = table
         self._faulty: set[str] = set()
-        self.misspelt = not self.keys.keys() <= table.keys()
+        self.has_unknown_keys = not self.keys.keys() <= table.keys()
         for name in self.keys.keys() - table.keys():
             self.fault(name, _unknown_key(name, table), at_key=True)
         self.values = {name: self._read(name, key) for name, key in table.items()}
@@ -176,7 +182,7 @@ def mapping(node: Node, path: str, faults: FieldFaults) -> Mapping | None:
 
 
 def read_value(
-    accepted: keys.Accepted, node: Node, path: str, general: str, faults: FieldFaults
+    accepted: keys.Accepted, node: Node, path: str, table_path: str, faults: FieldFaults
 ) -> Any:
     """Return a value of the file in base units, or note a fault and return ``None``.
 
@@ -188,17 +194,17 @@ def read_value(
             shape = isinstance(node, Sequence), isinstance(node, Mapping)
             for kind in kinds:
                 if (isinstance(kind, keys.ListOf), isinstance(kind, keys.Mapped)) == shape:
-                    return read_value(kind, node, path, general, faults)
+                    return read_value(kind, node, path, table_path, faults)
         case keys.Mapped(), Mapping():
-            return Section(node, path, general, faults) if general in keys.SECTIONS else node
+            return Section(node, path, table_path, faults) if table_path in keys.SECTIONS else node
         case ((keys.ListOf(each) | keys.OneOrMore(each)), Sequence(items=[_, *_] as items)):
-            kind, general = each or keys.Mapped(), f"{general}.{keys.EACH}"
+            kind, table_path = each or keys.Mapped(), f"{table_path}.{keys.EACH}"
             return tuple(
-                read_value(kind, item, f"{path}[{n}]", general, faults)
+                read_value(kind, item, f"{path}[{n}]", table_path, faults)
                 for n, item in enumerate(items)
             )
         case keys.OneOrMore(each), ScalarNode():
-            value = read_value(each, node, path, general, faults)
+            value = read_value(each, node, path, table_path, faults)
             return None if value is None else (value,)
     empty = isinstance(node, Sequence) and not node.items
     message = f"found {'an empty list' if empty else node}; accepted: {_form(accepted)}"

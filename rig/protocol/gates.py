@@ -7,7 +7,7 @@ from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.protocol.contact import touching_heights
-from rig.protocol.protocol import SIDES, Gate, Gates, RodChain, vocabulary_of
+from rig.protocol.protocol import SIDES, RodChain, vocabulary_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -19,7 +19,7 @@ CLEARANCE_M = 0.001
 """A beam is some millimetres wide and a hanging chain sways: the least margin around a rod, m."""
 
 
-def check_gates(section: Section, *, surface: bool, chains: int) -> None:
+def check_sides(section: Section, *, surface: bool, chains: int) -> None:
     """Note sides that a scene does not have or that lack gates, and channels used twice.
 
     Parameters
@@ -50,16 +50,6 @@ def check_gates(section: Section, *, surface: bool, chains: int) -> None:
                 gate.fault("channel", message)
             elif channel is not None:
                 lines[channel] = gate.place("channel").line
-
-
-def build_gates(section: Section) -> Gates:
-    """Return the gates of a sound section."""
-    gates = (
-        Gate(gate["channel"], gate["height"], side)
-        for side in SIDES
-        for gate in section[side] or ()
-    )
-    return Gates(tuple(gates), section["height_uncertainty"], section["datum_uncertainty"])
 
 
 class _Rod(NamedTuple):

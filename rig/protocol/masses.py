@@ -38,7 +38,7 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
     profiles = SECTIONS["chains.*.masses"]
     if sum(name in masses for name in profiles) != 1:
         examples = (f"{name}: {example(profile)}" for name, profile in profiles.items())
-        if not masses.misspelt:
+        if not masses.has_unknown_keys:
             masses.refuse(f"state one profile, {' or '.join(examples)}")
         return None
     if not masses.is_sound():

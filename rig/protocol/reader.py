@@ -15,9 +15,12 @@ from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
 from rig.protocol.fields import FieldFaults, Section, mapping
 from rig.protocol.protocol import (
+    SIDES,
     Accept,
     Contact,
     Drag,
+    Gate,
+    Gates,
     InclinedTrack,
     Plan,
     Priors,
@@ -32,7 +35,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from rig.model.surface import Surface
-    from rig.protocol.protocol import Gates, RodChain
+    from rig.protocol.protocol import RodChain
     from rig.protocol.yamltree import Node
 
 MAX_BYTES = 1_000_000
@@ -124,7 +127,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
     check_scene(top, chains, count=_count_chains(top), kept=kept)
     if faults.problems or chains is None:
         return None
-    track = top["track"] and InclinedTrack(**_renamed(top["track"], incline="incline_deg"))
+    track = top["track"] and InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
     gravity = _gravity(top)
     contact = top["contact"]
     return Protocol(
@@ -132,26 +135,26 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
         chains=chains,
         gravity=gravity if track is None else track.along(gravity),
         drop=top["drop"],
-        surface=_surface(top["surface"]),
+        surface=top["surface"] and _surface(top["surface"]),
         track=track,
-        gates=_gates(top["gates"]),
-        release=ReleasePulse(**_renamed(top["release"])),
-        plan=Plan(**_renamed(top["plan"], incline="inclines")),
-        accept=Accept(**_renamed(top["accept"])),
+        gates=top["gates"] and _gates(top["gates"]),
+        release=ReleasePulse(**_arguments(top["release"])),
+        plan=Plan(**_arguments(top["plan"], incline="inclines")),
+        accept=Accept(**_arguments(top["accept"])),
         initial_speed=top["initial_speed"],
-        drag=top["drag"] and Drag(**_renamed(top["drag"])),
+        drag=top["drag"] and Drag(**_arguments(top["drag"])),
         contact=Contact(contact["level"], contact["strike"], contact["datum"] == "board")
         if contact
         else Contact(),
         reference_u=top["reference"],
-        priors=Priors(**_renamed(top["priors"])),
+        priors=Priors(**_arguments(top["priors"])),
         blind=top["blind"],
         text=text,
         source=faults.source,
     )
 
 
-def _renamed(section: Section | None, **names: str) -> dict[str, Any]:
+def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
     """Return the values of a section, some by the names that `rig.protocol.protocol` has."""
     values = section.values if section else {}
     return {names.get(name, name): value for name, value in values.items()}
@@ -175,10 +178,8 @@ def _gravity(top: Section) -> Quantity:
     return gravity_at(top["site"]["latitude"], top["site"]["height"])
 
 
-def _surface(section: Section | None) -> Surface | None:
+def _surface(section: Section) -> Surface:
     """Return the surface; without a restitution, which no chain then needs, its is 0."""
-    if section is None:
-        return None
     from rig.model.surface import Pile, Surface  # noqa: PLC0415 - see above
 
     pile = section["pile"]
@@ -189,9 +190,11 @@ def _surface(section: Section | None) -> Surface | None:
     )
 
 
-def _gates(section: Section | None) -> Gates | None:
-    if section is None:
-        return None
-    from rig.protocol.gates import build_gates  # noqa: PLC0415 - see above
-
-    return build_gates(section)
+def _gates(section: Section) -> Gates:
+    """Return the gates, impact side first, in the order of the file."""
+    gates = (
+        Gate(gate["channel"], gate["height"], side)
+        for side in SIDES
+        for gate in section[side] or ()
+    )
+    return Gates(tuple(gates), section["height_uncertainty"], section["datum_uncertainty"])
