@@ -22,7 +22,7 @@ _LONGEST_NAME = 32
 
 
 def read_chains(
-    node: Node, faults: FieldFaults, *, seen_by_gates: bool, struck: bool
+    node: Mapping, faults: FieldFaults, *, seen_by_gates: bool, struck: bool
 ) -> dict[str, RodChain] | None:
     """Read the ``chains`` mapping.
 
@@ -42,17 +42,14 @@ def read_chains(
     dict of str to RodChain, or None
         In file order; ``None`` if any chain is faulty.
     """
-    outer = mapping(node, "chains", faults)
-    if outer is None:
-        return None
-    places, nodes = unique_entries(outer, "chains", faults)
+    places, nodes = unique_entries(node, "chains", faults)
     if not 1 <= len(nodes) <= 2:
-        faults.add(outer.place, "chains", f"found {len(nodes)} chains; one or two are accepted")
+        faults.add(node.place, "chains", f"found {len(nodes)} chains; one or two are accepted")
     for name, place in places.items():
         if not name.isidentifier() or len(name) > _LONGEST_NAME:
             message = "this name needs to be one word of letters and digits, such as A"
             faults.add(place, join("chains", name), message)
-    described = {name: mapping(node, join("chains", name), faults) for name, node in nodes.items()}
+    described = {name: mapping(own, join("chains", name), faults) for name, own in nodes.items()}
     bases = {name: like for name, own in described.items() if (like := _base(own)) is not None}
     chains: dict[str, RodChain | None] = {}
     for name in sorted(nodes, key=lambda name: name in bases):

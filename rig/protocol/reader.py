@@ -27,7 +27,7 @@ from rig.protocol.protocol import (
     Protocol,
     ReleasePulse,
 )
-from rig.protocol.yamltree import Mapping, Place, ScalarNode, load
+from rig.protocol.yamltree import Place, ScalarNode, load
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -121,9 +121,9 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
         return None
     top = Section(root, "", "", faults)
     chains: dict[str, RodChain] | None = None
-    if "chains" in top:
+    if top["chains"]:
         struck, measured = "surface" in top, "gates" in top
-        chains = read_chains(top.nodes["chains"], faults, seen_by_gates=measured, struck=struck)
+        chains = read_chains(top["chains"], faults, seen_by_gates=measured, struck=struck)
     check_scene(top, chains, count=_count_chains(top), kept=kept)
     if faults.problems or chains is None:
         return None
@@ -162,10 +162,9 @@ def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
 
 def _count_chains(top: Section) -> int:
     """Return how many chains the file names, whether or not they can be read."""
-    node = top.nodes.get("chains")
-    if not isinstance(node, Mapping):
+    if top["chains"] is None:
         return 1
-    return len({key.text for key, _ in node.entries if isinstance(key, ScalarNode)})
+    return len({key.text for key, _ in top["chains"].entries if isinstance(key, ScalarNode)})
 
 
 def _gravity(top: Section) -> Quantity:
