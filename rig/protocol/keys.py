@@ -156,8 +156,8 @@ _SMALL = Range(LENGTH, 0.0, 0.1, "mm")
 _RESTITUTION = Range(NUMBER, -1.0, 1.0, "1", exact="")
 _CONTACT = Range(LENGTH, -0.1, 0.1, "mm", exact="")
 _CHANNEL = Whole(0, GATES - 1)
-_BEAM = Range(LENGTH, 0.0, 100.0, "m", open_low=True,
-              exact="state the uncertainty of all gates as height_uncertainty")  # fmt: skip
+_COMMON_U = "state the uncertainty of all gates as height_uncertainty"
+_BEAM = Range(LENGTH, 0.0, 100.0, "m", open_low=True, exact=_COMMON_U)
 _SHARE = Range(NUMBER, 0.0, 1.0, "%")
 _MULTIPLE = Range(NUMBER, 0.0, 10.0, "%")
 
