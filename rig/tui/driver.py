@@ -21,7 +21,7 @@ from rig.campaign.events import (
     effect_failed,
 )
 from rig.campaign.machine import step
-from rig.errors import RigError
+from rig.errors import DeviceTimeoutError, RigError
 from rig.tui.model import StopAnswer
 
 if TYPE_CHECKING:
@@ -105,10 +105,7 @@ class Driver:
                 case GiveUp():
                     return  # what is wrong is shown, and the operator goes on from there
                 case Stop(reason):
-                    asked = self.stop
-                    heard = await _heard(client, reason)
-                    if asked is not None and asked is self.stop:
-                        self.stop = asked._replace(heard=heard)
+                    await self._switch_off(client, reason)
                     return
                 case Wait(seconds):
                     await client.call("wait", seconds=seconds)
@@ -136,11 +133,18 @@ class Driver:
         else:
             self.take(Answered(ticket, token))
 
+    async def _switch_off(self, client: ReconnectingClient, reason: str) -> None:
+        """Have everything switched off, and ask on until it is known whether it is.
 
-async def _heard(client: ReconnectingClient, reason: str) -> bool:
-    """Have everything switched off; whether anybody did."""
-    try:
-        await client.call("stop", reason=reason)
-    except RigError:
-        return False
-    return True
+        The daemon answers after a second at the latest, also when the board was not heard by then.
+        """
+        asked, is_known = self.stop, False
+        while not is_known and asked is self.stop:
+            try:
+                await client.call("stop", reason=reason)
+            except RigError as error:
+                heard, is_known = False, not isinstance(error, DeviceTimeoutError)
+            else:
+                heard = is_known = True
+            if asked is not None and asked is self.stop:
+                asked = self.stop = asked._replace(heard=heard)

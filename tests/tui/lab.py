@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 KEYS = {action.name: action.keys for action in ACTIONS}
 
-_DAEMON = """\
+DAEMON = """\
 import rig.daemon.lease, rig.daemon.worker
 rig.daemon.lease.LEASE_S = 60.0
 rig.daemon.worker._COMMIT_S = 0.5
@@ -111,7 +111,7 @@ class Lab:
 
     def start(self) -> None:
         """Start the daemon, and wait until it says that it is there."""
-        command = [sys.executable, "-c", _DAEMON, "daemon", "--port", self.url]
+        command = [sys.executable, "-c", DAEMON, "daemon", "--port", self.url]
         daemon = subprocess.Popen(
             [*command, "--socket", str(self.socket)], cwd=ROOT, stderr=subprocess.PIPE
         )

@@ -11,7 +11,7 @@ from rig.campaign.events import Stage
 from rig.session.store import Session
 from rig.tui.screens.ask import Ask, Confirm, Pick
 from rig.tui.screens.help import Help
-from tests.tui.lab import run
+from tests.tui.lab import DAEMON, run
 
 
 @asynccontextmanager
@@ -66,6 +66,40 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab):
             await op.press("ctrl+p")
             await op.until(lambda: len(op.app.screen_stack) == 2)
             await stops(op, "f9")
+
+    run(work())
+
+
+_HELD_UP = """\
+import time
+import rig.daemon.service
+from rig.recorder.controller import Controller
+rig.daemon.service._STOP_S = 0.2
+stop, times = Controller.stop, []
+def late(self, reason):
+    times.append(time.sleep(0.0 if times else 1.0))
+    stop(self, reason)
+Controller.stop = late
+"""
+"""A daemon whose board is heard of at its first STOP only when the daemon has answered."""
+
+
+def test_stop_is_asked_for_until_it_is_known_that_all_is_off(lab, monkeypatch):
+    lab.stop()
+    lab.daemons.clear()
+    monkeypatch.setattr("tests.tui.lab.DAEMON", _HELD_UP + DAEMON)
+    lab.start()
+
+    async def work():
+        async with lab.ready() as op:
+            await op.press("ctrl+p")
+            await op.until(lambda: len(op.app.screen_stack) == 2)
+            async with listening(op) as called:
+                await op.press("f9")
+                await op.until(lambda: op.app.driver.stop.heard is False)
+                assert "stop answered" not in called
+                await op.until(lambda: op.app.driver.stop.heard)
+            assert "stop answered" in called
 
     run(work())
 
