@@ -18,9 +18,15 @@ class RigError(Exception):
         What happened, in one sentence.
     hint
         What to do next; empty when the message already says it.
+
+    Attributes
+    ----------
+    reasons
+        The `rig.reasons.Reason` of it, where it has a code: see `rig.reasons.make_error`.
     """
 
     exit_code = 1
+    reasons: tuple[Any, ...] = ()
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)

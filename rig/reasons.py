@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from rig.errors import RigError
 from rig.units import Quantity, format_quantity
 from rig.vocabulary import ANY_SCENE, VOCABULARIES
 from rig.wordings import LOOK, NOTE, SENTENCE, WORDINGS
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
     from rig.vocabulary import Vocabulary
     from rig.wordings import Severity
+
+Failure = TypeVar("Failure", bound=RigError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +97,33 @@ def make_reason(code: str, words: Vocabulary = ANY_SCENE, /, **values: Any) -> R
     if "log_odds" in values:
         sentence += f" (odds {_odds(values['log_odds'])} to 1)"
     return Reason(code, values, sentence, words.scene)
+
+
+def make_error(kind: type[Failure], code: str, /, **values: Any) -> Failure:
+    """Make the error that refuses a request; its message and its hint are the table's.
+
+    Parameters
+    ----------
+    kind
+        Class of the error.
+    code, **values
+        As for `make_reason`; of a path its name is kept, of an exception its words.
+    """
+    words = {name: _written(value) for name, value in values.items()}
+    return error_of(kind, make_reason(code, **words))
+
+
+def _written(value: object) -> object:
+    if isinstance(value, OSError) and value.strerror:
+        return value.strerror
+    return str(value) if isinstance(value, Exception | PurePath) else value
+
+
+def error_of(kind: type[Failure], reason: Reason) -> Failure:
+    """Make an error of a reason."""
+    error = kind(reason.text, *remedies([reason]))
+    error.reasons = (reason,)
+    return error
 
 
 def sentences(reasons: Iterable[Reason]) -> str:

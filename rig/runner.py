@@ -28,11 +28,11 @@ from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
 from rig.daemon.connecting import connect
-from rig.errors import DeviceError, InputError
+from rig.errors import DeviceError
 from rig.link.refusals import DeviceRefusedError
 from rig.measurands import told
 from rig.protocol import reader
-from rig.protocol.measurable import check_recordable
+from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.recorder.interrupts import Interrupts
@@ -113,11 +113,7 @@ def run_protocol(
         The device is in trouble; what was measured is in the session, which can be continued.
     """
     protocol = reader.read(source)
-    if protocol.gates is None:
-        raise InputError(
-            f"{source} has no gates, so nothing can be measured",
-            f"rig predict {source} says what the model expects",
-        )
+    check_gates(protocol)
     check_recordable(protocol)
     interrupts = Interrupts() if interrupts is None else interrupts
     rig = connect(url, operator.say, interrupts, socket)

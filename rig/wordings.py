@@ -75,6 +75,15 @@ _RULE = (
     "sudo udevadm control --reload and sudo udevadm trigger"
 )
 
+_CLIENTS = "close clients that nobody needs, or try again in a few seconds"
+_DISK = "STOP still goes out to the board; look at the disk (full, on a network, failing?)"
+_UNKNOWN = "for {late_s:.0f} s: gates, phase and drop are not known meanwhile"
+_OFF = "; what was armed switches itself off after 0.25 s"
+_DISCARD = "taking the power from the board discards the drop, a reset does not"
+_PORTS = "`rig ports` lists what is there"
+_RECOVER = "rig recover says what is whole, and with -o NEW saves all that can be read"
+_SESSION_FILE = "name a file made by rig run, rig import or rig daemon"
+
 WORDINGS: dict[str, Wording] = {
     # The record.
     "edges_lost": _void(
@@ -365,7 +374,6 @@ WORDINGS: dict[str, Wording] = {
         "say which is which: --map '{pairs}'"),
     "which_gate": _doubt(
         "the file does not say which gate its times are of", "--channel N says which: {channels}"),
-    "no_gates": _doubt("the scene has no gates", "add the gates that the edges come from"),
     "run_unplanned": _doubt(
         "run {run} is not in the plan of {protocol}, which has {planned} runs",
         "raise plan.repeats, or number the runs as the plan does"),
@@ -383,6 +391,171 @@ WORDINGS: dict[str, Wording] = {
     "blocked_level": _remark(
         "assumed: a {level} signal is a blocked beam, because beams are clear at the beginning; "
         "--dark {other} reverses this"),
+    # What daemon, recorder, session and link refuse.
+    "no_gates": _void("{source} has no gates, so nothing can be measured",
+        "add the gates that are there, at any heights; rig predict {source} needs none"),
+    "daemon_gone": _void("the daemon is gone: {text}",
+        "start it again (rig daemon), then give the same command: a drop that fell is fetched"),
+    "daemon_silent": _void("the daemon at {path} did not answer within {patience_s:g} s",
+        "the computer is very busy, or the daemon hangs: try again, or stop it and start it again"),
+    "daemon_no_answer": _void("the daemon does not answer {method}", "stop it and start it again"),
+    "daemon_version": _void(
+        "this client speaks version {client} of the daemon's interface; rig {rig}'s daemon speaks "
+        "version {daemon}",
+        "stop the daemon and start it again after an update; update the client"),
+    "daemon_busy": _void("the daemon at {path} is busy: for {patience_s:g} s it took no new client",
+        "try again; if it stays so, stop it and start it again"),
+    "daemon_there": _void("another daemon answers at {path}",
+        "use that daemon, stop it, or name another place with --socket"),
+    "daemon_ends": _void("the daemon ends", "start it again: rig daemon"),
+    "daemon_port": _void("the daemon has {port}, not {wanted}",
+        "give --port {port}, or name another daemon's place with --socket"),
+    "no_daemon": _void("no daemon at {path}: {text}", "start one: rig daemon"),
+    "daemon_foreign": _void(
+        "the daemon at {path} belongs to another user", "start one of your own: rig daemon"),
+    "not_a_daemon": _void("the program that answers there is not a daemon of this rig",
+        "name the daemon's place with --socket"),
+    "not_understood": _void("the daemon does not understand: {text}", "are both of one version?"),
+    "internal_error": _void(
+        "internal error", "this is a bug, please report it with the daemon's log"),
+    "file_failed": _void("{path}: {text}", "name another file"),
+    "socket_lost": _void(
+        "{path} was deleted, moved or replaced: no client finds this daemon, so it ended",
+        "its last words are in {folder}; start it again"),
+    "place_unusable": _void("cannot use {path}: {text}", "name another place with --socket"),
+    "folder_foreign": _void("{folder} belongs to another user", "name another place with --socket"),
+    "folder_open": _void("{folder} is open to other users",
+        "name a place in a folder of your own with --socket; if this folder is for nothing else: "
+        "chmod 700 {folder}"),
+    "clients_full": _void("{clients} clients are connected", _CLIENTS),
+    "clients_only_stop": _void(
+        "{clients} clients are connected: any further client may only stop", _CLIENTS),
+    "connections_silent": _void("the daemon has too many connections that say nothing", _CLIENTS),
+    "requests_full": _void(
+        "{requests} requests of this client wait already", "wait for their answers"),
+    "hello_late": _void(
+        "nothing of use was asked for {patience_s:g} s", "say hello as soon as connected"),
+    "control_held": _void(
+        "{holder} has control", "let it finish, or close it; watching and STOP work meanwhile"),
+    "control_lost": _void(
+        "control was lost: nothing was heard from this program for {silence_s:.1f} s, and "
+        "{holder} has it now",
+        "when {holder} has finished, give the same command again: it continues from here"),
+    "control_needed": _void("this needs control, and {holder} has it",
+        "take control first; where somebody else has it, let them finish"),
+    "stop_unknown": _void(
+        "STOP went out to the board; it is not known yet whether the board heard it{because}",
+        "a board that is not heard of switches its release off by itself, after 0.25 s"),
+    "disk_slow": _void(f"the disk has been at one write {_UNKNOWN}", _DISK),
+    "disk_slow_armed": _void(f"the disk has been at one write {_UNKNOWN}{_OFF}", _DISK),
+    "held_up": _void(f"the daemon has been held up {_UNKNOWN}", _DISK),
+    "held_up_armed": _void(f"the daemon has been held up {_UNKNOWN}{_OFF}", _DISK),
+    "records_waiting": _void(
+        "records wait for the disk", "what is waiting is kept in memory until it can be written"),
+    "no_connection": _void("there is no connection to the device", "wait until it is back"),
+    "no_session_open": _void("no session is open", "open a session first"),
+    "not_now": _void("this is not the moment to {act}", "open a session; finish the drop"),
+    "not_next": _void("run {run}, attempt {attempt} does not come next",
+        "read the session again: another client may have continued it"),
+    "nothing_armed": _void("nothing is armed", "arm first"),
+    "not_recorded": _void("there is no record of run {run}, attempt {attempt}", "repeat the run"),
+    "cannot_judge": _void("run {run}, attempt {attempt} cannot be {state}",
+        "only the latest attempt is judged, when it is recorded"),
+    "switched_off": _void("everything was switched off", "arm again when all is well"),
+    "release_test_stopped": _void("the test of the release was stopped", "the release is off"),
+    "drop_of_another_session": _void(
+        "the device holds a drop (run {run}, attempt {attempt}) of another session",
+        f"continue that session first; {_DISCARD}"),
+    "drop_differs": _void(
+        "the device holds another drop of run {run}, attempt {attempt}, than this session",
+        f"continue the session it belongs to; {_DISCARD}"),
+    "other_board": _void("another board is at {port} ({difference})",
+        "plug the board of this session in again; to continue with the board that is there, give "
+        "the same rig run command again"),
+    "other_protocol": _void("{path} was made with another protocol ({source})",
+        "give the same protocol file to continue it, or a new session file"),
+    "session_mixed": _void("{path} is a {recorded} session and {port} is {kind}",
+        "the two are never mixed: give a new session file"),
+    "device_silent": _void("the device did not answer {request}",
+        "check cable and power, press the board's reset button; no firmware yet? rig flash"),
+    "device_confused": _void(
+        "the device answered {request} with {answer}", "is this the rig's own board? rig selftest"),
+    "device_endless": _void("the device records and never ends", "abort the drop; rig selftest"),
+    "events_not_sent": _void("the device did not send the events it was asked for",
+        "its firmware is faulty: rig flash, then rig selftest"),
+    "board_restarted": _void(
+        "the board restarted", f"check its power supply and {WIRING}, then connect again"),
+    "board_restarted_in_drop": _void(f"the board restarted {{moment}}: {SUPPLY}",
+        f"give the magnets a supply of their own, and check {WIRING}"),
+    "connection_lost": _void("connection lost: {text}",
+        "check the cable; plugged in again, the board is found by its serial number, and the "
+        "same rig run goes on: a drop that fell is fetched"),
+    "bytes_strange": _void("{size_mb:.1f} MB of bytes {lacking}",
+        "another baud rate, or another program's port? rig ports lists what is there"),
+    "no_port": _void(
+        "cannot open {port}: there is no such port", f"is the board plugged in? {_PORTS}"),
+    "port_denied": _void("cannot open {port}: permission denied",
+        "join the group that owns it (often dialout), log in again"),
+    "port_taken": _void("cannot open {port}: another program uses it",
+        "close that program, or let its daemon do the work"),
+    "port_failed": _void("cannot open {port}: {text}", _PORTS),
+    "port_unreachable": _void("cannot open {port}: {text}",
+        "is the program that passes the port on running there, and does a firewall let it? As a "
+        "URL: socket://HOST:PORT"),
+    "emulator_missing": _void("the emulator is not installed, or is broken",
+        "install it: pip install ./firmware/emulator (needs gcc and Debian's libsimavr-dev)"),
+    "not_a_port": _void("{port} is no port: {text}", "a device path, or a URL such as sim://"),
+    "disk_knows_no_locks": _void("cannot lock {path}: its disk knows no locks",
+        "is it on a network? Put the session on a disk of this computer, and copy it when all is "
+        "done"),
+    "cannot_lock": _void("cannot lock {path}: {text}",
+        "a session needs a folder you may write to; copy it to one, or only read it"),
+    "session_in_use": _void("{path} is being written by {holder}",
+        "stop that program first, use its daemon, or open the session read-only"),
+    "session_two_names": _void("{path} has a second name (a hard link)",
+        "both would be written at once: copy it to a new file, and use that file"),
+    "session_there": _void(
+        "{path} already exists", "choose another name, or continue that session"),
+    "session_absent": _void(
+        "no session at {path}: {text}", "rig run, rig import and rig daemon make one"),
+    "session_unmade": _void("cannot make {path}: {text}", "choose a folder you may write to"),
+    "session_unreadable": _void("cannot read {path}: {text}",
+        "check its name and permissions, and that there is room for a copy in TMPDIR"),
+    "session_newer": _void(
+        "{path} was written by a newer rig (format {format}; this rig knows up to {known})",
+        "update rig to open it"),
+    "session_altered": _void("{path} was built or altered by another program: {text}", _RECOVER),
+    "not_a_session": _void("{path} is not a session file: {text}", _SESSION_FILE),
+    "session_wrong": _void("{path}: {text}", _RECOVER),
+    "session_closed": _void("{path} is closed", "open it again"),
+    "session_read_only": _void("{path} is open read-only", "open it for writing"),
+    "session_unsaved": _void(
+        "{trouble} while it was in use, and could not be saved anywhere: {text}",
+        "what was not committed is lost; a drop that fell is still on the board: make room, and "
+        "give the same command with a new session file"),
+    "session_rescued": _void(
+        "{trouble} while it was in use; everything that was recorded is saved as "
+        "{place}{except_for}",
+        "give that name to the same command, and it goes on; look for what moves or deletes "
+        "sessions (a sync or backup program?)"),
+    # What SQLite says of a session, with its own words in brackets.
+    "sqlite_full": _void("the disk is full while writing {path} ({text})",
+        "free some space, then the same command goes on: nothing committed is lost, and a drop "
+        "that fell is still on the board"),
+    "sqlite_ioerr": _void("the disk failed under {path} ({text})",
+        "check the disk and its cable, copy the session to another disk, then open the copy"),
+    "sqlite_readonly": _void("{path} cannot be written ({text})",
+        "check the permissions of the file and its folder, or work on a copy"),
+    "sqlite_cantopen": _void(
+        "{path} cannot be opened ({text})", "check the permissions of the file and its folder"),
+    "session_locked": _void("{path} is locked by another program ({text})",
+        "close the program that has the session open and try again"),
+    "sqlite_corrupt": _void("{path} is damaged ({text})", _RECOVER),
+    "sqlite_interrupt": _void("{path} takes far longer to read than any session ({text})",
+        "it was altered or is damaged: rig recover says what is whole"),
+    "sqlite_constraint": _void("{path} refuses this record ({text})",
+        "raw records are added once and never altered; record a new attempt instead"),
+    "sqlite_failed": _void("{path} cannot be read ({text})", _RECOVER),
     # Words of people and of old files.
     OPERATOR: _void("{text}", label="rejected by the operator"),
     NOTE: _remark("note: {text}"),

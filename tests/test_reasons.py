@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import ast
 import re
+import sqlite3
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from rig.errors import RigError, SessionError
 from rig.link.messages import DisarmReason, RefusalReason
-from rig.reasons import _PHRASES, make_reason
+from rig.reasons import _PHRASES, make_error, make_reason
 from rig.vocabulary import Vocabulary
 from rig.wordings import WORDINGS
 
 RIG = Path(__file__).parents[1] / "rig"
-RAISERS = {"make_reason": 0, "plain_reason": 1, "problem": 1, "CheckFailedError": 0,
-           "NotPossibleError": 0, "problems.add": 3, "_problems.add": 3, "place.add": 1,
-           "problems.refuse": 2, "refusal": 1}  # fmt: skip
+RAISERS = {"make_reason": 0, "make_error": 1, "plain_reason": 1, "problem": 1,
+           "CheckFailedError": 0, "NotPossibleError": 0, "problems.add": 3, "_problems.add": 3,
+           "place.add": 1, "problems.refuse": 2, "refusal": 1}  # fmt: skip
 """Functions that take a code, and which of their arguments it is."""
 REFUSED = {f"refused_{reason.name.lower()}" for reason in RefusalReason}
+SQLITE = {name.lower() for name in dir(sqlite3) if name.startswith("SQLITE_")}
 DISARMED = {f"disarmed_{reason.name.lower()}" for reason in DisarmReason}
 
 
@@ -56,14 +59,55 @@ def test_each_raised_code_is_in_the_table():
     assert set(WORDINGS) >= REFUSED | DISARMED
 
 
+def given(call, tree):
+    """Names of the values that a call gives, also by ``**values`` of a dictionary in its file."""
+    names = {keyword.arg for keyword in call.keywords if keyword.arg}
+    by_name = {ast.unparse(keyword.value) for keyword in call.keywords if not keyword.arg}
+    dictionaries = [
+        (ast.unparse(target), texts(node.value))
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict)
+        for target in node.targets
+    ]
+    names = names.union(*(keys for name, keys in dictionaries if name in by_name))
+    return names, by_name - {name for name, _ in dictionaries}
+
+
+ROOMS = ("daemon", "recorder", "session", "link")
+DECODED = {"DeviceRefusedError", "MessageError"}
+"""The one takes its code from the device's reason; the other says why bytes are no message."""
+
+
+def kinds(kind=RigError):
+    return {kind.__name__}.union(*map(kinds, kind.__subclasses__()))
+
+
+def test_whatever_rig_and_session_refuse_has_a_code():
+    plain = {
+        (str(path.relative_to(RIG)), call.lineno)
+        for path, tree in trees()
+        if path.relative_to(RIG).parts[0] in ROOMS
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call)
+        and ast.unparse(call.func).rpartition(".")[2] in kinds() - DECODED
+    }
+    assert not plain
+
+
+def test_an_error_has_the_sentence_and_the_remedy_of_its_code():
+    error = make_error(SessionError, "session_in_use", path="a.session", holder="process 7")
+    assert str(error).startswith("a.session is being written by process 7\n  hint: stop that ")
+    assert [reason.code for reason in error.reasons] == ["session_in_use"]
+
+
 def test_each_call_gives_what_its_sentence_and_remedy_need():
     words = set(_PHRASES) | {field.name for field in fields(Vocabulary)}
-    lacking = {}
+    lacking, parsed = {}, dict(trees())
     for path, code, call in raised_codes():
-        values = {keyword.arg for keyword in call.keywords}
+        values, unseen = given(call, parsed[path])
         if "plain_reason" in ast.unparse(call.func):
             values.add("text")
-        if None not in values:  # ** may hold any
+        if not unseen:  # by a name that no dictionary of the file has, ** may hold any
             wording = WORDINGS[code]
             places = re.findall(r"(?<!\{)\{(\w+)", wording.sentence + wording.remedy)
             if missing := set(places) - values - words:
@@ -73,7 +117,7 @@ def test_each_call_gives_what_its_sentence_and_remedy_need():
 
 def test_each_code_of_the_table_is_raised():
     somewhere = set().union(*(texts(tree) for _, tree in trees()))
-    somewhere |= {"operator", "note", "sentence"} | REFUSED | DISARMED
+    somewhere |= {"operator", "note", "sentence"} | REFUSED | DISARMED | SQLITE
     assert set(WORDINGS) <= somewhere
 
 

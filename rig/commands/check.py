@@ -11,7 +11,7 @@ from rig.errors import InputError
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.measurable import check_recordable, unmeasurable
+from rig.protocol.measurable import check_gates, check_recordable, unmeasurable
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -44,13 +44,12 @@ def _reference(*, as_schema: bool) -> int:
 
 
 def _draw(protocol: Protocol, path: Path) -> None:
-    if protocol.gates is None or not protocol.gates.gates:
-        raise InputError(f"{protocol.source}: the scene has no gates to draw", "leave -o out")
+    gates = check_gates(protocol)
     from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - matplotlib, only here
     from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
 
     kind_of(path)
-    write_figure(path, mounting_figure(protocol, protocol.gates))
+    write_figure(path, mounting_figure(protocol, gates))
 
 
 def _trials(protocol: Protocol) -> list[str]:

@@ -17,7 +17,7 @@ from rig.doctor.gathering import (
 )
 from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
-from rig.selftest.findings import Finding
+from rig.selftest.findings import Finding, explain
 from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:
@@ -80,6 +80,8 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
 
 
 def _failure(name: str, error: RigError) -> Finding:
+    if error.reasons:
+        return explain(name, error.reasons[0])
     return checks.problem(name, "failed", text=error.message, hint=error.hint)
 
 

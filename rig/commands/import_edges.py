@@ -13,7 +13,7 @@ from rig.clock.host import SystemClock
 from rig.commands.output import say
 from rig.files import require_file
 from rig.protocol import reader
-from rig.protocol.measurable import check_measurable
+from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.plan import runs
 from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
@@ -160,15 +160,14 @@ def _read_share(text: str) -> float:
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
-    if protocol.gates is None:
-        raise refusal(protocol.source, "no_gates")
+    gates = check_gates(protocol)
     check_measurable(protocol)
     planned = len(runs(protocol))
     strangers = sorted({drop.run for drop in drops if drop.run > planned})
     if strangers:
         values = {"run": strangers[0], "protocol": protocol.source, "planned": planned}
         raise refusal(source, "run_unplanned", **values)
-    used = protocol.gates.mask
+    used = gates.mask
     idle = sorted({e.channel for drop in drops for e in drop.edges if not used >> e.channel & 1})
     if idle:
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

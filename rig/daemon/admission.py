@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.daemon.rpc import BusyError
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +45,7 @@ class Admission:
         oldest = next((one for one in self._strangers if not one.spoke), None)
         if oldest is not None:
             del self._strangers[oldest]
-            oldest.turn_away(_busy("the daemon has too many connections that say nothing"))
+            oldest.turn_away(make_error(BusyError, "connections_silent"))
         return oldest is not None
 
     def late(self, connection: Connection) -> bool:
@@ -64,7 +65,7 @@ class Admission:
         elif len(self._reserve) < RESERVE:
             room = self._reserve
         else:
-            raise _busy(f"{CLIENTS} clients are connected")
+            raise make_error(BusyError, "clients_full", clients=CLIENTS)
         self._strangers.pop(connection, None)
         room.add(connection)
 
@@ -77,14 +78,10 @@ class Admission:
             It wants something else.
         """
         if connection in self._reserve and method != "stop":
-            raise _busy(f"{CLIENTS} clients are connected: beyond them only stop is done")
+            raise make_error(BusyError, "clients_only_stop", clients=CLIENTS)
 
     def left(self, connection: Connection) -> None:
         """Forget a connection."""
         self._strangers.pop(connection, None)
         self._clients.discard(connection)
         self._reserve.discard(connection)
-
-
-def _busy(why: str) -> BusyError:
-    return BusyError(why, "close clients that nobody needs, or try again in a few seconds")

@@ -20,6 +20,7 @@ from rig.daemon.client_protocol import (
 from rig.daemon.lease import LEASE_S, ControlError
 from rig.daemon.socket_path import reach
 from rig.errors import DeviceError, DeviceTimeoutError
+from rig.reasons import make_error
 from rig.recorder.interrupts import Interrupts
 from rig.session.store import Session
 
@@ -100,9 +101,7 @@ class Client:
                     if ours or turned_away(message):
                         return rpc.result_of(message)
             if time.monotonic() > until:
-                raise DeviceTimeoutError(
-                    f"the daemon does not answer {method}", "stop it and start it again"
-                )
+                raise make_error(DeviceTimeoutError, "daemon_no_answer", method=method)
 
     def take_control(self) -> None:
         """Take control and keep it until `close`.
@@ -123,7 +122,7 @@ class Client:
     def session(self) -> Reader:
         """The open session, for reading."""
         if self._session is None:
-            raise ControlError("no session is open", "open one first")
+            raise make_error(ControlError, "no_session_open")
         return self._session
 
     def open_session(
@@ -170,7 +169,7 @@ class Client:
         self.call("collect", run=run, attempt=attempt, patience=2 * _ANSWER_S)
         drop = self.session.drop(run, attempt)
         if drop is None:
-            raise DeviceError(f"run {run}, attempt {attempt} is not in {self.session.path}")
+            raise make_error(DeviceError, "not_recorded", run=run, attempt=attempt)
         return drop
 
     def log_state(

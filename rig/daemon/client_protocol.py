@@ -7,6 +7,7 @@ from typing import Any
 
 from rig.daemon import rpc
 from rig.errors import DeviceError, DeviceTimeoutError
+from rig.reasons import make_error
 
 HELLO_PATIENCE_S = 10.0
 """How long a client waits for the answer to `hello`."""
@@ -44,7 +45,7 @@ class ClientProtocol:
         except ValueError:
             messages = [None]
         if len(self._rest) > rpc.MESSAGE_LIMIT or not all(isinstance(m, dict) for m in messages):
-            raise DeviceError("what answers there is no daemon of this rig")
+            raise make_error(DeviceError, "not_a_daemon")
         return messages
 
 
@@ -112,15 +113,10 @@ def hello(name: str, token: str) -> dict[str, Any]:
 
 def gone(why: object) -> DeviceError:
     """Make the error that says that a daemon is gone."""
-    return DeviceError(
-        f"the daemon is gone: {why}",
-        "start it again (rig daemon), then give the same command: a drop that fell is fetched",
-    )
+    return make_error(DeviceError, "daemon_gone", text=why)
 
 
 def silent(path: object) -> DeviceTimeoutError:
     """Make the error that says that a daemon takes connections and answers nothing."""
-    return DeviceTimeoutError(
-        f"the daemon at {path} did not answer within {HELLO_PATIENCE_S:g} s",
-        "the computer is very busy, or it hangs: try again, or stop it and start it again",
-    )
+    patience_s = HELLO_PATIENCE_S
+    return make_error(DeviceTimeoutError, "daemon_silent", path=path, patience_s=patience_s)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NoReturn, TypeAlias
 
 from rig.daemon.socket_path import default_socket, token_file
 from rig.errors import DeviceError, RigError
+from rig.reasons import make_error
 from rig.recorder.controller import Controller
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def connect(
             if socket is None:
                 client.close()
                 return Controller(url, interrupts)
-            _refuse(f"the daemon has {client.daemon['port']}, not {url}")
+            _refuse(client.daemon["port"], url)
         client.take_control()
     except BaseException:
         client.close()
@@ -79,5 +80,5 @@ def _same(one: str, other: str) -> bool:
     return Path(one).resolve() == Path(other).resolve()
 
 
-def _refuse(why: str) -> NoReturn:
-    raise DeviceError(why, "leave --socket out, or name that port")
+def _refuse(port: str, wanted: str) -> NoReturn:
+    raise make_error(DeviceError, "daemon_port", port=port, wanted=wanted)

@@ -6,6 +6,7 @@ import asyncio
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rig.daemon import rpc
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -135,9 +136,7 @@ class Connection:
             task.add_done_callback(self._urgent.discard)
         elif waiting.full() and isinstance(one, rpc.Request):
             # Refused, not kept back: a stop behind it must be read.
-            busy = rpc.BusyError(
-                f"{rpc.BATCH_LIMIT} requests of this client wait already", "wait for their answers"
-            )
+            busy = make_error(rpc.BusyError, "requests_full", requests=rpc.BATCH_LIMIT)
             reply(None if one.notification else rpc.failure(one.id, busy))
         elif waiting.full():
             reply(None)

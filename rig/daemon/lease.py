@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,10 +59,7 @@ class Lease:
         """
         with self._guard:
             if self._holder not in {None, client} and self._now() < self._until:
-                raise ControlError(
-                    f"{self._name} has control",
-                    "let it finish, or close it; watching and STOP work meanwhile",
-                )
+                raise make_error(ControlError, "control_held", holder=self._name)
             if self._holder not in {None, client}:
                 self._overtaken[self._holder] = self._until - LEASE_S
             self._silences.pop(client, None)
@@ -105,12 +103,5 @@ class Lease:
         if holder is client:
             return
         if silence is not None:
-            raise ControlError(
-                f"control was lost: nothing was heard from this program for {silence:.1f} s, "
-                f"and {name} has it now",
-                "when that one has finished, give the same command again: it goes on from here",
-            )
-        raise ControlError(
-            f"this needs control, and {name} has it",
-            "take control first; where somebody else has it, let them finish",
-        )
+            raise make_error(ControlError, "control_lost", silence_s=silence, holder=name)
+        raise make_error(ControlError, "control_needed", holder=name)

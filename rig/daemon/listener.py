@@ -12,6 +12,7 @@ from rig.daemon import rpc
 from rig.daemon.socket_path import prepare_folder, token_file
 from rig.errors import InputError
 from rig.files import identity_of, write_atomic
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,10 +43,7 @@ def listen(path: Path, token: str) -> socket.socket:
     """
     prepare_folder(path.parent)
     if _answers_at_socket(path) or _answers_at_port(token_file(path)):
-        raise InputError(
-            f"another daemon answers at {path}",
-            "use that one, stop it, or name another place with --socket",
-        )
+        raise make_error(InputError, "daemon_there", path=path)
     for left_by_a_killed_one in (path, token_file(path)):
         left_by_a_killed_one.unlink(missing_ok=True)
     if token:
@@ -97,9 +95,7 @@ def _answers_at_socket(path: Path) -> bool:
         except (BlockingIOError, TimeoutError):
             return True  # so many wait that it does not come to us
         except OSError as error:
-            raise InputError(
-                f"cannot listen at {path}: {error}", "name another place with --socket"
-            ) from error
+            raise make_error(InputError, "place_unusable", path=path, text=error) from error
     return True
 
 

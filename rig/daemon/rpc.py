@@ -11,6 +11,7 @@ from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, DeviceTimeoutError, InputError, RigError, SessionError
 from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
+from rig.reasons import make_error, read_record
 from rig.recorder.interrupts import StoppedError
 
 log = logging.getLogger(__name__)
@@ -149,9 +150,7 @@ def error_of(message: dict[str, Any]) -> RigError:
     error = message["error"]
     if isinstance(error.get("data"), dict):
         return error_from_data(error["data"])
-    return RigError(
-        f"the daemon does not understand: {error.get('message')}", "are both of one version?"
-    )
+    return make_error(RigError, "not_understood", text=str(error.get("message")))
 
 
 def known(error: Exception) -> RigError:
@@ -159,9 +158,9 @@ def known(error: Exception) -> RigError:
     if isinstance(error, RigError):
         return error
     if isinstance(error, OSError) and error.filename:  # of a file that a client has named
-        return InputError(f"{error.filename}: {error.strerror}", "name another file")
+        return make_error(InputError, "file_failed", path=str(error.filename), text=error)
     log.error("internal error", exc_info=error)
-    return RigError("internal error", "this is a bug, please report it with the daemon's log")
+    return make_error(RigError, "internal_error")
 
 
 def error_to_data(error: RigError) -> dict[str, Any]:
@@ -176,7 +175,7 @@ def error_to_data(error: RigError) -> dict[str, Any]:
         "reason": refused.reason.name if refused else None,
         "detail": refused.detail if refused else None,
         "disarmed": refused.disarmed.name if refused and refused.disarmed else None,
-        "reason_codes": [refused.why.json()] if refused else [],
+        "reason_codes": [reason.record() for reason in error.reasons],
     }
 
 
@@ -192,6 +191,7 @@ def error_from_data(data: dict[str, Any]) -> RigError:
     kind = _KINDS.get(str(data.get("kind")), RigError)
     error = kind(str(data.get("message", "")), str(data.get("hint", "")))
     error.exit_code = int(data.get("exit_code", kind.exit_code))
+    error.reasons = tuple(map(read_record, data.get("reason_codes") or ()))
     return error
 
 

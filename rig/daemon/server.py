@@ -26,6 +26,7 @@ from rig.daemon.worker import STALL_S, Worker
 from rig.errors import InputError, RigError
 from rig.files import make_folder, state_folder
 from rig.ports import is_simulated
+from rig.reasons import make_error
 from rig.recorder.published import PublishedState
 
 if TYPE_CHECKING:
@@ -196,11 +197,7 @@ class Server:
 
     def _hurry(self, connection: Connection) -> None:
         if self._admission.late(connection):
-            connection.turn_away(
-                rpc.BusyError(
-                    f"nothing of use was asked for {HELLO_S:g} s", "say hello as soon as connected"
-                )
-            )
+            connection.turn_away(make_error(rpc.BusyError, "hello_late", patience_s=HELLO_S))
 
     async def _watch_lease(self) -> None:
         """See that control lapses also when its holder says nothing."""
@@ -232,10 +229,8 @@ class Server:
         """End when no client is there and none can come; what is said then goes into a log too."""
         while door.there() or self.publisher.connections:
             await asyncio.sleep(_DOOR_S)
-        self._failed = InputError(
-            f"{door.path} was deleted, moved or replaced: no client finds this daemon, so it ended",
-            f"its last words are in {state_folder()}; start it again",
-        )
+        folder = state_folder()
+        self._failed = make_error(InputError, "socket_lost", path=door.path, folder=folder)
         with _kept_log():
             log.error("%s", self._failed)
             self.end()

@@ -13,7 +13,7 @@ from rig import __version__
 from rig.daemon import rpc
 from rig.errors import DeviceTimeoutError
 from rig.printable import encodable, one_line
-from rig.reasons import Reason, plain_reason, read_record
+from rig.reasons import Reason, make_error, plain_reason, read_record
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -127,11 +127,8 @@ class Service:
         self, who: Connection, /, api: object, client: object, token: object = ""
     ) -> dict[str, Any]:
         if isinstance(api, bool) or api != rpc.API:
-            raise rpc.VersionError(
-                f"this client speaks version {api} of the daemon's interface, rig {__version__}'s "
-                f"daemon version {rpc.API}",
-                "stop the daemon and start it again after an update; update the client",
-            )
+            versions = {"client": one_line(str(api), 40), "rig": __version__, "daemon": rpc.API}
+            raise make_error(rpc.VersionError, "daemon_version", **versions)
         if self._token and token != self._token:
             raise rpc.RpcError(rpc.INVALID, "wrong token")
         name = one_line(_text(client, "client"), 80) or "a client"
@@ -172,11 +169,8 @@ class Service:
         await asyncio.wait([done], timeout=_STOP_S)
         if not done.done():
             stalled = self._worker.stalled()
-            raise DeviceTimeoutError(
-                "STOP went out to the board; that it was heard is not known yet"
-                + (f": {stalled.message}" if stalled else ""),
-                "a board that is not heard of switches its release off by itself, after 0.25 s",
-            )
+            because = f": {stalled.message}" if stalled else ""
+            raise make_error(DeviceTimeoutError, "stop_unknown", because=because)
         return done.result() or {}
 
     async def _open_session(

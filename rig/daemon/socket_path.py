@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rig.daemon.rpc import BusyError
 from rig.errors import DeviceError, InputError
+from rig.reasons import make_error
 
 _SECRET = 0o077  # what the group and others may not have
 _REACH_S = 5.0
@@ -42,9 +43,7 @@ def prepare_folder(folder: Path) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         check_folder(folder)
     except OSError as error:
-        raise InputError(
-            f"cannot use {folder}: {error.strerror or error}", "name another place with --socket"
-        ) from error
+        raise make_error(InputError, "place_unusable", path=folder, text=error) from error
 
 
 def check_folder(folder: Path) -> None:
@@ -57,13 +56,9 @@ def check_folder(folder: Path) -> None:
     """
     about = folder.stat()
     if about.st_uid != os.getuid():
-        raise InputError(f"{folder} belongs to somebody else", "name another place with --socket")
+        raise make_error(InputError, "folder_foreign", folder=folder)
     if about.st_mode & _SECRET:
-        raise InputError(
-            f"{folder} is open to other users",
-            "name a place in a folder of your own with --socket; if this one is for nothing else: "
-            f"chmod 700 {folder}",
-        )
+        raise make_error(InputError, "folder_open", folder=folder)
 
 
 def peer_uid(connection: socket.socket) -> int | None:
@@ -111,18 +106,14 @@ def reach(path: Path) -> tuple[socket.socket, str]:
     except (BlockingIOError, TimeoutError) as error:
         if line is not None:
             line.close()
-        raise BusyError(
-            f"the daemon at {path} is busy: for {_REACH_S:g} s it took no new client",
-            "try again; if it stays so, stop it and start it again",
-        ) from error
+        raise make_error(BusyError, "daemon_busy", path=path, patience_s=_REACH_S) from error
     except (OSError, ValueError) as error:
         if line is not None:
             line.close()
-        why = getattr(error, "strerror", None) or error
-        raise DeviceError(f"no daemon at {path}: {why}", "start one: rig daemon") from error
+        raise make_error(DeviceError, "no_daemon", path=path, text=error) from error
     if peer_uid(line) not in {None, os.getuid()}:
         line.close()
-        raise DeviceError(f"no daemon of this user at {path}", "start one: rig daemon")
+        raise make_error(DeviceError, "daemon_foreign", path=path)
     return line, token
 
 

@@ -24,7 +24,7 @@ from rig.daemon.stopper import Stopper
 from rig.errors import InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
-from rig.reasons import make_reason
+from rig.reasons import make_error, make_reason, remedies
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
 
@@ -45,7 +45,7 @@ _STATISTICS_S = 1.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
 STALL_S = 1.0
 """Held up for longer, the worker is said to be: nothing is known of the board meanwhile."""
-_KEPT = "what is waiting is kept in memory until it can be written"
+_WAITING = make_reason("records_waiting")
 
 
 class _Job(NamedTuple):
@@ -157,14 +157,10 @@ class Worker:
         watched = disk or (recorder is not None and not is_simulated(self._url))
         if late_s < STALL_S or not watched:
             return None
-        what = "the disk has been at one write" if disk else "the daemon has been held up"
-        off = ""
-        if recorder is not None and recorder.armed is not None:
-            off = "; what was armed switches itself off after 0.25 s"
-        return SessionError(
-            f"{what} for {late_s:.0f} s: gates, phase and drop are not known meanwhile{off}",
-            "STOP still goes out to the board; look at the disk (full, on a network, failing?)",
-        )
+        is_armed = recorder is not None and recorder.armed is not None
+        disk_codes, worker_codes = ("disk_slow", "disk_slow_armed"), ("held_up", "held_up_armed")
+        code = (disk_codes if disk else worker_codes)[is_armed]
+        return make_error(SessionError, code, late_s=late_s)
 
     def at_rest(self) -> Future[bool]:
         """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
@@ -222,7 +218,7 @@ class Worker:
             self._turn(job)
         self._stop = self._stop or "the daemon ended"
         self._attend()
-        self._drain(StoppedError("the daemon ends", "start it again: rig daemon"))
+        self._drain(make_error(StoppedError, "daemon_ends"))
         self._trying(self.controller.close)
         self._due_s = math.inf
 
@@ -238,7 +234,7 @@ class Worker:
         if job is None or not job.outcome.set_running_or_notify_cancel():
             return  # somebody only wants to be heard, or nobody waits any more
         if self._stop:
-            job.outcome.set_exception(StoppedError(self._stop))
+            job.outcome.set_exception(self._stopped())
             return
         self._at_work = True
         try:
@@ -249,7 +245,7 @@ class Worker:
             if self._trouble is None:
                 self._weigh(failure)
             stopped = isinstance(error, StoppedError | DeviceRefusedError) and self._stop
-            job.outcome.set_exception(StoppedError(self._stop) if stopped else failure)
+            job.outcome.set_exception(self._stopped() if stopped else failure)
         else:
             if self._trouble is not None and self._over():
                 self._well()
@@ -267,6 +263,9 @@ class Worker:
     def _open_session(self) -> object:
         return self.controller.session if self.controller.recording else None
 
+    def _stopped(self) -> StoppedError:
+        return make_error(StoppedError, "stopped", text=self._stop)
+
     def _drain(self, error: RigError) -> None:
         with suppress(queue.Empty):
             while True:
@@ -283,7 +282,7 @@ class Worker:
             reason, stops = self._stop, [*self._stops]  # one that comes from here on is not lost
         why: Reason | str = reason
         if reason:
-            self._drain(StoppedError(reason))
+            self._drain(make_error(StoppedError, "stopped", text=reason))
         elif armed and not self._held:
             silence = self._lease.silence(self._holder)
             client = {"client": self._lease.name, "silence_s": silence} if silence else {}
@@ -369,8 +368,9 @@ class Worker:
         """Decide what an error means for the link."""
         if isinstance(error, SessionError) and self.controller.recording:
             waiting = self.controller.session.pending
-            if waiting and _KEPT not in error.hint:
-                error.hint = "; ".join(filter(None, [error.hint, _KEPT]))
+            if waiting and _WAITING not in error.reasons:
+                error.reasons += (_WAITING,)
+                error.hint = "; ".join(remedies(error.reasons))
         if isinstance(error, DeviceRefusedError | StoppedError | ControlError | InputError):
             return
         if isinstance(error, SessionError):

@@ -14,9 +14,9 @@ from rig.analysis.pattern import Guess
 from rig.analysis.quantities import measurands
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.unknowns import SharedUnknowns
-from rig.errors import InputError
 from rig.model.rods import rod_impacts
 from rig.protocol.contact import at_contact
+from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Run
 from rig.records import Drop
@@ -121,11 +121,7 @@ def beams_of(protocol: Protocol) -> list[tuple[Role, float]]:
     InputError
         Where it has none.
     """
-    if protocol.gates is None:
-        raise InputError(
-            f"{protocol.source} has no gates", "add the gates that are there, at any heights"
-        )
-    return [(gate.side, gate.height) for gate in protocol.gates.gates]
+    return [(gate.side, gate.height) for gate in check_gates(protocol).gates]
 
 
 def with_beams(protocol: Protocol, beams: Sequence[tuple[Role, float]]) -> Protocol:

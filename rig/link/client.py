@@ -11,6 +11,7 @@ from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received
+from rig.reasons import make_error
 from rig.records import ClockSample
 
 if TYPE_CHECKING:
@@ -302,9 +303,7 @@ class Device:
                 if (state.phase, state.label) != (wire.Phase.RECORDING, label):
                     break  # the certificate was lost on the way, or the drop is gone
                 if now() >= hopeless:
-                    raise DeviceTimeoutError(
-                        "the device records and never ends", "abort the drop; rig selftest"
-                    )
+                    raise make_error(DeviceTimeoutError, "device_endless")
                 ask = now() + round(_LATE_S * 1e9)
         return self.fetch(label)
 
@@ -366,8 +365,5 @@ class Device:
                 size = max(_SMALLEST_READ, size // 2)
             else:
                 if drop.missing(at_most=size, readable=True)[:1] == missing[:1]:
-                    raise DeviceError(
-                        "the device did not send the events it was asked for",
-                        "its firmware is faulty: rig flash, then rig selftest",
-                    )
+                    raise make_error(DeviceError, "events_not_sent")
                 failures = 0

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
+import serial
+
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import DeviceRefusedError
 from rig.link.restarts import Restart
 from rig.link.transcript import Received, Record, Transcript
-from rig.wordings import SUPPLY, WIRING
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -131,14 +133,9 @@ class Exchange:
             if isinstance(answer, wire.Refused):
                 raise DeviceRefusedError(answer.reason, answer.detail)
             if answer is not None:
-                raise DeviceError(
-                    f"the device answered {type(message).__name__} with {type(answer).__name__}",
-                    "is this the rig's own board? rig selftest",
-                )
-        raise DeviceTimeoutError(
-            f"the device did not answer {type(message).__name__}",
-            "check cable and power, press the board's reset button; no firmware yet? rig flash",
-        )
+                names = {"request": type(message).__name__, "answer": type(answer).__name__}
+                raise make_error(DeviceError, "device_confused", **names)
+        raise make_error(DeviceTimeoutError, "device_silent", request=type(message).__name__)
 
     def wait(self, seconds: float, wanted: Callable[[Received], bool]) -> wire.Message | None:
         """Read until a wanted message comes or the time is over.
@@ -268,27 +265,17 @@ class Exchange:
 
 def _restarted(restart: Restart) -> DeviceError:
     if restart.label is None:
-        hint = f"check its power supply and {WIRING}, then connect again"
-        return DeviceError("the board restarted", hint)
-    return DeviceError(
-        f"the board restarted {restart.when}: {SUPPLY}",
-        f"give the magnets a supply of their own, and check {WIRING}",
-    )
+        return make_error(DeviceError, "board_restarted")
+    return make_error(DeviceError, "board_restarted_in_drop", moment=restart.when)
 
 
 def _lost(error: OSError) -> DeviceError:
-    # What pyserial says of a port that is gone sounds like something else.
-    why = "the port is gone" if "returned no data" in str(error) else error
-    return DeviceError(
-        f"connection lost: {why}",
-        "check the cable; plugged in again, the board is found by its serial number, and the same "
-        "rig run goes on: a drop that fell is fetched",
-    )
+    # Of a serial port that is gone the cause is pyserial's own, and not the system's.
+    is_gone = isinstance(error.__context__, serial.SerialException)
+    text = "the port is gone" if is_gone else str(error)
+    return make_error(DeviceError, "connection_lost", text=text)
 
 
 def _strange(size: int, frames: int) -> DeviceError:
-    what = "and no word of who is there" if frames else "that are no frames"
-    return DeviceError(
-        f"{size / 1e6:.1f} MB of bytes {what}",
-        "another baud rate, or another program's port? rig ports lists what is there",
-    )
+    lacking = "and no word of who is there" if frames else "that are no frames"
+    return make_error(DeviceError, "bytes_strange", size_mb=size / 1e6, lacking=lacking)

@@ -16,32 +16,22 @@ import serial
 from rig.clock.host import Clock, SystemClock
 from rig.errors import DeviceError, InputError, RigError
 from rig.ports import check_name
+from rig.reasons import make_error
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
 READ_TIMEOUT_S = 0.02
 _HANDLERS = ("sim", "rig_emulator")  # packages where pyserial finds sim:// and emu://
-_EMULATOR = "install it: pip install ./firmware/emulator (needs gcc and Debian's libsimavr-dev)"
-
-_LOOK = "`rig ports` lists what is there"
-_ABSENT = ("there is no such port", f"is the board plugged in? {_LOOK}")
-_FORBIDDEN = ("permission denied", "join the group that owns it (often dialout), log in again")
-_TAKEN = ("another program uses it", "close that program, or let its daemon do the work")
-_CAUSES = {
-    errno.ENOENT: _ABSENT,
-    errno.ENODEV: _ABSENT,
-    errno.EACCES: _FORBIDDEN,
-    errno.EPERM: _FORBIDDEN,
-    errno.EBUSY: _TAKEN,
-    errno.EAGAIN: _TAKEN,
-    errno.ENOTTY: ("it is no serial port", _LOOK),
-    errno.EISDIR: ("it is a folder", _LOOK),
+_CODES = {
+    errno.ENOENT: "no_port",
+    errno.ENODEV: "no_port",
+    errno.EACCES: "port_denied",
+    errno.EPERM: "port_denied",
+    errno.EBUSY: "port_taken",
+    errno.EAGAIN: "port_taken",
 }
+_PLAIN = {errno.ENOTTY: "it is no serial port", errno.EISDIR: "it is a folder"}
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
-_REACH = (
-    "is the program that passes the port on running there, and does a firewall let it? "
-    "As a URL: socket://HOST:PORT"
-)
 
 
 class Port(Protocol):
@@ -100,16 +90,19 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
         if _scheme(url) in _NETWORK:
-            raise DeviceError(f"cannot open {url}: {_why_unreachable(error)}", _REACH) from error
+            text = _why_unreachable(error)
+            raise make_error(DeviceError, "port_unreachable", port=url, text=text) from error
         # Of what it cannot set up, pyserial keeps the cause only behind its own words.
         below = error.__context__.args[:1] if error.__context__ else ()
         number = error.errno or next((one for one in below if isinstance(one, int)), 0)
-        cause, hint = _CAUSES.get(number, (str(error), _LOOK))
-        raise DeviceError(f"cannot open {url}: {cause}", hint) from error
+        text = _PLAIN.get(number, str(error))
+        raise make_error(
+            DeviceError, _CODES.get(number, "port_failed"), port=url, text=text
+        ) from error
     except ValueError as error:
         if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import
-            raise DeviceError("the emulator is not installed, or is broken", _EMULATOR) from error
-        raise DeviceError(f"cannot open {url}: {error}", _LOOK) from error
+            raise make_error(DeviceError, "emulator_missing") from error
+        raise make_error(DeviceError, "port_failed", port=url, text=error) from error
     opened: Port = NetworkPort(port) if _scheme(url) == "socket" else port
     return opened
 
@@ -127,9 +120,7 @@ def check_url(url: str) -> None:
     try:
         serial.serial_for_url(url, do_not_open=True)
     except ValueError as error:
-        raise InputError(
-            f"{url} is no port: {error}", "a device path, or a URL such as sim://"
-        ) from error
+        raise make_error(InputError, "not_a_port", port=url, text=error) from error
 
 
 def _add_handlers() -> None:

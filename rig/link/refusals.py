@@ -19,8 +19,6 @@ class DeviceRefusedError(DeviceError):
         What the reason's definition says it is.
     disarmed
         Why the device had disarmed itself before, where that is the cause.
-    why
-        The same with its code, its values and its sentence.
     """
 
     def __init__(
@@ -30,8 +28,9 @@ class DeviceRefusedError(DeviceError):
             code, values = f"refused_{reason.name.lower()}", _values(reason, detail)
         else:
             code, values = f"disarmed_{disarmed.name.lower()}", {}
-        self.why = make_reason(code, **values)
-        super().__init__(self.why.text, *remedies([self.why]))
+        why = make_reason(code, **values)
+        super().__init__(why.text, *remedies([why]))
+        self.reasons = (why,)
         self.reason = reason
         self.detail = detail
         self.disarmed = disarmed

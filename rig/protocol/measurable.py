@@ -13,10 +13,11 @@ from rig.boards import BOARDS, LONGEST_RECORD_MS
 from rig.errors import InputError, Problem
 from rig.protocol.protocol import AT_REST, SIDES
 from rig.protocol.yamltree import load, place_of
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from rig.boards import Capabilities
-    from rig.protocol.protocol import Gate, Protocol
+    from rig.protocol.protocol import Gate, Gates, Protocol
 
 LEAST_RECORD_MS = 1500
 """Long enough for the drops of most labs, and then the same for all."""
@@ -61,6 +62,19 @@ def unmeasurable(protocol: Protocol) -> list[str]:
     if protocol.initial_speed != AT_REST:
         found.append(f"initial_speed: the rig releases {protocol.vocabulary.body} from rest")
     return found
+
+
+def check_gates(protocol: Protocol) -> Gates:
+    """Return the gates of a scene.
+
+    Raises
+    ------
+    InputError
+        It has none, so nothing can be measured.
+    """
+    if protocol.gates is None or not protocol.gates.gates:
+        raise make_error(InputError, "no_gates", source=protocol.source)
+    return protocol.gates
 
 
 def check_measurable(protocol: Protocol) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
+from rig.reasons import make_error
 from rig.usb.listing import path_of, serial_number_at, serial_ports
 
 if TYPE_CHECKING:
@@ -112,8 +113,4 @@ class BoardLocator:
 
 
 def _stranger(which: str, where: str) -> DeviceError:
-    return DeviceError(
-        f"another board is at {where} ({which})",
-        "plug the board of this session in again; to go on with this one, give the same rig run "
-        "command again",
-    )
+    return make_error(DeviceError, "other_board", port=where, difference=which)

@@ -15,15 +15,15 @@ from rig.link.messages import TEST_RUN, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
-from rig.protocol.measurable import check_recordable
-from rig.reasons import make_reason, plain_reason, remedies
+from rig.protocol.measurable import check_gates, check_recordable
+from rig.reasons import error_of, make_error, make_reason, plain_reason
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.recorder.opening import known_before, open_for, shown
 from rig.recorder.published import PublishedState
-from rig.recorder.recorder import DISCARD, Recorder
+from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
 from rig.session.schema import RunState
 
@@ -101,7 +101,7 @@ class Controller:
             There is none.
         """
         if self._session is None:
-            raise SessionError("no session is open", "open one first")
+            raise make_error(SessionError, "no_session_open")
         return self._session
 
     @property
@@ -135,8 +135,7 @@ class Controller:
         """
         source, path = Path(protocol), Path(session)
         scene = reader.read(protocol)
-        if scene.gates is None:
-            raise InputError(f"{protocol} has no gates, so nothing can be measured")
+        check_gates(scene)
         fresh = completed(self.url, source, path, seed)
         self.close_session()
         made = not path.exists()
@@ -272,10 +271,7 @@ class Controller:
         if held is not None:
             if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in entries):
                 run, attempt = held
-                raise DeviceError(
-                    f"the device holds a drop (run {run}, attempt {attempt}) of another session",
-                    f"continue that session first; {DISCARD}",
-                )
+                raise make_error(DeviceError, "drop_of_another_session", run=run, attempt=attempt)
             recorder.fetch(*held)
             self._lost.pop(held, None)
         for entry in {entry.run: entry for entry in entries}.values():
@@ -338,14 +334,11 @@ class Controller:
         """
         recorder = self._connected()
         if self._protocol is None or recorder.armed or self.due:
-            raise InputError("this is not the moment to arm", "open a session; finish the drop")
+            raise make_error(InputError, "not_now", act="arm")
         last = self.session.latest_state(run)
         planned = self.published.planned(run)
         if not planned or attempt != (last.attempt if last else 0) + 1:
-            raise InputError(
-                f"run {run}, attempt {attempt} is not what comes next",
-                "read the session again: another client may have gone on with it",
-            )
+            raise make_error(InputError, "not_next", run=run, attempt=attempt)
         self.session.require_presence()
         self._unarmed = None
         return recorder.arm(run, attempt, self._protocol)
@@ -356,7 +349,7 @@ class Controller:
         if recorder is None or recorder.armed is None or recorder.lapsed is None:
             return
         refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, recorder.lapsed)
-        self.stop(refusal.why)
+        self.stop(*refusal.reasons)
         self._unarmed = refusal
 
     def fire(self, token: int) -> None:
@@ -370,7 +363,7 @@ class Controller:
         recorder = self._connected()
         armed = recorder.armed
         if armed is None:
-            raise self._unarmed or InputError("nothing is armed", "arm first")
+            raise self._unarmed or make_error(InputError, "nothing_armed")
         try:
             recorder.fire(token)
         finally:
@@ -407,9 +400,8 @@ class Controller:
         self.finish()
         drop = self.session.drop(run, attempt)
         if drop is None:
-            raise self._lost.get((run, attempt)) or DeviceError(
-                f"there is no record of run {run}, attempt {attempt}", "repeat the run"
-            )
+            missing = make_error(DeviceError, "not_recorded", run=run, attempt=attempt)
+            raise self._lost.get((run, attempt)) or missing
         return drop
 
     def test_release(self) -> dict[str, Any]:
@@ -422,9 +414,7 @@ class Controller:
         """
         recorder = self._connected()
         if self._protocol is None or recorder.armed or self.due:
-            raise InputError(
-                "this is not the moment to test the release", "open a session; finish the drop"
-            )
+            raise make_error(InputError, "not_now", act="test the release")
         self.published.set(release_test=None)
         found = release_test.drive(recorder, self._protocol, self._halted)
         self.published.set(release_test=found)
@@ -447,10 +437,8 @@ class Controller:
             or last.attempt != attempt
             or self.session.drop(run, attempt) is None
         ):
-            raise InputError(
-                f"run {run}, attempt {attempt} cannot be {state}",
-                "only the latest attempt is judged, when it is recorded",
-            )
+            which = {"run": run, "attempt": attempt, "state": state}
+            raise make_error(InputError, "cannot_judge", **which)
         if (last.state, last.reasons) != (state, reasons):
             self._connected().state(run, attempt, state, reasons)
             self.session.settle()
@@ -468,7 +456,7 @@ class Controller:
             return
         armed = recorder.armed
         why = plain_reason(reason, "stopped") if isinstance(reason, str) else reason
-        self._unarmed = StoppedError(why.text, *remedies([why]))
+        self._unarmed = error_of(StoppedError, why)
         try:
             recorder.abort()
         finally:
@@ -496,5 +484,5 @@ class Controller:
 
     def _connected(self) -> Recorder:
         if self.recorder is None:
-            raise DeviceError("there is no connection to the device", "wait until it is back")
+            raise make_error(DeviceError, "no_connection")
         return self.recorder

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
-from rig.reasons import published_reasons
+from rig.reasons import make_error, published_reasons
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -33,16 +33,12 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
     session = Session.open(path)
     clash = None
     if session.protocol_text != protocol.text:
-        clash = SessionError(
-            f"{path} was made with another protocol ({session.protocol_source})",
-            "give the same protocol file to continue it, or a new session file",
-        )
+        values = {"path": str(path), "source": session.protocol_source}
+        clash = make_error(SessionError, "other_protocol", **values)
     elif session.simulated != simulated:
-        clash = SessionError(
-            f"{path} is a {'simulated' if session.simulated else 'real'} session and {url} is "
-            f"{'a simulation' if simulated else 'a real port'}",
-            "the two are never mixed: give a new session file",
-        )
+        words = ("simulated", "a real port") if session.simulated else ("real", "a simulation")
+        values = {"path": str(path), "recorded": words[0], "port": url, "kind": words[1]}
+        clash = make_error(SessionError, "session_mixed", **values)
     if clash is not None:
         session.close()
         raise clash

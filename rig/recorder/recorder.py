@@ -17,7 +17,7 @@ from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received
 from rig.ports import told
 from rig.protocol.measurable import record_ms
-from rig.reasons import sentences
+from rig.reasons import make_error, sentences
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.records import ClockSample, Pulse
 from rig.session.schema import RunState
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 ARM_TIMEOUT_MS = 10_000
-DISCARD = "taking the power from the board discards the drop, a reset does not"
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
 _ARMED_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
 _REFERENCE_S = 10.0  # between two questions for the latest pulse of the reference
@@ -182,7 +181,7 @@ class Recorder:
             Before `connect` and after `close`.
         """
         if self._device is None or self._port is None:
-            raise DeviceError("not connected", "connect first")
+            raise make_error(DeviceError, "no_connection")
         return self._device
 
     def wait(self, seconds: float) -> None:
@@ -310,11 +309,7 @@ class Recorder:
             if known is None:
                 return self._keep(drop)
             if known.certificate != drop.certificate or known.fire_tick != drop.fire_tick:
-                raise DeviceError(
-                    f"the device holds another drop of run {run}, attempt {attempt}, than this "
-                    "session",
-                    f"continue the session it belongs to; {DISCARD}",
-                )
+                raise make_error(DeviceError, "drop_differs", run=run, attempt=attempt)
             self._acknowledge(drop)
             return None
 
@@ -356,7 +351,7 @@ class Recorder:
 
     def _go_on(self) -> None:
         if self._halted():
-            raise StoppedError("everything was switched off", "arm again when all is well")
+            raise make_error(StoppedError, "switched_off")
 
     def _keep(self, drop: Drop) -> Drop:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")

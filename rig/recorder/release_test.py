@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError
 from rig.link.messages import TEST_RUN, Phase, pack_label
+from rig.reasons import make_error
 from rig.recorder.interrupts import StoppedError
 
 if TYPE_CHECKING:
@@ -94,4 +95,4 @@ def forget(recorder: Recorder) -> None:
 
 def _insist(wanted: bool) -> None:
     if not wanted:
-        raise StoppedError("the test of the release was stopped", "the release is off")
+        raise make_error(StoppedError, "release_test_stopped")

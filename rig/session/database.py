@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 from rig.errors import SessionError
 from rig.files import require_file, sync_directory
+from rig.reasons import make_error
 from rig.session.faults import not_a_session, translated
 from rig.session.foreign import check_schema, guard
 from rig.session.lock import writer_of
@@ -50,9 +51,7 @@ def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text:
     except SessionError:
         raise
     except OSError as error:
-        raise SessionError(
-            f"cannot make {path}: {error.strerror or error}", "choose a folder you may write to"
-        ) from error
+        raise make_error(SessionError, "session_unmade", path=path, text=error) from error
     finally:
         temporary.unlink(missing_ok=True)
     sync_directory(path.parent)
@@ -67,9 +66,7 @@ def check_free(path: Path) -> None:
         If the path exists.
     """
     if path.exists():
-        raise SessionError(
-            f"{path} already exists", "choose another name, or continue that session"
-        )
+        raise make_error(SessionError, "session_there", path=path)
 
 
 def check_place(path: Path) -> None:
@@ -84,10 +81,7 @@ def check_place(path: Path) -> None:
         require_file(path)
         size = path.stat().st_size
     except OSError as error:
-        raise SessionError(
-            f"no session at {path}: {error.strerror or error}",
-            "rig run, rig import and rig daemon make one",
-        ) from error
+        raise make_error(SessionError, "session_absent", path=path, text=error) from error
     if size == 0:  # SQLite would take it for an empty database
         raise not_a_session(path, "it is empty")
 
@@ -152,10 +146,7 @@ def copy_session(path: Path, folder: Path) -> Path:
         if log.is_file() and log.stat().st_size:
             shutil.copyfile(log, folder / "copy-wal")
     except OSError as error:
-        raise SessionError(
-            f"cannot read {path}: {error.strerror or error}",
-            "check its name and permissions, and that there is room for a copy in TMPDIR",
-        ) from error
+        raise make_error(SessionError, "session_unreadable", path=path, text=error) from error
     return copy
 
 
@@ -205,9 +196,6 @@ def _format(path: Path, connection: sqlite3.Connection) -> int:
     if version < 1:
         raise not_a_session(path, "it was never finished")
     if version > SCHEMA_VERSION:
-        raise SessionError(
-            f"{path} was written by a newer rig (format {version}, this one knows up to "
-            f"{SCHEMA_VERSION})",
-            "update rig to open it",
-        )
+        formats = {"format": version, "known": SCHEMA_VERSION}
+        raise make_error(SessionError, "session_newer", path=path, **formats)
     return int(version)

@@ -13,6 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from rig.errors import SessionError
+from rig.reasons import make_error
 from rig.session.schema import CREATE, LATER
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     Shape: TypeAlias = tuple[object, ...]
 
-RECOVER = "rig recover says what is whole, and with -o NEW saves all that can be read"
 LONGEST_VALUE = 1 << 26
 """Bytes of one value; the longest that is ever written is a protocol or a burst of edges."""
 _STEPS = 1 << 20  # of SQLite's machine, between two looks at how many there were
@@ -73,7 +73,7 @@ def check_schema(path: Path, connection: sqlite3.Connection, version: int) -> No
 
 
 def _altered(path: Path, what: str) -> SessionError:
-    return SessionError(f"{path} was built or altered by another program: {what}", RECOVER)
+    return make_error(SessionError, "session_altered", path=path, text=what)
 
 
 @cache

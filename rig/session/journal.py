@@ -8,6 +8,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import SessionError
+from rig.reasons import make_error
 from rig.session.faults import as_session_error
 
 if TYPE_CHECKING:
@@ -177,7 +178,8 @@ class Journal:
         if isinstance(refusal, sqlite3.Error):
             raise as_session_error(self._path, refusal) from refusal
         if refusal is not None:
-            raise SessionError(f"{self._path} refuses this record ({refusal})") from refusal
+            failure = make_error(SessionError, "sqlite_constraint", path=self._path, text=refusal)
+            raise failure from refusal
 
     def _apply(self, statements: tuple[Statement, ...]) -> None:
         # Even one executemany can fail half-way through its rows.

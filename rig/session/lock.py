@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig.errors import SessionError
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,15 +37,8 @@ class WriterLock:
             if isinstance(error, SessionError):
                 raise
             if error.errno in {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}:
-                raise SessionError(
-                    f"cannot lock {session}: its disk knows no locks",
-                    "is it on a network? Put the session on a disk of this computer, and copy it "
-                    "when all is done",
-                ) from error
-            raise SessionError(
-                f"cannot lock {session}: {error.strerror or error}",
-                "a session needs a folder you may write to; copy it to one, or only read it",
-            ) from error
+                raise make_error(SessionError, "disk_knows_no_locks", path=session) from error
+            raise make_error(SessionError, "cannot_lock", path=session, text=error) from error
 
     def _acquire(self, session: Path) -> int:
         while True:
@@ -60,10 +54,8 @@ class WriterLock:
                 owner = os.pread(handle, 32, 0).decode("ascii", "replace").strip()
                 os.close(handle)
                 holder = f"process {owner}" if owner else "another process"
-                raise SessionError(
-                    f"{session} is being written by {holder}",
-                    "stop that one first, use its daemon, or open the session read-only",
-                ) from None
+                used = make_error(SessionError, "session_in_use", path=session, holder=holder)
+                raise used from None
             except BaseException:
                 os.close(handle)
                 raise
@@ -104,7 +96,4 @@ def _refuse_second_name(session: Path) -> None:
     """A hard link has a lock and a log of its own: two writers would destroy the file."""
     with suppress(FileNotFoundError):
         if session.stat().st_nlink > 1:
-            raise SessionError(
-                f"{session} has a second name (a hard link)",
-                "both would be written at once: copy it to a new file, and use that",
-            )
+            raise make_error(SessionError, "session_two_names", path=session)

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.boards import GATES
 from rig.errors import SessionError
+from rig.reasons import make_error
 from rig.records import ClockSample, Drop, HostBreak, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translated
-from rig.session.foreign import RECOVER, limit_steps
+from rig.session.foreign import limit_steps
 from rig.session.reason_rows import read_reasons
 from rig.session.rows import CERTIFICATE_AT, RowError, check_row, drop_of, identity
 from rig.session.schema import RunState
@@ -75,9 +76,9 @@ class Reader:
             {str(key): str(value) for key, value in self._rows("meta")}
         )
         if missing := sorted(_ALWAYS - self._meta.keys()):
-            raise SessionError(f"{path} does not say {missing[0]}", RECOVER)
+            raise self._damaged(f"it does not say {missing[0]}")
         if self._meta["simulated"] not in {"true", "false"}:
-            raise SessionError(f"{path} does not say whether it is simulated", RECOVER)
+            raise self._damaged("it does not say whether it is simulated")
 
     @property
     def readonly(self) -> bool:
@@ -122,7 +123,7 @@ class Reader:
         """The protocol file word for word."""
         text = str(self._protocol()[2])
         if hashlib.sha256(text.encode()).hexdigest() != self._meta["protocol_sha256"]:
-            raise SessionError(f"{self.path}: its protocol was altered", RECOVER)
+            raise self._damaged("its protocol was altered")
         return text
 
     @property
@@ -215,14 +216,12 @@ class Reader:
         self.states()
         for drop in self.drops():  # and the bytes
             if drop.damage:
-                raise SessionError(
-                    f"{self.path}: run {drop.run}, attempt {drop.attempt}: {drop.damage}", RECOVER
-                )
+                raise self._damaged(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")
         _ = self.protocol_text, self.protocol_source
 
     def _opened(self) -> sqlite3.Connection:
         if self._connection is None:
-            raise SessionError(f"{self.path} is closed", "open it again")
+            raise make_error(SessionError, "session_closed", path=self.path)
         return self._connection
 
     def _raw(self, table: str, which: str, *values: object) -> Iterator[tuple[Any, ...]]:
@@ -253,7 +252,7 @@ class Reader:
             try:
                 check_row(table, row)
             except RowError as error:
-                raise SessionError(f"{self.path}: {error}", RECOVER) from error
+                raise self._damaged(str(error)) from error
             yield row
 
     def _newer(self, table: str) -> Iterator[tuple[Any, ...]]:
@@ -264,14 +263,14 @@ class Reader:
     def _protocol(self) -> tuple[Any, ...]:
         row = next(self._rows("protocol"), None)
         if row is None:
-            raise SessionError(f"{self.path} has lost its protocol", RECOVER)
+            raise self._damaged("it has lost its protocol")
         return row
 
     def _drop(self, row: tuple[Any, ...], replayed: Mapping[Job, Drop]) -> Drop:
         try:
             check_row("drop", row[:3])
         except RowError as error:  # nobody knows which drop it is
-            raise SessionError(f"{self.path}: {error}", RECOVER) from error
+            raise self._damaged(str(error)) from error
         try:
             check_row("drop", row)
             edges = self._edges(row)
@@ -286,6 +285,9 @@ class Reader:
         # Of its numbers none can be trusted.
         run, attempt = row[1:3]
         return Drop(run, attempt, tick_hz=1, edges=(), damage=why)
+
+    def _damaged(self, text: str) -> SessionError:
+        return make_error(SessionError, "session_wrong", path=self.path, text=text)
 
     def _edges(self, row: tuple[Any, ...]) -> list[tuple[Any, ...]]:
         number, events = row[0], row[CERTIFICATE_AT]

@@ -19,6 +19,7 @@ from rig import __version__
 from rig.errors import InputError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
+from rig.reasons import make_error
 from rig.session.database import build, check_free, check_place, connect
 from rig.session.faults import translated
 from rig.session.journal import Journal, Statement
@@ -209,19 +210,12 @@ class Session(Reader):
                 place = _unused(make_folder(state_folder()) / self.path.name)
                 lost = self._journal.save(place)
         except (sqlite3.Error, OSError, InputError) as error:
-            return SessionError(
-                f"{trouble} while it was in use, and could not be saved anywhere: {error}",
-                "what was not committed is lost; a drop that fell is still on the board: make "
-                "room, and give the same command with a new session file",
-            )
+            return make_error(SessionError, "session_unsaved", trouble=trouble, text=error)
         self.rescued = True
         log.error("%s while it was in use; everything is saved as %s", trouble, place)
-        return SessionError(
-            f"{trouble} while it was in use; everything that was recorded is saved as {place}"
-            + (f", but for {lost} records" if lost else ""),
-            "give that name to the same command, and it goes on; look for what moves or deletes "
-            "sessions (a sync or backup program?)",
-        )
+        except_for = f", but for {lost} records" if lost else ""
+        values = {"trouble": trouble, "place": place, "except_for": except_for}
+        return make_error(SessionError, "session_rescued", **values)
 
     def close(self) -> None:
         """Commit and close; further calls do nothing.
@@ -362,7 +356,7 @@ class Session(Reader):
         if self._gone is not None:
             raise self._gone
         if self.readonly:
-            raise SessionError(f"{self.path} is open read-only", "open it for writing")
+            raise make_error(SessionError, "session_read_only", path=self.path)
         return self._journal
 
     def _add(self, sql: str, *rows: Sequence[object]) -> None:

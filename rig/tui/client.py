@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
+from rig.reasons import make_error
 from rig.tui.state import DaemonState, typed
 
 if TYPE_CHECKING:
@@ -210,10 +211,7 @@ class ReconnectingClient:
         await client.subscribe()
         self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
-            raise DeviceError(
-                f"the daemon has {self._port}, not {self.url}",
-                "leave out --port to watch that port, or give --socket for a second daemon",
-            )
+            raise make_error(DeviceError, "daemon_port", port=self._port, wanted=self.url)
 
     def _start(self, error: DeviceError) -> None:
         """Start a daemon that outlives this screen, as long as it has something to do."""

@@ -229,7 +229,7 @@ def test_what_is_missing_is_named(bring, tmp_path):
 
 def test_a_protocol_without_gates_has_no_edges(bring, tmp_path):
     line, _ = refused(bring(protocol=PROTOCOLS / "bead-chain.yaml"), tmp_path)
-    assert line.endswith("bead-chain.yaml: the scene has no gates")
+    assert line.endswith("bead-chain.yaml has no gates, so nothing can be measured")
 
 
 @pytest.mark.parametrize("u", ["nan", "-1 ppm", "50", "3 mm", ""])

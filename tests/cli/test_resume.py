@@ -402,7 +402,7 @@ def test_a_port_where_nobody_answers_is_closed_again(new, monkeypatch):
         with pytest.raises(DeviceError):
             station.connect()
         assert [port.is_open for port in opened] == [False]
-        with pytest.raises(DeviceError, match="not connected"):
+        with pytest.raises(DeviceError, match="no connection to the device"):
             station.device  # noqa: B018
 
 

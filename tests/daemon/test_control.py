@@ -82,7 +82,7 @@ def test_what_comes_next_is_the_daemons_to_know(processes, armed):
         one.arm(1, 2)
     one.stop("tried")
     for run, attempt in ((1, 1), (1, 3), (9, 1)):
-        with pytest.raises(InputError, match="not what comes next"):
+        with pytest.raises(InputError, match="does not come next"):
             one.arm(run, attempt)
     with pytest.raises(InputError, match="cannot be accepted"):
         one.log_state(1, 1, RunState.ACCEPTED)

@@ -118,7 +118,7 @@ def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch)
 
     async def test(server, path, _):
         clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
-        with pytest.raises(rpc.BusyError, match="only stop is done"):
+        with pytest.raises(rpc.BusyError, match="any further client may only stop"):
             await clients[2].call("subscribe")
         assert await clients[2].call("stop") == {}
         with pytest.raises(rpc.BusyError, match="2 clients are connected"):

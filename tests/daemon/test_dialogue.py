@@ -31,14 +31,14 @@ def test_any_cut_gives_the_same_messages(messages, data):
 
 @pytest.mark.parametrize("line", [b"HTTP/1.1 400 Bad Request\n", b"\xff\xfe\n", b"[1]\n", b"\n"])
 def test_who_is_no_daemon_is_told_so(line):
-    with pytest.raises(DeviceError, match="no daemon of this rig"):
+    with pytest.raises(DeviceError, match="not a daemon of this rig"):
         ClientProtocol().feed(line)
 
 
 def test_a_line_without_an_end_is_no_daemons():
     dialogue = ClientProtocol()
     assert dialogue.feed(b"x" * rpc.MESSAGE_LIMIT) == []
-    with pytest.raises(DeviceError, match="no daemon of this rig"):
+    with pytest.raises(DeviceError, match="not a daemon of this rig"):
         dialogue.feed(b"x")
 
 

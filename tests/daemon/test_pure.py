@@ -28,6 +28,7 @@ from rig.errors import (
 from rig.files import identity_of
 from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
+from rig.reasons import make_error
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import EDGES_LIMIT, PublishedState
@@ -41,7 +42,8 @@ ERRORS = [
     DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b101),
     DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
     ControlError("taken"),
-    StoppedError("stopped"),
+    make_error(StoppedError, "stopped", text="stopped by Ada"),
+    make_error(ControlError, "control_lost", silence_s=3.25, holder="Ada"),
     rpc.VersionError("old"),
 ]
 
@@ -54,14 +56,14 @@ def test_an_error_comes_out_as_it_went_in(error):
     assert type(again.value) is type(error)
     assert str(again.value) == str(error)
     assert again.value.exit_code == error.exit_code
-    for name in ("reason", "detail", "disarmed", "why"):
+    for name in ("reason", "detail", "disarmed", "reasons"):
         assert getattr(again.value, name, None) == getattr(error, name, None)
 
 
 def test_a_refusal_has_its_code_and_values_as_results_have_them():
     data = rpc.error_to_data(DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b1010))
-    values = {"channels": [1, 3]}
-    assert data["reason_codes"] == [{"code": "refused_gate_blocked", "values": values}]
+    (reason,) = data["reason_codes"]
+    assert (reason["code"], reason["values"]) == ("refused_gate_blocked", {"channels": [1, 3]})
     assert data["message"] == "gates 1, 3 are blocked"
     assert rpc.error_to_data(InputError("no"))["reason_codes"] == []
 

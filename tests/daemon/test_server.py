@@ -93,7 +93,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
     tmp_path.chmod(0o700)
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
-    with pytest.raises(InputError, match="belongs to somebody else"):
+    with pytest.raises(InputError, match="belongs to another user"):
         prepare_folder(tmp_path)
 
 

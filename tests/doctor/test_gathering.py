@@ -98,7 +98,7 @@ def test_a_session(tmp_path):
         connection.execute("DELETE FROM meta WHERE key = 'simulated'")
     facts = look_at_session(str(path))
     assert not facts.whole
-    assert facts.first_trouble.endswith("s.session does not say simulated")
+    assert facts.first_trouble.endswith("s.session: it does not say simulated")
 
 
 # -- a board

@@ -71,5 +71,5 @@ def test_check_draws_it(tmp_path):
 def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):
     bead = str(PROTOCOLS / "bead-chain.yaml")
     assert main(["check", bead, "-o", str(tmp_path / "m.svg")]) == 2
-    assert "the scene has no gates to draw" in capsys.readouterr().err
+    assert "has no gates, so nothing can be measured" in capsys.readouterr().err
     assert not (tmp_path / "m.svg").exists()

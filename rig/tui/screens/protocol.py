@@ -13,7 +13,7 @@ from rig.errors import InputError
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.measurable import check_recordable
+from rig.protocol.measurable import check_gates, check_recordable
 from rig.tui.screens.page import Page
 from rig.tui.widgets.text import Words, plain
 
@@ -145,12 +145,8 @@ class ProtocolPage(Page):
         self._read, self._protocol, self._problem = stamp, None, ""
         try:
             self._protocol = reader.read(file)
-            if self._protocol.gates is None:
-                self._problem = (
-                    "This scene has no gates: nothing can be measured. Add gates to the protocol."
-                )
-            else:
-                check_recordable(self._protocol)
+            check_gates(self._protocol)
+            check_recordable(self._protocol)
         except InputError as error:
             lines = [plain(problem, 300) for problem in error.problems]
             self._problem = "\n".join(lines or [plain(error.message), plain(error.hint)])
