@@ -6,6 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.command_help import runnable
 from rig.commands.output import print_json, say
 from rig.doctor import checks
 from rig.doctor.gathering import (
@@ -42,7 +43,7 @@ def main(arguments: Namespace) -> int:
     for finding in _findings(arguments.port, arguments.session):
         findings.append(finding)
         if not arguments.json:
-            print(finding, flush=True)
+            print(runnable(str(finding)), flush=True)
     if arguments.json:
         print_json({"findings": [finding.json() for finding in findings]})
     troubles = sum(bool(finding.advice) for finding in findings)

@@ -38,7 +38,9 @@ class WriterLock:
                 raise
             if error.errno in {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}:
                 raise make_error(SessionError, "disk_knows_no_locks", path=session) from error
-            raise make_error(SessionError, "cannot_lock", path=session, text=error) from error
+            # The lock is the first file that a session makes: without its folder there is neither.
+            code = "session_unmade" if isinstance(error, FileNotFoundError) else "cannot_lock"
+            raise make_error(SessionError, code, path=session, text=error) from error
 
     def _acquire(self, session: Path) -> int:
         while True:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
+from rig.command_help import runnable
 from rig.doctor.checks import other_packages
 from rig.doctor.facts import Owner
 from rig.doctor.gathering import (
@@ -254,6 +255,7 @@ def test_without_a_port_nothing_is_opened_and_a_damaged_session_is_said(doctor, 
     code, out, _ = doctor("--session", tmp_path / "s")
     assert code == 4
     assert "not a session: there is nothing of a session in it\n  do: " in out
+    assert runnable("rig run") in out  # as this user can type it
     assert doctor()[0] == 0
     assert doctor("--session", tmp_path / "none")[0] == 4
 

@@ -84,6 +84,12 @@ def kill(process: subprocess.Popen[str]) -> None:
         process.wait(30)
 
 
+def test_a_session_needs_a_folder_that_is_there(tmp_path):
+    with pytest.raises(SessionError, match=r"cannot make .*No such file or directory") as refusal:
+        Session.create(tmp_path / "no" / "s", "x", "x.yaml", simulated=True, origin="x")
+    assert [reason.code for reason in refusal.value.reasons] == ["session_unmade"]
+
+
 def test_everything_comes_back_as_it_went_in(path: Path) -> None:
     with make(path) as session:
         fill(session)
