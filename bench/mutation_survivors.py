@@ -20,11 +20,6 @@ _WHY: dict[tuple[str, str, str], str] = {
         "<=",
     ): "one tick in a mark that only says that a stamp may be late",
     (
-        "rig/analysis/align.py",
-        "costs < MISSED + EXTRA",
-        "(costs >= MISSED + EXTRA)",
-    ): "a short cut of a matching that is made in another way since",
-    (
         "rig/analysis/faults.py",
         "0.015",
         "0.03",
@@ -40,12 +35,6 @@ _WHY: dict[tuple[str, str, str], str] = {
         "top + speed**2 / (2.0 * fall)",
         "(top - speed ** 2 / (2.0 * fall))",
     ): "the same: height is linear in the equations, so a step takes it there from anywhere",
-    (
-        "rig/analysis/identify.py",
-        "0.97",
-        "1.94",
-    ): "more is tried, and the best of it is the same: slower only",
-    ("rig/analysis/pattern.py", "8", "9"): "how many falls are asked about together: speed only",
     ("rig/link/port.py", "0", "1"): "the same: the call that follows overwrites it",
     (
         "rig/model/fall.py",

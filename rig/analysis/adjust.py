@@ -115,7 +115,7 @@ def adjust(
     Parameters
     ----------
     matches
-        For each side what `rig.analysis.align.align` found.
+        For each side what `rig.analysis.annealing.Pairing.matched` returned.
     x
         Where to begin.
     centre

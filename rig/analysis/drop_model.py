@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.align import Pairing
+from rig.analysis.annealing import Pairing
 from rig.analysis.components import Components, stated
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
@@ -31,17 +31,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.analysis.annealing import Guess
     from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.pattern import Guess
     from rig.analysis.trajectory import Trajectory
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
-
-_ALIKE = 0.05
-"""Scatter of impulses, relative to α, with which an adjustment begins: more may lead it astray."""
 
 
 class DropModel:
@@ -87,7 +84,9 @@ class DropModel:
             for role, record in self.records.items()
         }
         self.pairings: dict[str, Pairing] = {
-            role: made[role].pairings[role] if role in made else Pairing.of(record.trains)
+            role: made[role].pairings[role]
+            if role in made
+            else Pairing.of(record.trains, record.chain.widths)
             for role, record in self.records.items()
         }
         self.discrepancy: Discrepancy  # where a chain strikes
@@ -102,17 +101,6 @@ class DropModel:
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
         self._levels: dict[str, tuple[bytes, Array]] = {}
         self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
-
-    def stiff(self) -> DropModel:
-        """Return the same drop with impulses that are nearly alike, the last one too."""
-        if "impact" not in self.records:
-            return self
-        other = copy(self)
-        impulse = min(_ALIKE, self.components.impulse)
-        none = dict.fromkeys(("bounce", "landed", "stretch"), 0.0)
-        other.components = replace(self.components, impulse=impulse, **none)
-        other.unknowns = Unknowns(other)  # other priors, and the same paths
-        return other
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
         """Return the same drop with other priors, that of impulses relative to the α found.

@@ -8,12 +8,13 @@ unexplained.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rig.analysis.align import EXTRA, MISSED, split
+from rig.analysis.annealing import MISSED, STRAYS, split
 from rig.analysis.chain_records import QUICK
 from rig.analysis.later_passages import later_passages
 
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
 EdgeClass = Literal[
     "missed", "merged", "dead gate", "chatter", "string", "bounce", "later passage", "extra"
 ]
+ABSENT = -math.log(MISSED)
+"""Cost of an expected edge that did not come: −ln of how probable that is beforehand."""
+SURPLUS = -math.log(STRAYS * QUICK)
+"""Cost of an edge that belongs to no rod: the same of one within the time of a flicker."""
 UNEXPLAINED: EdgeClass = "extra"
 """The class of what nothing explains; ``accept`` of a protocol limits it."""
 
@@ -60,7 +65,7 @@ class UnmatchedEdge:
     edge
         Its number in the drop; `None` for what did not come.
     cost
-        What it cost the matching, in units of ½ (residual/scale)², see `rig.analysis.align`.
+        What it costs the likelihood: `ABSENT` or `SURPLUS`.
     """
 
     kind: EdgeClass
@@ -121,7 +126,7 @@ def _absent(
     for at in np.flatnonzero(match < 0).tolist():
         blocks, when = bool(train.blocks[at]), float(expected[at])
         yield UnmatchedEdge(
-            _why(train, when), channel, when, blocks, int(train.rods[at]), None, MISSED
+            _why(train, when), channel, when, blocks, int(train.rods[at]), None, ABSENT
         )
 
 
@@ -158,4 +163,4 @@ def _surplus(
         elif when > hit:
             kind = "bounce"
         rod = int(near[0]) if near.size else None
-        yield UnmatchedEdge(kind, channel, when, blocked, rod, int(train.edge[at]), EXTRA)
+        yield UnmatchedEdge(kind, channel, when, blocked, rod, int(train.edge[at]), SURPLUS)

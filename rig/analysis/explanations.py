@@ -15,23 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel, prior_air
 from rig.analysis.fit import settle
-from rig.analysis.identify import (
-    MISSED,
-    around_order,
-    held_back,
-    possible,
-    read_quickly,
-    read_side,
-    weighed,
-    well_read,
-)
-from rig.analysis.pattern import guesses
+from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weighed, well_read
 from rig.analysis.score_test import scores
 from rig.reasons import make_reason
-from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -140,7 +130,7 @@ class Explainer:
             if any(possible(one) < _SOME * one.expected for one in records):
                 return []  # too few edges came for any fall
             sides = [
-                read_side(self.setting.protocol, one, self.clock_u, self.components)
+                read_quickly(self.setting.protocol, [one], self.clock_u, self.components)
                 for one in records
             ]
             stated = sum(_freely(one) for one in sides if one is not None)
@@ -202,18 +192,9 @@ class Explainer:
         for record in records:
             key = expected, *_key(setting, record)
             if key not in self._votes:
-                drop, gravity = setting.protocol.drop, setting.protocol.gravity.value
-                tried = guesses(
-                    record,
-                    Quantity(drop.value),
-                    gravity,
-                    prior_air(setting.protocol)[0],
-                    alphas=(record.alpha - _NEAR, record.alpha + _NEAR),
-                    window=around_order(setting.protocol, record),
-                    # What one side lacks, the other cannot make up for.
-                    least=record.expected - (1.0 - _VOTED) * expected,
+                self._votes[key] = most_votes(
+                    setting.protocol, record, self.clock_u, self.components
                 )
-                self._votes[key] = next((one.votes for one in tried), 0)
             votes += self._votes[key]
         return votes / max(1, expected), 2 * votes - expected
 

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.adjust import STEPS, Estimate, adjust
+from rig.analysis.adjust import Estimate, adjust
 from rig.analysis.equations import STRAY
-from rig.analysis.pattern import middle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from rig.analysis.annealing import Guess
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.pattern import Guess
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -26,11 +25,7 @@ if TYPE_CHECKING:
 CLOSE = 0.05
 """Of a standard uncertainty: after a step so short a drop's readings are weighed, for that is near
 enough by its square."""
-ROUGHLY = 1.0
-"""And those of a side, which are adjusted once more with the other: the next step is a thousandth
-of this one."""
-_COARSE = 2.5e-3  # m: how far off a first guess may put a rod
-_FINE = 0.5e-3  # m: how far off an adjusted trajectory may
+_FINE = 0.8e-3  # m: how far off an adjusted trajectory may, one standard deviation
 _NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
 _SAME = 0.1  # of a standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
@@ -79,52 +74,29 @@ class Fit(Matched):
         return self.estimate.x
 
 
-def settle(
-    model: DropModel,
-    matches: Matches | None = None,
-    rounds: int = _ROUNDS,
-    steps: int = STEPS,
-    x: Array | None = None,
-    done: float = CLOSE,
-) -> Fit:
+def settle(model: DropModel, matches: Matches | None = None, x: Array | None = None) -> Fit:
     """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
-
-    It begins with impulses that are nearly alike, and bends only to what fits already: one of the
-    few edges of the last leg may be a stray.
 
     Parameters
     ----------
     matches
         To begin with; `None` where nothing is matched yet.
-    rounds, steps
-        How often at most, and how many steps each adjustment may take.
     x
-        Unknowns to begin with, if not as the guesses have them; with `matches` too, they bend
-        already to what they should.
-    done
-        Of a standard uncertainty: how short the last step is.
+        Unknowns to begin with, if not as the guesses have them.
     """
-    begun = x is not None and matches is not None
     x = model.first() if x is None else x
-    stiff = model if begun else model.stiff()
-    if matches is None:
-        matches = match(model, x, _COARSE)
+    matches = match(model, x) if matches is None else matches
     # Not to the end where the matches are about to change.
-    estimate = adjust(
-        stiff, matches, x, done=done if begun else _NEAR, steps=steps, rough=not begun
-    )
-    last = model if begun else None
-    for round_ in range(rounds):
+    estimate = adjust(model, matches, x, done=_NEAR, rough=True)
+    for round_ in range(_ROUNDS):
         x, before = estimate.x, matches
         matches = without_strays(model, x, match(model, x), estimate.scatter)
-        now = model if round_ else stiff
         if _alike(matches, before):
             matches = before  # what was made for these is at hand
-            if now is last:
+            if round_:
                 break
-        estimate = adjust(now, matches, x, done=done, steps=steps, rough=now is not model)
-        last = now
-        if now is model and estimate.beyond(x) < max(_SAME, done):
+        estimate = adjust(model, matches, x, done=CLOSE)
+        if estimate.beyond(x) < _SAME:
             break
     return Fit(model, matches, estimate)
 
@@ -161,11 +133,6 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
     return Fit(model, begun.matches, estimate.kept())
 
 
-def first_match(model: DropModel) -> Matches:
-    """Match all edges to rods where the first guess has the chains."""
-    return match(model, model.first(), _COARSE)
-
-
 def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
     """Match all edges to rods, given where the chains are.
 
@@ -174,11 +141,12 @@ def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
     width
         How far off an edge may be, m.
     """
-    clock = float(x[model.unknowns["clock"]][0])
-    return {
-        role: pairing.matched(model.all_levels(role, x), model.trajectory(role, x), width, clock)
-        for role, pairing in model.pairings.items()
-    }
+    clock = 1.0 + float(x[model.unknowns["clock"]][0])
+    found: Matches = {}
+    for role, pairing in model.pairings.items():
+        heights, speeds = model.trajectory(role, x).heights(pairing.times * clock)
+        found[role] = pairing.matched(model.all_levels(role, x), heights, speeds, width)
+    return found
 
 
 def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float = 1.0) -> Matches:
@@ -198,7 +166,7 @@ def _kept(
     rows = model.residuals(role, x, matches)
     far = np.abs(rows.values) / rows.sigma
     # A few strays enlarge the scatter, and would hide behind it: most edges tell how much it is.
-    usual = max(1.0, _MOST * middle(far) / _MEDIAN) if far.size else 1.0
+    usual = max(1.0, _MOST * float(np.sort(far)[far.size // 2]) / _MEDIAN) if far.size else 1.0
     limit = STRAY * min(scatter, usual)
     stray = far > limit
     # Of a rod's two sides that do not go together one is wrong, or both: the one that is further

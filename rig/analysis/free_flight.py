@@ -1,7 +1,8 @@
 """One leg of a fall: uniform acceleration, or that of g − κv² in air, and its derivatives.
 
 The same formulas as in `rig.model.drag`, for arrays, and for κ below zero too: an adjustment tries
-what no air does. Where an array takes κ, it may differ by element, its sign never.
+what no air does. Where an array takes κ, it may differ by element, its sign never; with such an
+array g may differ too.
 """
 
 from __future__ import annotations
@@ -36,16 +37,16 @@ def _largest(kappa: float | Array) -> float:
     return high if high > -low else low
 
 
-def _rate(kappa: float | Array, gravity: float) -> float | Array:
+def _rate(kappa: float | Array, gravity: float | Array) -> float | Array:
     """√(|κ|g); of one κ a plain number, with which arrays are multiplied quicker."""
-    if isinstance(kappa, float):
+    if isinstance(kappa, float) and isinstance(gravity, float):
         return math.sqrt(abs(kappa) * gravity) if gravity > 0.0 else math.nan
     found: Array = np.sqrt(np.abs(kappa) * gravity)
     return found
 
 
 def fall_for(
-    since: Array, speed: Array, gravity: float, kappa: float | Array
+    since: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array]:
     """Way fallen and speed, a time after the beginning of a leg."""
     way, end, _ = _fall(since, speed, gravity, kappa)
@@ -53,7 +54,7 @@ def fall_for(
 
 
 def _fall(
-    since: Array, speed: Array, gravity: float, kappa: float | Array
+    since: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array, Array]:
     """Way, speed at its end, and the derivative of the way by the speed v at its beginning.
 
@@ -77,7 +78,7 @@ def _fall(
 
 
 def fall_through(
-    distance: Array, speed: Array, gravity: float, kappa: float | Array
+    distance: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array]:
     """Speed at the end of a leg and how long it takes, as in `rig.model.drag.drag_leg`."""
     reach = reach_of(distance, kappa)
@@ -87,7 +88,7 @@ def fall_through(
 
 
 def lasting(
-    reach: Array, speed: Array, arrival: Array, gravity: float, kappa: float | Array
+    reach: Array, speed: Array, arrival: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
     """How long a leg takes, by its `reach_of` and the speeds at both ends."""
     tiny = np.finfo(float).tiny
@@ -100,12 +101,14 @@ def lasting(
     return np.asarray(curve / rate)
 
 
-def squared_after(distance: Array, speed: Array, gravity: float, kappa: float | Array) -> Array:
+def squared_after(
+    distance: Array, speed: Array, gravity: float | Array, kappa: float | Array
+) -> Array:
     """Square of the speed at the end of a leg; before its beginning it may be negative."""
     return _squared(reach_of(distance, kappa), speed, gravity, kappa)
 
 
-def _squared(reach: Array, speed: Array, gravity: float, kappa: float | Array) -> Array:
+def _squared(reach: Array, speed: Array, gravity: float | Array, kappa: float | Array) -> Array:
     found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
     return found
 
@@ -119,7 +122,7 @@ def reach_of(distance: Array, kappa: float | Array) -> Array:
 
 
 def leg_slopes(
-    since: Array, speed: Array, gravity: float, kappa: float | Array
+    since: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Way z fallen and speed, a time after the beginning of a leg, and derivatives of z.
 
@@ -135,7 +138,7 @@ def leg_slopes(
     return way, end, by_speed, by_gravity, by_kappa
 
 
-def _slowed(since: Array, speed: Array, gravity: float) -> Array:
+def _slowed(since: Array, speed: Array, gravity: float | Array) -> Array:
     """∫∫v² of a ballistic leg, m²."""
     half = 0.5 * speed * speed + (speed * gravity / 3.0 + gravity**2 * since / 12.0) * since
     found: Array = half * since * since

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel, prior_air
-from rig.analysis.pattern import Guess
 from rig.analysis.quantities import measurands
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.analysis.unknowns import SharedUnknowns

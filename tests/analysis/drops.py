@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import Components
 from rig.analysis.drop import fit_drop
 from rig.analysis.drop_model import DropModel
+from rig.analysis.fit import match
 from rig.analysis.identify import Identification, adjusted, identify
-from rig.analysis.pattern import Guess
 from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
@@ -99,12 +100,7 @@ class Case:
         """The observation equations of this drop, and the matches that the first guess gives."""
         model = DropModel(self.protocol, self.records, self.guesses(), self.scale.u)
         x = model.first()
-        matches = {
-            side.role: model.pairings[side.role].matched(
-                model.all_levels(side.role, x), model.trajectory(side.role, x), 2.5e-3
-            )
-            for side in self.records
-        }
+        matches = match(model, x)
         return model, matches
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from rig.analysis.align import EXTRA, MISSED
+from rig.analysis.edge_classes import ABSENT, SURPLUS
 from rig.analysis.result import DropResult
 from sim.dials import Dials
 from tests.analysis.drops import STRAY, UNIFORM, Case, case, with_dials
@@ -26,8 +26,8 @@ def consistent(result: DropResult) -> None:
     absent = [edge for edge in result.unmatched if edge.edge is None]
     surplus = [edge for edge in result.unmatched if edge.edge is not None]
     assert (len(absent), len(surplus)) == (result.audit.missed, result.audit.spurious)
-    assert {edge.cost for edge in absent} <= {MISSED}
-    assert {edge.cost for edge in surplus} <= {EXTRA}
+    assert {edge.cost for edge in absent} <= {ABSENT}
+    assert {edge.cost for edge in surplus} <= {SURPLUS}
     assert not {edge.edge for edge in surplus} & result.matches.keys()
     times = [edge.time_s for edge in result.unmatched]
     assert times == sorted(times)

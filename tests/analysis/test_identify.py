@@ -11,10 +11,8 @@ import pytest
 from scipy.special import log_ndtr
 
 from rig.analysis import identify
+from rig.analysis.annealing import MISSED, STRAYS
 from rig.analysis.deciding import deciding_gate
-from rig.analysis.fit import CLOSE, settle
-from rig.analysis.identify import MISSED, STRAYS
-from rig.analysis.pattern import Guess
 from rig.analysis.verdict import LEAD, pattern_faults
 from rig.errors import InputError
 from rig.protocol import reader
@@ -322,29 +320,7 @@ def test_any_layout_is_read(written, dials):
             assert result.verdict != "void", (protocol.title, result.reasons)
 
 
-# What it takes ------------------------------------------------------------------------------------
-
-
-def test_no_fall_is_adjusted_twice_and_both_sides_begin_where_each_ended(monkeypatch):
-    """Of the chain that strikes two guesses of one α and two of another are the same fall."""
-    settled = []
-
-    def remember(model, matches=None, **rest):
-        fit = settle(model, matches, **rest)
-        settled.append((model.records.keys(), rest.get("x"), fit))
-        return fit
-
-    monkeypatch.setattr(identify, "settle", remember)
-    assert case(UNIFORM, seed=6, incline=40.0).identify().fit is not None
-    assert [*map(len, (roles for roles, *_ in settled))] == [1, 1, 1, 2]
-    _, begun, both = settled[-1]
-    assert both.estimate.beyond(begun) < CLOSE
-
-
 def test_releases_are_as_likely_apart_as_a_cauchy_of_the_accepted_skew_says():
     skew = UNIFORM.accept.release_skew
-    apart = [
-        identify._simultaneous(UNIFORM, [Guess(0.1, 0.2, 0.0), Guess(0.1 + times * skew, 0.2, 0.0)])
-        for times in (0, 1, 3)
-    ]
+    apart = [identify._simultaneous(UNIFORM, [0.1, 0.1 + times * skew]) for times in (0, 1, 3)]
     assert apart == pytest.approx([0.0, -math.log(2.0), -math.log(10.0)])

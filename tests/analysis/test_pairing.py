@@ -1,16 +1,16 @@
-"""Matching edges to rods: optimal by brute force, and right on edges whose rods are known."""
+"""Matching edges to rods: by weights of all rods, and right on edges whose rods are known."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.analysis.align import EXTRA, MISSED, Pairing
+from rig.analysis.annealing import MISSED, STRAYS, Pairing
 from rig.analysis.chain_records import ChainRecord, EdgeTrain
 from rig.analysis.trajectory import free_trajectory
 from sim.dials import Dials
@@ -18,10 +18,12 @@ from tests.analysis.drops import UNIFORM, case
 from tests.examples import examples
 
 
-def align(trains, levels, trajectory, scale, clock=0.0):
+def align(trains, levels, trajectory, scale, clock=0.0, widths=()):
     """Match all trains of a side at once."""
     every = np.concatenate([*levels, np.zeros(0)])
-    return Pairing.of(trains).matched(every, trajectory, scale, clock)
+    pairing = Pairing.of(trains, widths)
+    heights, speeds = trajectory.heights(pairing.times * (1.0 + clock))
+    return pairing.matched(every, heights, speeds, scale)
 
 
 GRAVITY = 9.81
@@ -31,9 +33,10 @@ SCALE = 1e-3
 
 # An edge: where the chain is when it comes, in units of SCALE, and its polarity.
 edges = st.lists(st.tuples(st.floats(-12, 12), st.booleans()), max_size=4)
-gates = st.lists(
-    st.tuples(edges, st.lists(st.tuples(st.floats(-12, 12), st.booleans()), max_size=5)), max_size=3
-)
+# Rods of one polarity are further apart than an edge may be off.
+places = st.integers(-3, 3).map(lambda n: 4.0 * n)
+rods = st.lists(st.tuples(places, st.booleans()), max_size=5, unique=True)
+gates = st.lists(st.tuples(edges, rods), max_size=3)
 
 
 def at(height: float) -> float:
@@ -56,46 +59,46 @@ def build(number: int, observed, expected) -> tuple[EdgeTrain, list, list]:
     return train, observed, expected
 
 
-def cost(match, observed, expected) -> float:
-    """What a matching costs; it must be one to one, in order, and of like polarity."""
-    taken = [(int(n), k) for k, n in enumerate(match) if n >= 0]
-    assert [n for n, _ in taken] == sorted({n for n, _ in taken})
-    assert all(observed[n][1] == expected[k][1] for n, k in taken)
-    pairs = sum(0.5 * (observed[n][0] - expected[k][0]) ** 2 for n, k in taken)
-    left = len(observed) - len(taken), len(expected) - len(taken)
-    return pairs + EXTRA * left[0] + MISSED * left[1]
-
-
-def cheapest(observed, expected) -> float:
-    """Try everything."""
-
-    @cache
-    def rest(n: int, k: int) -> float:
-        if n == len(observed):
-            return MISSED * (len(expected) - k)
-        if k == len(expected):
-            return EXTRA * (len(observed) - n)
-        ways = [EXTRA + rest(n + 1, k), MISSED + rest(n, k + 1)]
-        if observed[n][1] == expected[k][1]:
-            ways.append(0.5 * (observed[n][0] - expected[k][0]) ** 2 + rest(n + 1, k + 1))
-        return min(ways)
-
-    return rest(0, 0)
+def weight(off: float, others: list[float], speed: float) -> float:
+    """How probably an edge is the side that it misses by `off`, of all it might be; in SCALE."""
+    density = [
+        (1.0 - MISSED) * math.exp(-0.5 * far**2) / (SCALE * math.sqrt(2.0 * math.pi))
+        for far in (off, *others)
+    ]
+    return density[0] / (STRAYS / speed + sum(density))
 
 
 @examples(300)
 @given(gates)
-def test_no_matching_is_cheaper(drawn):
+def test_each_edge_is_the_rod_that_it_probably_is(drawn):
+    """One to one, of like polarity; none is taken that is improbable, none left that is not."""
     built = [build(number, *one) for number, one in enumerate(drawn)]
     trains = [train for train, _, _ in built]
     found = align(trains, [train.levels for train in trains], PATH, SCALE)
     assert len(found) == len(built)
     for match, (_, observed, expected) in zip(found, built, strict=True):
         assert match.shape == (len(expected),)
-        # Equal within 1e-9 a step counts as equal, and heights come out of times rounded.
-        assert cost(match, observed, expected) == pytest.approx(
-            cheapest(tuple(observed), tuple(expected)), abs=3e-8
-        )
+        taken = match[match >= 0].tolist()
+        assert len(taken) == len({*taken})
+        wanted: dict[int, int] = {}
+        for n, (height, blocked) in enumerate(observed):
+            speed = math.sqrt(2.0 * GRAVITY * (START - SCALE * height))
+            offs = [
+                (abs(height - level), k)
+                for k, (level, blocks) in enumerate(expected)
+                if blocks == blocked
+            ]
+            for k in np.flatnonzero(match == n).tolist():
+                assert expected[k][1] == blocked
+                others = [off for off, other in offs if other != k]
+                mine = abs(height - expected[k][0])
+                assert weight(mine, others, speed) > 0.499
+            if offs:
+                (nearest, k), *rest = sorted(offs)
+                if weight(nearest, [off for off, _ in rest], speed) > 0.501:
+                    wanted[n] = k
+        # Whoever is wanted gets an edge.
+        assert {*wanted.values()} <= {*np.flatnonzero(match >= 0).tolist()}
 
 
 def test_a_gate_alone_is_matched_as_among_others():
@@ -221,3 +224,21 @@ def test_chatter_costs_no_rod_its_edges():
         # Whichever edge of a burst stands for the rod, it is of that burst.
         assert np.abs(train.times[match] - whole.times).max() <= 90e-6 + 1e-12
         np.testing.assert_array_equal(train.blocked[match], train.blocks)
+
+
+def test_no_end_of_another_shadow_is_taken_for_the_top_rods():
+    """A rod thrown back and the top rod make one shadow, and it ends about when the top rod would.
+
+    Of a rod amid the chain its neighbours tell.
+    """
+    side = QUIET.side("free")
+    widths = side.chain.widths
+    for rod in (12, 24):
+        (train, *_) = side.trains
+        begin = int(np.flatnonzero((train.rods == rod) & train.blocks)[0])
+        times = train.times.copy()
+        times[begin] -= 2.5 * (times[begin + 1] - times[begin])  # so much earlier it darkens
+        (match,) = align([replace(train, times=times)], [train.levels], FALL, 0.5e-3, widths=widths)
+        assert match[begin] == -1
+        assert (match[begin + 1] == -1) == (rod == 24)
+        assert (np.delete(match, [begin, begin + 1]) >= 0).all()
