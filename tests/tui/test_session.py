@@ -35,11 +35,17 @@ def test_a_chosen_protocol_is_described_once_with_what_the_model_notes(lab, monk
 def test_any_key_before_the_release_stops_and_nothing_falls(lab):
     async def work():
         async with lab.ready(countdown_s=600.0) as op:
-            for attempt, key in enumerate(("f9", "escape", "k"), start=1):
-                await op.arms(Stage.COUNTDOWN)
-                await op.sees("ARMED", "Any key stops")
-                await op.press(key)
-                await op.sees("stopped: nothing fell", f"RUN 1 of 3 · attempt {attempt + 1}")
+            for key in ("f9", "escape", "k"):
+                stopped = False
+                while not stopped:  # a board that a busy machine leaves alone disarms itself
+                    await op.arms(Stage.COUNTDOWN)
+                    attempt = op.app.flow.job.attempt
+                    await op.until(lambda: op.app.flow.stage is not Stage.COUNTDOWN
+                                   or "Any key stops" in flat(op.app))  # fmt: skip
+                    await op.press(key)
+                    await op.at(Stage.PREPARE)
+                    await op.sees(f"RUN 1 of 3 · attempt {attempt + 1}")
+                    stopped = "stopped: nothing fell" in flat(op.app)
                 await op.until(lambda: op.app.state.line(1).state == "interrupted")
 
     run(work())
