@@ -26,6 +26,7 @@ from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.examples import examples
 from tests.tui.lab import KEYS, run
+from tests.waiting import PATIENCE_S
 
 STILL_S = 0.15
 SIZE = (80, 24)
@@ -38,6 +39,7 @@ MOMENTS = {
     "halted": Flow(Stage.HALTED, Job(1, 1), verdict="void"),
     "done": Flow(Stage.DONE, Job(1, 1)),
 }
+PAGE_OF = {"device": "device", "result": "result", "halted": "result", "done": "session"}
 DIALOGS = ("", "ctrl+p", "question_mark", "n", "a", "q", "c", "l")
 
 WORDS = ("board moved", "laser", "quit", "cza")
@@ -57,10 +59,10 @@ episodes = st.lists(
               st.lists(deeds, min_size=1, max_size=5)),
     min_size=3, max_size=6,
 )  # fmt: skip
-ARMS = [("prepare", "", [("wait", 6 * STILL_S), ("keys", ["enter"]), ("wait", 0.6)])]
-ENDS = [("prepare", "", [("wait", 6 * STILL_S), ("keys", ["enter"]), ("type", "x"), ("wait", 0.6)])]
-
-PASTES = [("prepare", "", [*ENDS[0][2][:2], ("paste", "x"), ("wait", 0.6)])]
+PRESSES = [("wait", 6 * STILL_S), ("keys", ["enter"])]
+ARMS = [("prepare", "", [*PRESSES, ("told", "collect")])]
+ENDS = [("prepare", "", [*PRESSES, ("type", "x"), ("told", "stop")])]
+PASTES = [("prepare", "", [*PRESSES, ("paste", "x"), ("told", "stop")])]
 
 
 class Rig(FakeClient):
@@ -111,6 +113,12 @@ class Hands:
             while time.monotonic() < end:
                 await asyncio.sleep(0.01)
                 self.look()
+        elif kind == "told":  # if anything is
+            await self.do("wait", 0.6)
+            end = time.monotonic() + PATIENCE_S
+            while (told := self.app.client.told) and told[-1][1] != what:
+                assert time.monotonic() < end, told
+                await asyncio.sleep(0.01)
         elif kind == "paste":
             self.touched = time.monotonic()
             self.keys.append((self.touched, False))
@@ -142,9 +150,10 @@ def session(tmp_path_factory):
 @example([("result", "", [("type", "board moved"), ("hold", "enter"), ("wait", 0.6)])])
 def test_nothing_is_armed_but_by_the_deliberate_step(session, lived):
     told, keys = run(_typed(session, lived))
-    for _ in range(5):  # on a busy machine a page may not have stood still long enough
-        if told or lived not in [ARMS, ENDS, PASTES]:
-            break
+    end = time.monotonic() + PATIENCE_S
+    while lived in [ARMS, ENDS, PASTES] and not told:
+        # On a busy machine a page may not have stood still long enough.
+        assert time.monotonic() < end
         told, keys = run(_typed(session, lived))
     for at, method in told:
         meant = [(when, face) for when, face in keys if face and when <= at]
@@ -172,7 +181,7 @@ async def _typed(session, lived):
             while len(app.screen_stack) > 1:
                 app.screen.dismiss(None)
             app.driver.flow = replace(MOMENTS[moment], ticket=app.flow.ticket + 1)
-            await pilot.pause(0.12)  # its page is there
+            await pilot.pause(0.12)  # its page is there, unless another one was turned to
             if dialog:
                 await hands.key(dialog)
             for kind, what in does:
@@ -233,8 +242,7 @@ def test_escape_leaves_a_dialog_whose_field_a_click_has_left(session):
 def test_a_dialog_bears_keys_that_come_before_it_is_there(session, key):
     async def work():
         async with _screen(session) as (app, pilot):
-            app.driver.flow = replace(MOMENTS["result"], ticket=app.flow.ticket + 1)
-            await pilot.pause(0.12)
+            await _at(app, pilot, "result")
             opened = set()
             for dialog in filter(None, DIALOGS):
                 for turns in range(3):
@@ -256,15 +264,24 @@ def test_a_dialog_bears_keys_that_come_before_it_is_there(session, key):
 def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async def work():
         async with _screen(session) as (app, pilot):
-            for moment, flow in MOMENTS.items():
-                app.driver.flow = replace(flow, ticket=app.flow.ticket + 1)
-                await pilot.pause(0.12)
-                waited = []
-                while min(waited, default=1.0) > 0.1:
-                    assert len(waited) < 5, (moment, waited)  # not all for other programs' sake
-                    waited.append(await _stopped(app, pilot))
+            for moment in MOMENTS:
+                await _at(app, pilot, moment)
+                end = time.monotonic() + PATIENCE_S
+                while (waited := await _stopped(app, pilot)) > 0.1:  # for other programs' sake
+                    assert time.monotonic() < end, (moment, waited)
 
     run(work())
+
+
+async def _at(app, pilot, moment):
+    """Come to a moment, with its page shown."""
+    flow = MOMENTS[moment]
+    app.driver.flow = replace(flow, ticket=app.flow.ticket + 1)
+    end = time.monotonic() + PATIENCE_S
+    while app._open() and app.page != PAGE_OF.get(moment, "run"):
+        assert time.monotonic() < end, app.page
+        await pilot.pause(0.01)
+    await pilot.pause(0.12)  # it is drawn
 
 
 async def _stopped(app, pilot):
