@@ -27,6 +27,15 @@ OPTIONAL = ("distributed", "mpmath")
 """Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
 
 
+class _ListFormats(argparse.Action):
+    """Print the formats of timers' files that are known, and stop."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        rows = import_module("rig.timers.vocabulary").formats()
+        sys.stdout.writelines(f"{name}: {how}; {example}\n" for name, _, how, example in rows)
+        parser.exit()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
 
@@ -287,8 +296,21 @@ def _parser() -> Parser:
         help="unit of the times, if the file does not state it",
     )
     imported.add_argument(
-        "--dark", choices=("high", "low"), help="level of a signal while its beam is blocked"
+        "--dark",
+        choices=("high", "low", "turns", "turns-clear", "each"),
+        help="level of a signal while its beam is blocked; of times alone: beams darken and clear "
+        "in turns, clear first, or darken at each",
     )
+    imported.add_argument(
+        "--map-file", metavar="FILE", help="save how the file is read, or use what was saved"
+    )
+    imported.add_argument(
+        "--as-read", action="store_true", help="do not compare the drops with the protocol's falls"
+    )
+    imported.add_argument(
+        "--allow-unused", action="store_true", help="accept rows of which no edge is made"
+    )
+    imported.add_argument("--list-formats", action=_ListFormats, nargs=0, help="list known formats")
     imported.add_argument(
         "--clock-uncertainty",
         metavar="U",

@@ -342,7 +342,6 @@ WORDINGS: dict[str, Wording] = {
     "no_edges": _doubt("no edges in this file"),
     "nothing_passes": _doubt("nothing passes in this file{notes}"),
     "unreadable": _doubt("cannot read this file: {text}"),
-    "not_csv": _doubt("not CSV: {text}"),
     "not_text": _doubt(
         "this is no text: a spreadsheet, or a program's own format?", "export it as text or CSV"),
     "open_quote": _doubt("a quoted value runs over the end of its line"),
@@ -355,11 +354,10 @@ WORDINGS: dict[str, Wording] = {
     "too_many_columns": _doubt("{columns} columns; at most {limit} are read"),
     "ambiguous": _doubt(
         "{column!r:.40} may be {readings}", "name it channel, run or state, or leave it out"),
-    "unit_missing": _doubt(
-        "whole numbers without a unit: seconds, or counts of a clock?", "say --unit ms or us"),
     "durations": _doubt(
         "{numbers} are durations, or something else, and not the times of passages",
-        "import the times themselves, as the timer counted them"),
+        "these are durations, not moments: use a column of the times themselves, as the timer "
+        "counted them"),
     "regular_samples": _doubt(
         "samples at regular times, as from video or a sensor ({columns})",
         "import the times at which gates change, or samples of gates in volts; if these are "
@@ -372,16 +370,37 @@ WORDINGS: dict[str, Wording] = {
     "inputs_unclear": _doubt(
         "the file's inputs {inputs} are not the gates' channels {channels}",
         "say which is which: --map '{pairs}'"),
-    "which_gate": _doubt(
-        "the file does not say which gate its times are of", "--channel N says which: {channels}"),
     "run_unplanned": _doubt(
         "run {run} is not in the plan of {protocol}, which has {planned} runs",
         "raise plan.repeats, or number the runs as the plan does"),
+    "several_readings": _doubt(
+        "the file may be read in more than one way", "decide with {options}"),
+    "no_reading_fits": _doubt(
+        "at most {share:.0f} % of the edges are where a fall of this protocol puts them, and the "
+        "file leaves open how to read it",
+        "is it the right protocol? otherwise decide with {options}, or with --as-read"),
+    "more_edges": _doubt(
+        "run {run} has {count} edges at channel {channel}; the object makes at most {most}",
+        "say which input is which gate with --map, or take the file as it is with --as-read"),
+    "one_wire": _doubt(
+        "the file has a single input, with the edges of all gates",
+        "if the gates are on a single wire, say so: {option}"),
+    "at_once": _doubt(
+        "run {run}: two inputs change at the same time, {time_s:.6f} s from its first second",
+        "is a row missing? otherwise take the file as it is with --as-read"),
+    "rows_unused": _doubt(
+        "{unused} of {rows} rows unused: lines {lines}",
+        "--allow-unused leaves them out; --map says which input is which gate"),
     "no_session_file": _doubt("no file is named", "--session FILE, or --dry-run to look first"),
     # What an import assumes of another timer's file.
     "samples": _remark(
         "sampled every {period_us:.4g} µs: an edge is known to {u_us:.3g} µs at best; state that "
         "as priors: {{jitter: ...}} in the protocol if it is more than 2 µs"),
+    "rows_used": _remark("{runs} runs, {rows} rows: {edges} edges; {silent} rows without a change"),
+    "rows_left_out": _remark(
+        "{runs} runs, {rows} rows: {edges} edges; {unused} rows unused: lines {lines}"),
+    "reading_chosen": _remark("read as {option}: {fit}"),
+    "gates_absent": _remark("the file has nothing of the gates at channels {channels}"),
     "inputs_unused": _remark("inputs that are no gate: {inputs}; see --map"),
     "channels_unused": _remark("edges of channels {channels} are kept but belong to no gate"),
     "columns_unused": _remark("not used: {columns}"),

@@ -6,9 +6,16 @@ import hashlib
 import math
 import re
 from collections import Counter
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rig.analysis.chain_records import chain_records
+from rig.analysis.components import stated
+from rig.analysis.drop import fit_drop
+from rig.analysis.identify import log_evidence, most_votes
+from rig.clock.calibration import TimeScale
+from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
 from rig.commands.output import say
 from rig.files import require_file
@@ -18,19 +25,36 @@ from rig.protocol.plan import runs
 from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.timers.edges_csv import read_edges
+from rig.timers.edges_csv import TICK_HZ, read_edges
+from rig.timers.layouts import (
+    SETTINGS,
+    FallMatch,
+    check_layout,
+    choose,
+    find_layouts,
+    part_names,
+    read_drops,
+    read_layout,
+    save_layout,
+)
 from rig.timers.problems import refusal
-from rig.timers.timer_file import drops_of, is_edge_file, label_number, read_timer_file
+from rig.timers.timer_file import is_edge_file, read_timer_file
 from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Sequence
 
-    from rig.protocol.protocol import Gate, Protocol
+    from rig.protocol.protocol import Protocol
     from rig.reasons import Reason
     from rig.records import Drop
+    from rig.timers.layouts import FileReading
     from rig.timers.timer_file import TimerFile
+
+_COMPARED = 3
+"""Drops that are compared with falls: as many as tell a way of reading from another."""
+_EXACT_S = 1e-5
+"""Of times: two gates never change within the same one, but for one drop in thousands."""
 
 
 def main(arguments: Namespace) -> int:
@@ -44,7 +68,7 @@ def main(arguments: Namespace) -> int:
         drops = read_edges(arguments.events)
         lines = ["the project's own format: run,channel,time_s,state"]
     else:
-        drops, channels, lines, notes = _read_timer_file(protocol, arguments)
+        drops, channels, lines, notes = read_with_protocol(protocol, arguments)
         timer |= {"beams": sorted(set(channels.values())), **reasons_json(notes)}
     _check_plan(protocol, drops, arguments.events)
     edges = sum(len(drop.edges) for drop in drops)
@@ -69,26 +93,104 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _read_timer_file(
+def read_with_protocol(
     protocol: Protocol, arguments: Namespace
 ) -> tuple[list[Drop], dict[str, int], list[str], list[Reason]]:
     """Drops of another timer's file, which gate each input is, and what was assumed."""
     file = read_timer_file(arguments.events, arguments.unit)
-    channels = _match_inputs(protocol, file, arguments)
+    gates = protocol.gates.gates if protocol.gates else ()
+    passed = [gate.channel for gate in sorted(gates, key=lambda gate: -gate.height)]
     bars = max(side.chain.rods for side in protocol.chains.values())
-    drops = drops_of(file, channels, bars, arguments.dark)
-    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
+    stated = _read_stated(arguments, file, passed)
+    layouts = find_layouts(file, passed, bars, stated)
+    if not layouts:
+        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, passed, strict=False))
+        values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, passed))}
+        raise refusal(arguments.events, "inputs_unclear", **values, pairs=pairs)
+    readings = [read_drops(file, layout) for layout in layouts[: 1 if arguments.as_read else None]]
+    if arguments.as_read:
+        reading, fit = readings[0], FallMatch(0.0)
+    else:
+        reading, fit = choose(readings, arguments.events, partial(fit_falls, protocol))
+    if reading.layout.groups == "passing" and file.labels and "groups" not in stated:
+        raise refusal(arguments.events, "one_wire", option=str(reading.layout))
+    _account(file, reading, bars, arguments)
+    if len(readings) > 1:
+        file.notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=fit.text))
+    if pause_s := reading.layout.pause_s:
+        drops = len(reading.drops)
+        file.notes.append(make_reason("several_drops", drops=drops, pause_s=pause_s))
+    channels = dict(reading.layout.channels)
     if file.period_s:
         period_us = file.period_s * 1e6
         u_us = period_us / math.sqrt(12.0)
         file.notes.append(make_reason("samples", period_us=period_us, u_us=u_us))
+    absent = [str(n) for n in passed if n not in channels.values()]
+    if absent:
+        file.notes.append(make_reason("gates_absent", channels=", ".join(absent)))
+    if reading.layout.dark in {"high", "low"}:
+        other = "low" if reading.layout.dark == "high" else "high"
+        file.notes.append(make_reason("blocked_level", level=reading.layout.dark, other=other))
     idle = [label for label in file.labels if label not in channels]
-    if idle:
+    if idle and reading.layout.groups != "passing":
         file.notes.append(make_reason("inputs_unused", inputs=", ".join(idle)))
     for note in file.notes:
         say(note.text)
+    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
     lines += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
-    return drops, channels, lines, file.notes
+    lines += [str(reading.layout), *([fit.text] if fit.text else [])]
+    if arguments.map_file is not None and not Path(arguments.map_file).exists():
+        save_layout(reading.layout, arguments.map_file)
+    return reading.drops, channels, lines, file.notes
+
+
+def _account(file: TimerFile, reading: FileReading, bars: int, arguments: Namespace) -> None:
+    """Say what became of every row; refuse rows that are not used, and more edges than can be."""
+    for drop in reading.drops:
+        for channel, count in Counter(edge.channel for edge in drop.edges).items():
+            if count > 2 * bars and not arguments.as_read:
+                excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
+                raise refusal(arguments.events, "more_edges", **excess)
+        ticks = Counter(edge.tick for edge in drop.edges)
+        together = next((tick for tick, count in ticks.items() if count > 1), None)
+        exact = (file.period_s or 0.0) < _EXACT_S
+        if together is not None and exact and not arguments.as_read:
+            raise refusal(arguments.events, "at_once", run=drop.run, time_s=together / drop.tick_hz)
+    unused = sorted(set(file.rows) - reading.lines - file.silent)
+    edges = sum(len(drop.edges) for drop in reading.drops)
+    values: dict[str, object] = {"runs": len(reading.drops), "rows": len(file.rows), "edges": edges}
+    if not unused:
+        file.notes.append(
+            make_reason("rows_used", silent=len(file.silent - reading.lines), **values)
+        )
+        return
+    listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
+    values |= {"unused": len(unused), "lines": listed}
+    if not arguments.allow_unused:
+        raise refusal(arguments.events, "rows_unused", **values)
+    file.notes.append(make_reason("rows_left_out", **values))
+
+
+def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMatch:
+    """Compare the first drops with falls that the protocol has."""
+    planned = {run.number: run for run in runs(protocol)}
+    share = near = received = expected = 0.0
+    evidence, gravity = 0.0, []
+    for drop in [drop for drop in drops if drop.run in planned][:_COMPARED]:
+        run, rate = planned[drop.run], TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
+        for record in chain_records(protocol, run, drop, TICK_HZ):
+            near += most_votes(protocol, record, rate.u, stated(protocol))
+            expected += record.expected
+        received += len(drop.edges)
+        if exact:
+            result, fit = fit_drop(protocol, run, drop, rate, explain=False)
+            evidence += log_evidence(fit) if fit else 0.0
+            gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
+    share = min(1.0, 2.0 * near / max(1.0, received + expected))
+    text = f"{len(drops)} runs: {near:.0f} of {expected:.0f} edges where a fall puts them"
+    if gravity:
+        text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
+    return FallMatch(share, evidence, text)
 
 
 def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
@@ -100,24 +202,43 @@ def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
         yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {counts}"
 
 
-def _match_inputs(protocol: Protocol, file: TimerFile, arguments: Namespace) -> dict[str, int]:
-    """Which gate each of the file's inputs is."""
-    gates = [gate.channel for gate in protocol.gates.gates] if protocol.gates else []
-    labels = file.labels
-    if not labels:
-        return {"": _find_gate(protocol, arguments.channel).channel}
+def _read_stated(arguments: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
+    """Return what is decided by a saved layout and by options, which come before it."""
+    stated: dict[str, Any] = {}
+    if arguments.map_file is not None and Path(arguments.map_file).exists():
+        stated |= read_layout(arguments.map_file)
+    options = {"unit": None if file.has_unit else arguments.unit, "dark": arguments.dark}
+    stated |= {name: value for name, value in options.items() if value is not None}
     if arguments.map is not None:
-        return _read_pairs(arguments.map, labels, gates)
-    if len(labels) == 1 and (arguments.channel is not None or len(gates) == 1):
-        return {labels[0]: _find_gate(protocol, arguments.channel).channel}
-    channels = {name: n for name in labels if (n := label_number(name)) in gates and n is not None}
-    # As many inputs as gates, and not all of the same number: counted from 1, perhaps.
-    shifted = len(labels) == len(gates) and len(channels) < len(labels)
-    if not channels or shifted or len(set(channels.values())) < len(channels):
-        pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
-        values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
-        raise refusal(arguments.events, "inputs_unclear", **values, pairs=pairs)
-    return channels
+        settings, pairs = _part_settings(arguments.map, file)
+        stated |= check_layout(settings, "--map")
+        labels = list(file.labels) or ["input"]
+        if stated.get("groups") == "gates":
+            labels = part_names(file)
+        elif stated.get("groups") == "passing":
+            labels = [f"gate {n}" for n in range(1, len(gates) + 1)]
+        if pairs or not settings:
+            chosen = _read_pairs(pairs, labels, gates)
+            bare = labels == ["input"]
+            stated["channels"] = {"" if bare else label: n for label, n in chosen.items()}
+    elif arguments.channel is not None and len(file.labels) < 2:
+        label = next(iter(file.labels), "")
+        stated["channels"] = {label: arguments.channel}
+    return stated
+
+
+def _part_settings(text: str, file: TimerFile) -> tuple[dict[str, object], str]:
+    """Part what decides how a file is read from the pairs of inputs and channels."""
+    settings: dict[str, object] = {}
+    pairs = []
+    for part in text.split(","):
+        name, _, value = part.partition("=")
+        if name.strip() in SETTINGS and name.strip() not in file.labels:
+            number = name.strip() == "pause_s" and re.fullmatch(r"[0-9.]{1,20}", value)
+            settings[name.strip()] = float(value) if number else value.strip()
+        else:
+            pairs.append(part)
+    return settings, ",".join(pairs)
 
 
 def _read_pairs(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[str, int]:
@@ -132,19 +253,6 @@ def _read_pairs(text: str, labels: Sequence[str], gates: Sequence[int]) -> dict[
             raise refusal("--map", "not_accepted", text=f"{label}={channel}", accepted=accepted)
         channels[label] = int(channel)
     return channels
-
-
-def _find_gate(protocol: Protocol, channel: int | None) -> Gate:
-    """Which gate the beam of a file was that has only one."""
-    gates = protocol.gates.gates if protocol.gates else ()
-    candidates = [gate for gate in gates if channel is None or gate.channel == channel]
-    if len(candidates) == 1:
-        return candidates[0]
-    channels = ", ".join(f"{gate.channel} at {gate.height * 1e3:g} mm" for gate in gates)
-    if channel is None:
-        raise refusal(protocol.source, "which_gate", channels=channels)
-    accepted = f"a gate's channel: {channels}"
-    raise refusal("--channel", "not_accepted", text=str(channel), accepted=accepted)
 
 
 def _read_share(text: str) -> float:

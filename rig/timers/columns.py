@@ -3,523 +3,352 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rig.timers.table import (
-    BLOCKED,
-    CLEAR,
-    FALLING,
-    NAME_AND_NUMBER,
-    NO_LEVEL,
-    RISING,
-    as_state,
-    is_number,
+from rig.timers.table import count_known, is_number, is_value
+from rig.timers.vocabulary import (
+    POWERS,
+    SYMBOLS,
+    has_role,
+    normal,
+    number_of,
+    state_of,
+    unit_of,
+    without_accents,
+    words,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.timers.problems import ProblemList
-    from rig.timers.table import Row, RowBlock, TableCell
+    from rig.timers.table import Row, RowBlock, Table
 
-UNITS = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sekunden", "secondes", "secondi",
-                     "segundos"), 0),
-    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds", "millisekunden"), 3),
-    **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microsecond", "microseconds",
-                     "mikrosekunden"), 6),
-    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 9),
-}  # fmt: skip
-"""Decimal power from seconds, by what a heading or a row of units says."""
-
-_UNIT = re.compile(r"[\[(]\s*([^\W\d_]+)\s*[\])]|/\s*([^\W\d_]+)\s*$|[_ ]([^\W\d_]+)\s*$")
-_RUN = re.compile(r"\brun\s*#?\s*[0-9]+|\bset\s*[0-9]+", re.IGNORECASE)
-
-_I = re.IGNORECASE
-_STATE = re.compile(r"state|status|blocked|zustand|[ée]tat|estado|\bstato\b", _I)
-_DURATION = re.compile(
-    r"interval|period|dur[aeé]|delta|Δ|dauer|differ|\blap\b|\bhalf\b|"
-    r"(?:time|zeit|tempo)\s+(?:in|between|btw)|(?:gate|pulse)\s+time", _I)  # fmt: skip
-_TIME = re.compile(
-    r"(?<![a-z])(?:times?|zeit|zeiten|temps|tiempo|tempo|tempi|tijd|tid|time ?stamps?)(?![a-z])|"
-    r"^t$|^t[\s_/(\[0-9]|^(?:micros|millis)\b", _I)  # fmt: skip
-_NUMBERED_RUN = re.compile(r"^(?:run|trial|versuch|lauf|drop|prova|essai|set)\b", _I)
-_EDGE = re.compile(r"\bedge|flanke|\bkante|transition|slope|polarity|fronte\b|^level$", _I)
-_VOLTS = re.compile(
-    r"volt|[\[(]\s*(?:m?V|lx)\s*[\])]|spannung|tension|potential|illumin|luminan|\blux\b", _I
-)
-_SCOPE = re.compile(r"^(?:ch|chan|channel|kanal)[\s_]*[0-9a-d]$", _I)
-_MOMENT = re.compile(r"^(?:start|stop|on|off)(?![a-z])\s*[0-9]*", _I)
-_NUMBERED = re.compile(r"^(?:t|time|zeit|event)[\s_#]*[0-9]+(?![0-9])", _I)
-_DARKENS = re.compile(
-    r"(?<![a-z])(?:(un|not )?block(?:ed|s)?|(clear)(?:ed|s)?|dark(?:ens?)?)(?![a-z])", _I
-)
-_ANY_INPUT = re.compile(
-    r"(?:photogate|gate|channel|chan|ch|pin|input|beam|sensor|port|lichtschranke)[\s_#]*[0-9]+", _I
-)
-_VOLT_WORDS = {"v", "volt", "volts", "mv", "lx"}
-_INPUT = re.compile(
-    r"^(?:d|ch|chan|channel|digital|pin|gate|input|in|beam|sensor|di|dio|kanal|logic)?"
-    r"[\s_#:-]*([0-9]+)$", _I)  # fmt: skip
-_CHANNEL = re.compile(
-    r"channel|kanal|\bpin\b|(?:photo)?gate|\bbeam|\binput\b|sensor|\bport\b|canale|\bvoie\b|"
-    r"lichtschranke|barri[eè]r|fotocellula|\bch\b", _I)  # fmt: skip
-_COUNTER = re.compile(r"event|ereignis|index|count|^n$|^nr\b|^no\b|^#$|number|sample|^i$", _I)
-_DERIVED = re.compile(
-    r"dist|pos|vel|speed|accel|height|angle|weg|strecke|geschwindigkeit|omega|^v[a-z]?$|^a[a-z]?$|"
-    r"^[dsxyz]$|^[xyz]\b|latitude|error|note|remark|comment", _I)  # fmt: skip
-_WHOLE = re.compile(r"[0-9]{1,4}")
-_STATES = (BLOCKED | CLEAR) - RISING - FALLING
-_WORTH = 200  # rows that are looked at
-_SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
+_LOOKED_AT = 200  # rows
 _MEANINGS = {
     "state": "states, blocked or clear",
     "duration": "durations, not used",
-    "time": "times",
-    "time of an input": "times",
-    "moment": "times",
     "edge": "edges, up or down",
     "volts": "volts, or light",
     "level": "levels of an input",
     "run": "run",
-    "channel": "which gate",
-    "counter": "counts rows, not used",
-    "other": "not used",
+    "gate": "which gate",
+    "index": "counts rows, not used",
+    "coarse": "the same times, coarser; not used",
 }
 
 
 @dataclass(slots=True)
-class TimeColumn:
-    """Times of one run, or of all of them.
+class TimerColumn:
+    """What a column is.
 
     Attributes
     ----------
     at
         Which column, from 0.
+    name
+        Its heading.
+    role
+        A key of `_MEANINGS`, ``time``, or ``other``.
     power
-        Decimal power from seconds.
-    state
-        The column of states that belongs to it.
-    label
-        The input that all of them are of; empty where other columns say that.
+        Of times: decimal power from seconds; `None` where the file does not say it.
+    gate, run
+        Which input and which run all its values are of; empty where the heading does not say.
     blocked
-        What all of them did to the beam, where the heading says it.
+        What all its times did to the beam, where the heading says it.
+    numbered
+        Whether it is one of times side by side: ``t1``, ``Stop 2``.
     """
 
     at: int
-    power: int
-    state: int | None = None
-    label: str = ""
+    name: str
+    role: str
+    power: int | None = 0
+    gate: str = ""
+    run: str = ""
     blocked: bool | None = None
+    numbered: bool = False
+
+    @property
+    def meaning(self) -> str:
+        """What it was taken for, in words."""
+        if self.role == "time":
+            return "times in " + ("an unknown unit" if self.power is None else SYMBOLS[self.power])
+        return _MEANINGS.get(self.role, "not used")
 
 
-@dataclass(slots=True)
-class Columns:
-    """What the columns of a block are; the numbers are columns from 0.
-
-    Attributes
-    ----------
-    times
-        One, or one a run where runs stand side by side.
-    edge
-        Which way a signal went, which is not yet whether the beam is blocked.
-    channel, run
-        Which gate and which run a row is of.
-    levels
-        Samples of inputs, by the name of the input: 0 and 1.
-    volts
-        Samples in volts, by heading.
-    unused
-        Headings of all others.
-    derived
-        Whether places, speeds or other measured things stand beside the times.
-    row_is_run
-        Whether each row is a drop of its own, its times side by side.
-    meanings
-        What each column was taken for, in words, by its heading or number.
-    """
-
-    times: list[TimeColumn] = field(default_factory=list)
-    edge: int | None = None
-    channel: int | None = None
-    run: int | None = None
-    levels: dict[int, str] = field(default_factory=dict)
-    volts: dict[int, str] = field(default_factory=dict)
-    unused: list[str] = field(default_factory=list)
-    derived: bool = False
-    row_is_run: bool = False
-    meanings: dict[str, str] = field(default_factory=dict)
+@cache
+def _numbered(role: str) -> re.Pattern[str]:
+    listed = "|".join(sorted(map(re.escape, words()[role]), key=len, reverse=True))
+    return re.compile(
+        rf"(?<![^\W\d_])(?:{listed})[\s#:_-]{{0,3}}(?:nr\.?|no\.?)?\s?(?:[0-9]{{1,4}}|[a-d])(?![^\W_])",
+        re.IGNORECASE,
+    )
 
 
-def columns_of(block: RowBlock, separator: str, unit: str | None, problems: ProblemList) -> Columns:
+def find_label(name: str, role: str) -> str:
+    """Return the part of a heading that names an input, or a run, with its number."""
+    match = _numbered(role).search(without_accents(name[:200]))
+    return match[0] if match else ""
+
+
+def columns_of(
+    block: RowBlock, table: Table, unit: str | None, problems: ProblemList
+) -> list[TimerColumn]:
     """Find out what the columns of a block are.
 
     Parameters
     ----------
     unit
-        Of the times where the file does not say, a key of `UNITS`.
+        Of the times where the file does not say, a key of `POWERS`.
     problems
         Where it is noted, at its place, if that cannot be found out.
     """
-    width = max(len(row.cells) for row in block.rows[:_WORTH])
-    values = [_values(block, n) for n in range(width)]
-    heading = _with_units(block, _find_heading(block, width))
+    rows = [table.row(line) for line in block.rows[:_LOOKED_AT]]
+    width = max(len(row.texts) for row in rows)
+    values = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
+    heading = _find_heading(block, values)
     if heading is None:
-        return _by_values(block, values, separator, unit, problems)
-    return _by_heading(block, heading, values, separator, unit, problems)
+        columns = _by_values(block, values, table, problems)
+    else:
+        columns = [
+            _by_heading(block, heading, n, texts, table) for n, texts in enumerate(values) if texts
+        ]
+        _check(columns, heading, values, table, problems)
+    for column in columns:
+        if column.role == "time" and column.power is None:
+            column.power = POWERS[unit] if unit else _plain_power(values[column.at])
+    _leave_out_coarser(columns, values, table)
+    return columns
 
 
-def _values(block: RowBlock, n: int) -> list[str]:
-    cells = (row.cells[n].text for row in block.rows[:_WORTH] if n < len(row.cells))
-    return [text for text in cells if text]
-
-
-def _find_heading(block: RowBlock, width: int) -> Row | None:
-    """The row with most cells that are known; below it may stand symbols and units."""
-
-    def count_known(row: Row) -> int:
-        return sum(
-            any(
-                pattern.search(text)
-                for pattern in (_TIME, _STATE, _VOLTS, _CHANNEL, _EDGE, _INPUT, _MOMENT)
-            )
-            for text in row.texts
+def _find_heading(block: RowBlock, values: Sequence[list[str]]) -> Row | None:
+    """Return the row with most cells that are known; above and below may stand symbols, units."""
+    rows = [
+        row
+        for row in block.headings
+        if count_known(row)
+        and (len(row.texts) > 1 or len(values) == 1)
+        and any(
+            text and not is_number(text) and n < len(values) and values[n]
+            for n, text in enumerate(row.texts)
         )
-
-    rows = [row for row in block.headings if len(row.cells) > 1 or width == 1]
-    candidates = [row for row in rows if count_known(row)]
-    return max(candidates, key=count_known) if candidates else None
-
-
-def _with_units(block: RowBlock, heading: Row | None) -> Row | None:
-    """Join names and the units that stand in a row of their own, as oscilloscopes write them."""
-    if heading is None:
-        return None
-
-    def units(row: Row) -> list[str]:
-        words = [text.strip("()[] ") for text in row.texts]
-        are_units = [word.lower() in UNITS or word.lower() in _VOLT_WORDS for word in words if word]
-        return words if len(are_units) > 1 and all(are_units) else []
-
-    rows = [row for row in block.headings if len(row.cells) == len(heading.cells)]
-    stated = next(filter(None, map(units, rows)), None)
-    if stated is None or not _VOLT_WORDS & {word.lower() for word in stated}:
-        return heading
-    names = (
-        heading if not units(heading) else next((row for row in rows if not units(row)), heading)
-    )
-    cells = []
-    for n, (cell, unit) in enumerate(zip(names.cells, stated, strict=True)):
-        plain = n == 0 and unit.lower() in UNITS and not _TIME.search(cell.text)
-        name = "time" if plain else cell.text
-        cells.append(cell._replace(text=f"{name} ({unit})" if unit else name))
-    return names._replace(cells=cells)
+    ]
+    return max(rows, key=lambda row: (count_known(row), len("".join(row.texts))), default=None)
 
 
 def _by_heading(
-    block: RowBlock,
+    block: RowBlock, heading: Row, n: int, texts: Sequence[str], table: Table
+) -> TimerColumn:
+    full = heading.cell(n)
+    prefix, colon, rest = full.partition(":")
+    run = find_label(full, "run")
+    name = full.replace(run, " ") if run else full
+    if colon and rest.strip() and not find_label(prefix, "gate"):
+        run, name = run or prefix.strip(), rest
+    beside = [row.cell(n) for row in block.headings if row.line != heading.line]
+    unit = unit_of(name)
+    if unit not in {*POWERS, "v"}:
+        rows = [row for row in block.headings if _has_units(row)]
+        stated = (unit_of(row.cell(n).strip("()[] ")) for row in rows)
+        unit = next((word for word in stated if word in {*POWERS, "v"}), unit)
+    gate = next(filter(None, map(_find_gate, [name, *beside])), "")
+    role = _role(name, unit, gate, texts, table)
+    if role == "level" and len(texts) < min(len(block.rows), _LOOKED_AT):
+        role = "state"  # of samples, each row has every level
+    column = TimerColumn(n, full, role, gate=gate, run=run)
+    if role == "time":
+        column.power = POWERS.get(unit)
+        if not unit and "_" not in name and normal(name) in POWERS:
+            column.power = POWERS[normal(name)]
+        clear = has_role(name, "clear")
+        if clear or has_role(name, "blocked"):
+            column.blocked = not clear
+        counted = re.search(r"^\D{1,12}[0-9]{1,3}(?![0-9])", name.strip())
+        column.numbered = counted is not None or has_role(name, "moment")
+    return column
+
+
+def _has_units(row: Row) -> bool:
+    """Whether a row has units only, perhaps behind their name: ``Y_Unit_Label``."""
+    texts = [normal(text.strip("()[] ")) for text in row.texts if text]
+    units = set().union(*(listed for role, listed in words().items() if role.startswith("unit")))
+    return len(texts) > 0 and all(
+        text in units or (not n and "unit" in text) for n, text in enumerate(texts)
+    )
+
+
+def _find_gate(text: str) -> str:
+    bare = re.fullmatch(r"\s*[0-9]{1,3}\s*", text[:20])
+    return text.strip() if bare else find_label(text, "gate")
+
+
+def _role(name: str, unit: str, gate: str, texts: Sequence[str], table: Table) -> str:
+    """Return what a column is, by its heading, its unit and its values."""
+    levels, timed = has_levels(texts), unit in POWERS
+    fractions = any("." in text or "," in text for text in texts)
+    darkens = has_role(name, "blocked") or has_role(name, "clear")
+    is_time = has_role(name, "time") or (
+        timed and normal(name).strip("()[] ") in words()[f"unit {unit}"]
+    )
+    rules = (
+        ("time", timed and not levels and (darkens or has_role(name, "moment"))),
+        ("state", has_role(name, "state") and not timed),
+        ("duration", has_role(name, "duration")),
+        ("time", is_time and not levels and unit != "v"),
+        ("time", timed and has_role(name, "gate") and not levels and rises(texts, table)),
+        ("time", is_time and len(texts) < 3),
+        ("edge", has_role(name, "edge") and levels and not gate),
+        ("volts", unit == "v" or (has_role(name, "volts") and not (levels and gate))),
+        ("volts", bool(gate) and fractions and not levels),
+        (
+            "level",
+            bool(gate) and levels and not {state_of(t) for t in texts} & {"blocked", "clear"},
+        ),
+        ("state", bool(gate) and levels),
+        ("run", has_role(name, "run") and not fractions),
+        ("gate", has_role(name, "gate") and not fractions),
+        ("index", has_role(name, "index") or counts(texts)),
+        ("state", levels and darkens),
+    )
+    return next((role for role, fits in rules if fits), "other")
+
+
+def _check(
+    columns: Sequence[TimerColumn],
     heading: Row,
     values: Sequence[list[str]],
-    separator: str,
-    unit: str | None,
+    table: Table,
     problems: ProblemList,
-) -> Columns:
-    columns = Columns()
-    durations, states = [], []
-    for n, cell in enumerate(heading.cells):
-        text = cell.text
-        texts = values[n] if n < len(values) else []
-        kind = _find_kind(text, texts)
-        meaning = _MEANINGS[kind]
-        if kind == "state":
-            states.append(n)
-        elif kind == "duration":
-            durations.append(cell)
-        elif kind in {"time", "time of an input", "moment"}:
-            power = _find_power(block, heading, n, texts, unit, problems)
-            dark = _DARKENS.search(text)
-            blocked = None if dark is None or kind == "moment" else not (dark[1] or dark[2])
-            label = "" if kind != "time of an input" else text if dark is None else _input(text)
-            columns.times.append(TimeColumn(n, power, label=label, blocked=blocked))
-            columns.row_is_run |= kind == "moment" or blocked is not None
-            meaning = f"times in {_SYMBOLS[power]}"
-        elif kind == "volts":
-            columns.volts[n] = text
-        elif kind == "level":
-            columns.levels[n] = text
-        elif kind in {"edge", "channel", "run"}:
-            setattr(columns, kind, n)
-        elif kind == "other" and (text or texts):
-            columns.unused.append(_name(heading, n))
-            _check_unused(heading.line, cell, texts, problems)
-        if text or texts:
-            columns.meanings[_name(heading, n)] = meaning
-    columns.derived = bool(columns.unused)
-    _join_row(columns, heading, values, separator)
-    _pair_states(columns, heading, states, len(heading.cells))
-    _check_gate(columns, heading, values, problems)
-    _keep_finest(columns, heading, block, separator)
-    if not (columns.times or columns.levels or columns.volts):
-        if durations:
-            cell = durations[0]
-            problems.add(heading.line, cell.column, "", "durations", numbers=repr(cell.text))
-        else:
-            problems.add(heading.line, heading.cells[0].column, "", "no_time_column")
-    return columns
-
-
-def _check_unused(line: int, cell: TableCell, texts: Sequence[str], problems: ProblemList) -> None:
-    """Leave nothing out that may say what an edge is of."""
-    if not _DERIVED.search(cell.text) and _few_whole(texts):
-        _refuse_to_guess(line, cell, "the gate or the run of a row, or its state", problems)
-
-
-def _refuse_to_guess(line: int, cell: TableCell, readings: str, problems: ProblemList) -> None:
-    values = {"column": cell.text, "readings": readings}
-    problems.add(line, cell.column, cell.text, "ambiguous", **values)
-
-
-def _check_gate(
-    columns: Columns, heading: Row, values: Sequence[list[str]], problems: ProblemList
 ) -> None:
-    """Do not guess whether a lone column of 0 and 1 is a gate's number or its state."""
-    n = columns.channel
-    stated = columns.edge is not None or any(column.state is not None for column in columns.times)
-    if n is not None and not stated and set(values[n]) <= {"0", "1"}:
-        cell = heading.cells[n]
-        _refuse_to_guess(heading.line, cell, "a gate's number or its state", problems)
-
-
-def _find_kind(text: str, texts: Sequence[str]) -> str:
-    """What a column is, by its heading and its values."""
-    levels = _levels(texts)
-    match = _UNIT.search(text)
-    timed = match is not None and (match[1] or "").lower() in UNITS
-    by_heading = (
-        ("time of an input", _DARKENS, timed and not levels),
-        ("moment", _MOMENT, timed and not levels),
-        ("state", _STATE, True),
-        ("duration", _DURATION, True),
-        ("time", _TIME, True),
-        ("time of an input", _CHANNEL, timed and not levels),
-        ("edge", _EDGE, levels),
-        ("volts", _VOLTS, True),
-        ("volts", _SCOPE, _fractions(texts)),
-        ("level", _INPUT, levels),
-        ("run", _NUMBERED_RUN, _all_whole(texts)),
-        ("state", _CHANNEL, levels and not _digits(texts)),  # a gate that is blocked or clear
-        ("channel", _CHANNEL, bool(texts) and not _fractions(texts)),
-        ("counter", _COUNTER, True),
-    )
-    for kind, pattern, fits in by_heading:
-        if fits and pattern.search(text):
-            return kind
-    return "counter" if _counts(texts) else "other"
-
-
-def _name(heading: Row, n: int) -> str:
-    return heading.cells[n].text or f"column {n + 1}"
-
-
-def _input(text: str) -> str:
-    """Find the name of an input in a heading that says more."""
-    match = _ANY_INPUT.search(text)
-    return match[0] if match else text
-
-
-def _join_row(columns: Columns, heading: Row, values: Sequence[list[str]], separator: str) -> None:
-    """Find out whether times that stand side by side are one drop: a row each, gate after gate."""
-    times = columns.times
-    numbered = all(time.label or _NUMBERED.search(heading.cells[time.at].text) for time in times)
-    if len(times) < 2 or columns.channel is not None or not numbered or columns.row_is_run:
-        return
-    if any(_RUN.search(heading.cells[time.at].text) for time in times):
-        return
-    down = all(_rises(values[time.at], separator) for time in times)
-    if columns.run is None and (down and len(values[times[0].at]) > 1):
-        return
-    columns.row_is_run = True
-    for time in times:
-        time.label = time.label or heading.cells[time.at].text
-
-
-def _pair_states(columns: Columns, heading: Row, states: Sequence[int], width: int) -> None:
-    """Give each column of times the states that stand behind it, or before the first."""
-    paired: list[TimeColumn] = []
-    for column, end in pairwise([*columns.times, None]):
-        assert column is not None
-        behind = [n for n in states if column.at < n < (width if end is None else end.at)]
-        before = [n for n in states if n < column.at] if column is columns.times[0] else []
-        beside = [*behind, *before]
-        if len(beside) < 2:
-            column.state = beside[0] if beside else None
-            paired.append(column)
-            continue
-        # One clock, and a column of states for each input.
-        names = [heading.cells[n].text for n in beside]
-        short = [_input(name) for name in names]
-        labels = short if len(set(short)) == len(short) else names
-        paired += [TimeColumn(column.at, column.power, n, label)
-                   for n, label in zip(beside, labels, strict=True)]  # fmt: skip
-    columns.times = paired
-
-
-def _keep_finest(columns: Columns, heading: Row, block: RowBlock, separator: str) -> None:
-    """Of columns that say the same times in other units, keep the finest."""
-    if len({column.power for column in columns.times}) < 2:
-        return
-    finest = max(columns.times, key=lambda column: column.power)
-    coarser = [column for column in columns.times if column is not finest]
-    if all(_same_times(column, finest, block, separator) for column in coarser):
-        state = next((column.state for column in columns.times if column.state is not None), None)
-        columns.times = [TimeColumn(finest.at, finest.power, state)]
-        # First these: with like headings, what the finest one is stays.
-        columns.meanings |= {
-            _name(heading, column.at): "the same times, coarser; not used" for column in coarser
-        } | {_name(heading, finest.at): f"times in {_SYMBOLS[finest.power]}"}
-
-
-def _same_times(first: TimeColumn, second: TimeColumn, block: RowBlock, separator: str) -> bool:
-    for row in block.rows[:20]:
-        if max(first.at, second.at) >= len(row.cells):
-            return False
-        texts = row.cells[first.at].text, row.cells[second.at].text
-        if not all(is_number(text, separator) for text in texts):
-            continue
-        a, b = (float(text.replace(",", ".")) for text in texts)
-        if abs(a * 10.0**-first.power - b * 10.0**-second.power) > 3.0 * 10.0**-first.power:
-            return False
-    return True
-
-
-def _find_power(
-    block: RowBlock,
-    heading: Row,
-    n: int,
-    texts: Sequence[str],
-    stated: str | None,
-    problems: ProblemList,
-) -> int:
-    """Decimal power from seconds: by the heading, a row of units below it, or as stated."""
-    cell = heading.cells[n]
-    text = _RUN.sub("", cell.text).strip()
-    for match in _UNIT.finditer(text):
-        unit = next(word for word in match.groups() if word).lower()
-        if unit in UNITS:
-            return UNITS[unit]
-        if match[1]:
-            accepted = "a unit of time: s, ms, µs or ns"
-            problems.reject(heading.line, cell.column, "time", unit, accepted)
-            return 0
-    if text.lower() in {"micros", "millis"}:
-        return UNITS[text.lower()]
-    below = [
-        row.cells[n].text.strip("()[] ").lower()
-        for row in block.headings
-        if row.line > heading.line and n < len(row.cells)
-    ]
-    unit = next((word for word in below if word in UNITS), stated or "")
-    if unit:
-        return UNITS[unit]
-    return _guess(texts, heading.line, cell.column, problems)
-
-
-def _guess(texts: Sequence[str], line: int, column: int, problems: ProblemList) -> int:
-    """Take times without a unit for seconds, but not whole numbers that run into thousands."""
-    if texts and all(re.fullmatch(r"[+-]?[0-9]+", text) for text in texts):
-        span = abs(int(texts[-1]) - int(texts[0]))
-        if span > 100:
-            problems.add(line, column, "time", "unit_missing")
-    return 0
+    """Refuse what may be this or that, and a table without times."""
+    stated = any(column.role in {"edge", "state"} for column in columns)
+    for column in columns:
+        texts = values[column.at]
+        place = heading.line, table.column(heading.line, column.at), column.name
+        readings = ""
+        if column.role == "gate" and not stated and set(texts) <= {"0", "1"}:
+            readings = "a gate's number or its state"
+        elif column.role == "other" and not has_role(column.name, "derived") and _is_few(texts):
+            readings = "the gate or the run of a row, or its state"
+        if readings:
+            problems.add(*place, "ambiguous", column=column.name, readings=readings)
+        named = unit_of(column.name)
+        if column.role == "time" and named not in {*POWERS, ""} and not find_label(named, "gate"):
+            problems.reject(*place[:2], "time", named, "a unit of time: s, ms, µs or ns")
 
 
 def _by_values(
-    block: RowBlock,
-    values: Sequence[list[str]],
-    separator: str,
-    unit: str | None,
-    problems: ProblemList,
-) -> Columns:
-    """Without a heading: one column of times, and others that can be nothing else."""
-    columns = Columns()
+    block: RowBlock, values: Sequence[list[str]], table: Table, problems: ProblemList
+) -> list[TimerColumn]:
+    """Without a heading: a column of times, and others that can be nothing else."""
     first = block.rows[0]
-    if block.headings and not all(len(row.cells) == 1 for row in block.headings):
-        last = block.headings[-1]
-        problems.add(last.line, last.cells[0].column, "", "no_time_column")
-        return columns
-    rest = [n for n, texts in enumerate(values) if not _counts(texts) or len(values) == 1]
-    times = [n for n in rest if not _levels(values[n]) and _rises(values[n], separator)]
-    if len(values) == 1:
-        times = [0]
-    fractional = [n for n in times if _fractions(values[n])]
+    filled = [n for n, texts in enumerate(values) if texts]
+    for row in block.headings:  # one that says nothing
+        named = [n for n, text in enumerate(row.texts) if text and not is_value(text)]
+        if named == filled and len(named) > 1:
+            problems.add(row.line, table.column(row.line, 0), "", "no_time_column")
+            return []
+    rest = [n for n in filled if not counts(values[n]) or len(filled) == 1]
+    times = [n for n in rest if not has_levels(values[n]) and rises(values[n], table)]
+    fractional = [n for n in times if any(set(text) & set(".,") for text in values[n])]
     times = fractional if len(fractional) == 1 else times
-    if len(values) == 2 and not times:
-        times = [0]  # whatever is wrong with it is said where it is read
-    beside = [n for n in rest if n not in times]
-    states = [n for n in beside if _levels(values[n])] if len(times) == 1 else []
-    gates = [n for n in beside if n not in states and (_few_whole(values[n]) or _names(values[n]))]
-    if len(times) != 1 or len(states) > 1 or len(gates) > 1 or len(beside) > len(states + gates):
-        if len(values) == 2 and len(times) == 1 and not gates:
-            states = beside  # faults in it are said where they are read
-        else:
-            cell = first.cells[min(2, len(first.cells) - 1)]
-            problems.add(first.line, cell.column, "", "no_heading", columns=len(first.cells))
-            return columns
-    (at,) = times
-    cell = first.cells[at]
-    power = UNITS[unit] if unit else _guess(values[at], first.line, cell.column, problems)
-    # 0 and 1 beside a gate's number are levels: which one is dark is not said.
-    state = states[0] if states else None
-    signal = bool(states and gates) and not set(map(str.lower, values[states[0]])) <= _STATES
-    columns.times = [TimeColumn(at, power, None if signal else state)]
-    columns.edge = state if signal else None
-    columns.channel = gates[0] if gates else None
-    names = {at: f"times in {_SYMBOLS[power]}"}
-    names |= dict.fromkeys(gates, "which gate") | dict.fromkeys(states, "states")
-    for n in range(len(values)):
-        columns.meanings[f"column {n + 1}"] = names.get(n, "counts rows, not used")
+    if len(filled) == 1 or (len(filled) == 2 and not times):
+        times = filled[:1]  # whatever is wrong with it is said where it is read
+    columns = [TimerColumn(n, f"column {n + 1}", _plain_role(n, values, times)) for n in filled]
+    if len(filled) == 2 and len(block.rows) < 4 and times:
+        for column in columns:
+            column.role = "time" if column.at in times else "state"
+    roles = [column.role for column in columns]
+    if (
+        "other" in roles
+        or [roles.count(r) > 1 for r in ("time", "state", "gate")] != [False] * 3
+        or ("time" not in roles)
+    ):
+        at = filled[min(2, len(filled) - 1)]
+        problems.add(first, table.column(first, at), "", "no_heading", columns=len(filled))
+    labels = [find_label(text, "gate") for row in block.headings for text in row.texts]
+    for column in columns:
+        column.power = None if column.role == "time" else 0
+        if column.role == "volts":
+            column.gate = next(filter(None, labels), "")
+        # 0 and 1 beside a gate's number are levels: which of them is dark is not said.
+        digits = {state_of(text) for text in values[column.at]} <= {"one", "zero", "high", "low"}
+        if column.role == "state" and "gate" in roles and digits:
+            column.role = "edge"
     return columns
 
 
-def _levels(texts: Sequence[str]) -> bool:
+def _plain_role(n: int, values: Sequence[list[str]], times: Sequence[int]) -> str:
+    texts = values[n]
+    rules = (
+        ("time", n in times),
+        ("index", counts(texts)),
+        ("state", has_levels(texts)),
+        ("gate", _is_few(texts) or not any(map(is_number, texts))),
+        ("volts", len(texts) > 30),
+    )
+    return next((role for role, fits in rules if fits), "other")
+
+
+def _leave_out_coarser(
+    columns: Sequence[TimerColumn], values: Sequence[list[str]], table: Table
+) -> None:
+    """Of columns that say the same times in other units, keep the finest."""
+    times = [column for column in columns if column.role == "time" and column.power is not None]
+    finest = max(times, key=lambda column: column.power or 0, default=None)
+    for column in times:
+        if finest is None or column.power == finest.power:
+            continue
+        least = 10.0 ** -(column.power or 0)
+        ratio = 10.0 ** -(finest.power or 0)
+        pairs = list(zip(values[column.at][:20], values[finest.at][:20], strict=False))
+        if pairs and all(
+            is_number(a)
+            and is_number(b)
+            and abs(as_float(a, table) * least - as_float(b, table) * ratio) < 3.0 * least
+            for a, b in pairs
+        ):
+            column.role = "coarse"
+
+
+def as_float(text: str, table: Table) -> float:
+    """Return a number."""
+    return float(table.with_point(text))
+
+
+def _plain_power(texts: Sequence[str]) -> int | None:
+    """Return the power of times without a unit: fractions are seconds, and small whole numbers."""
+    if not all(re.fullmatch(r"[+-]?[0-9]{1,30}", text) for text in texts):
+        return 0
+    return 0 if abs(int(texts[-1]) - int(texts[0])) <= 100 else None
+
+
+def has_levels(texts: Sequence[str]) -> bool:
     """Whether a column holds two states, or levels, and nothing else."""
-    states = BLOCKED | CLEAR | RISING | FALLING | NO_LEVEL
-    return bool(texts) and all(as_state(text) in states for text in texts)
+    return bool(texts) and all(state_of(text) or text.casefold() in {"x", "z"} for text in texts)
 
 
-def _digits(texts: Sequence[str]) -> bool:
-    return all(text[:1].isdigit() for text in texts)
+def _is_few(texts: Sequence[str]) -> bool:
+    """Whether a column holds few different whole numbers, or names, again and again."""
+    whole = [text for text in texts if number_of(text) is not None and not set(text) & set(".,+-")]
+    return bool(texts) and len(whole) == len(texts) >= 2 * len(set(texts))
 
 
-def _all_whole(texts: Sequence[str]) -> bool:
-    return bool(texts) and all(_WHOLE.fullmatch(text) for text in texts)
-
-
-def _names(texts: Sequence[str]) -> bool:
-    return bool(texts) and all(NAME_AND_NUMBER.fullmatch(text) for text in texts)
-
-
-def _few_whole(texts: Sequence[str]) -> bool:
-    """Whether a column holds few different whole numbers, again and again."""
-    return _all_whole(texts) and len(texts) > 2 * len(set(texts))
-
-
-def _fractions(texts: Sequence[str]) -> bool:
-    return any("." in text or "," in text for text in texts)
-
-
-def _counts(texts: Sequence[str]) -> bool:
+def counts(texts: Sequence[str]) -> bool:
     """Whether a column counts its rows."""
-    if len(texts) < 2 or not all(re.fullmatch("[0-9]+", text) for text in texts):
+    if len(texts) < 2 or not all(re.fullmatch("[0-9]{1,9}", text) for text in texts):
         return False
     numbers = [int(text) for text in texts]
     return numbers[0] in {0, 1} and all(b - a == 1 for a, b in pairwise(numbers))
 
 
-def _rises(texts: Sequence[str], separator: str) -> bool:
-    if not texts or not all(is_number(text, separator) for text in texts):
+def rises(texts: Sequence[str], table: Table) -> bool:
+    """Whether a column is of numbers of which none is below that before."""
+    if not texts or not all(map(table.is_number, texts)):
         return False
-    numbers = [float(text.replace(",", ".")) for text in texts]
+    numbers = [as_float(text, table) for text in texts]
     return all(a <= b for a, b in pairwise(numbers))

@@ -5,26 +5,23 @@ Times are read as decimals and kept to the picosecond, so what a file says is wh
 
 from __future__ import annotations
 
-import csv
 import io
 import re
 from collections import defaultdict
 from fractions import Fraction
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import GATES
-from rig.files import read_input
 from rig.records import Drop, Edge
-from rig.timers.problems import Lines, ProblemList, refusal
+from rig.timers.problems import ProblemList
+from rig.timers.table import Table, read_content
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Mapping
 
 HEADER = ("run", "channel", "time_s", "state")
 TICK_HZ = 10**12
-MAX_BYTES = 200_000_000
 MAX_SPAN_S = 3600
 """A drop lasts half a second; an hour inside one run means a wrong unit or a wrong run."""
 
@@ -57,32 +54,15 @@ def read_edges(path: str | os.PathLike[str]) -> list[Drop]:
         Every fault of the file at its line and column (the first 50 of them).
     """
     problems = ProblemList(str(path))
-    table = _Table(problems)
     # Wrong bytes inside comments harm nobody; inside values they are reported as such.
     text = read_content(path, problems).decode("utf-8-sig", "replace")
-    for place, record in _records(Lines(io.StringIO(text, newline="")), problems):
-        table.add(place, record)
+    table = Table(text.splitlines(), ",")
+    reader = _RunReader(table, problems)
+    _read_rows(table, reader, problems)
     problems.raise_if_any()
-    if not table.runs:
+    if not reader.runs:
         problems.refuse(1, 1, "no_edges")
-    return [drop_of(run, edges) for run, edges in sorted(table.runs.items())]
-
-
-def read_content(path: str | os.PathLike[str], problems: ProblemList) -> bytes:
-    """Return the bytes of a file.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, or is far too large.
-    """
-    try:
-        size = Path(path).stat().st_size
-        if size > MAX_BYTES:
-            problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
-        return read_input(path)
-    except OSError as error:
-        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
+    return [drop_of(run, edges) for run, edges in sorted(reader.runs.items())]
 
 
 def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
@@ -115,70 +95,81 @@ def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | No
     return text.getvalue()
 
 
-class _Table:
-    """Checked rows by run, in picoseconds."""
+class _RunReader:
+    """Checks rows, and keeps them by run, in picoseconds."""
 
-    def __init__(self, problems: ProblemList) -> None:
+    def __init__(self, table: Table, problems: ProblemList) -> None:
         self.runs: defaultdict[int, list[Edge]] = defaultdict(list)
-        self._problems = problems
+        self._table, self._problems = table, problems
         self._last: dict[tuple[int, int], int] = {}
         self._span: dict[int, tuple[int, int]] = {}
 
-    def add(self, place: _Place, record: list[str]) -> None:
-        run = place.read_whole(record, 0, range(1, 10**9), "a run: a whole number from 1")
-        channel = place.read_whole(record, 1, range(GATES), f"a channel: 0 to {GATES - 1}")
-        time = place.read_time(record, 2)
-        state = place.read_whole(record, 3, range(2), "a state: 1 is blocked, 0 is clear")
+    def add(self, line: int, texts: list[str]) -> None:
+        """Read a row of four values."""
+        run = self._read_whole(line, texts, 0, range(1, 10**9), "a run: a whole number from 1")
+        channels = range(GATES)
+        channel = self._read_whole(line, texts, 1, channels, f"a channel: 0 to {GATES - 1}")
+        time = picoseconds(texts[2])
+        if time is None or abs(time) >= 10**12 * TICK_HZ:
+            accepted = "a time of a drop in seconds"
+            self._note(line, 2, "not_accepted", text=texts[2], accepted=accepted)
+            time = None
+        state = self._read_whole(line, texts, 3, range(2), "a state: 1 is blocked, 0 is clear")
         if run is None or channel is None or time is None or state is None:
             return
         before = self._last.get((run, channel), time)
         if time < before:
             last = _seconds(before, Fraction(TICK_HZ))
-            place.add(2, "before_last", text=record[2], last=last, channel=channel, run=run)
+            values = {"text": texts[2], "last": last, "channel": channel, "run": run}
+            self._note(line, 2, "before_last", **values)
             return
         low, high = self._span.get(run, (time, time))
         low, high = min(low, time), max(high, time)
         if high - low > MAX_SPAN_S * TICK_HZ:
-            lasting = (high - low) / TICK_HZ
-            place.add(2, "too_long", recording=f"run {run}", lasting_s=lasting, limit_s=MAX_SPAN_S)
+            values = {"recording": f"run {run}", "lasting_s": (high - low) / TICK_HZ}
+            self._note(line, 2, "too_long", **values, limit_s=MAX_SPAN_S)
             return
         self._last[run, channel] = time
         self._span[run] = low, high
         self.runs[run].append(Edge(time, channel, state == 1))
 
+    def _note(self, line: int, at: int, code: str, **values: object) -> None:
+        self._problems.add(line, self._table.column(line, at), HEADER[at], code, **values)
 
-class _Place:
-    """Where a record stands, and the reading of its values."""
+    def _read_whole(
+        self, line: int, texts: list[str], at: int, limits: range, accepted: str
+    ) -> int | None:
+        if _WHOLE.fullmatch(texts[at]) and int(texts[at]) in limits:
+            return int(texts[at])
+        self._note(line, at, "not_accepted", text=texts[at], accepted=accepted)
+        return None
 
-    def __init__(self, lines: Lines, problems: ProblemList) -> None:
-        self._lines = lines
-        self._problems = problems
 
-    def add(self, field: int, code: str, **values: object) -> None:
-        """Note a fault of one value."""
-        lines = self._lines
-        self._problems.add(lines.number, lines.column(field), HEADER[field], code, **values)
-
-    def reject(self, field: int, text: str, accepted: str) -> None:
-        """Note a value that is not what is accepted there."""
-        self.add(field, "not_accepted", text=text, accepted=accepted)
-
-    def read_whole(self, record: list[str], field: int, limits: range, accepted: str) -> int | None:
-        """Read a whole number within limits."""
-        text = record[field]
-        if not _WHOLE.fullmatch(text) or int(text) not in limits:
-            self.reject(field, text, accepted)
-            return None
-        return int(text)
-
-    def read_time(self, record: list[str], field: int) -> int | None:
-        """Read a time in seconds as picoseconds, ties to even."""
-        text = record[field]
-        ticks = picoseconds(text)
-        if ticks is None or abs(ticks) >= 10**12 * TICK_HZ:
-            self.reject(field, text, "a time of a drop in seconds")
-            return None
-        return ticks
+def _read_rows(table: Table, reader: _RunReader, problems: ProblemList) -> None:
+    """Read the rows below the header; those of other shapes are noted."""
+    header, headed, quoted = ",".join(HEADER), False, False
+    for line, text in enumerate(table.lines, 1):
+        if not quoted and (not text.strip() or text.lstrip().startswith("#")):
+            continue
+        if text.count('"') % 2:
+            quoted = not quoted
+            if quoted:
+                problems.add(line, 1, "", "open_quote")
+            continue
+        texts = table.row(line).texts
+        if quoted:
+            continue
+        if not headed:
+            if tuple(value.lower() for value in texts) != HEADER:
+                problems.add(line, 1, "", "wrong_header", header=header)
+                return  # the values of a file of another kind would only make noise
+            headed = True
+        elif len(texts) != len(HEADER):
+            problems.add(
+                line, 1, "", "wrong_width", values=len(texts), needed=len(HEADER), header=header
+            )
+        else:
+            reader.add(line, texts)
 
 
 def picoseconds(text: str, power: int = 0) -> int | None:
@@ -196,35 +187,6 @@ def picoseconds(text: str, power: int = 0) -> int | None:
     digits, shift = int(integer + part), int(exponent or 0) - len(part) + 12 + power
     ticks = digits * 10**shift if shift >= 0 else round(Fraction(digits, 10**-shift))
     return -ticks if sign == "-" else ticks
-
-
-def _records(lines: Lines, problems: ProblemList) -> Iterator[tuple[_Place, list[str]]]:
-    """Yield data rows of four stripped values; the header and rows of other shapes are checked."""
-    place = _Place(lines, problems)
-    reader = csv.reader(lines, strict=True)
-    expected = ",".join(HEADER)
-    headed = False
-    while True:
-        lines.start_record()
-        try:
-            record = [value.strip() for value in next(reader)]
-        except StopIteration:
-            return
-        except csv.Error as error:
-            problems.add(lines.number, 1, "", "not_csv", text=str(error))
-            record = []
-        if lines.consumed > 1:
-            problems.add(lines.number, 1, "", "open_quote")
-        elif not headed and record:
-            if tuple(value.lower() for value in record) != HEADER:
-                problems.add(lines.number, 1, "", "wrong_header", header=expected)
-                return  # the values of a file of another kind would only make noise
-            headed = True
-        elif record and len(record) != len(HEADER):
-            values = {"values": len(record), "needed": len(HEADER), "header": expected}
-            problems.add(lines.number, 1, "", "wrong_width", **values)
-        elif record:
-            yield place, record
 
 
 def drop_of(run: int, edges: list[Edge]) -> Drop:

@@ -1,27 +1,26 @@
-"""Rows of a timer's table as passages: when, at which input, and whether it got dark."""
+"""Rows of a timer's table as passages: when, at which input, and whether the beam got dark."""
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import dataclass, field
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers.edges_csv import TICK_HZ, picoseconds
-from rig.timers.table import BLOCKED, CLEAR, FALLING, RISING, as_state, with_point
+from rig.timers.vocabulary import number_of, state_of
 
 if TYPE_CHECKING:
-    from rig.timers.columns import Columns, TimeColumn
-    from rig.timers.problems import ProblemList
-    from rig.timers.table import Row, TableCell
+    from collections.abc import Sequence
 
-MAX_SPAN_S = 60
-"""A drop lasts half a second, and nobody waits a minute until it is recorded."""
+    from rig.timers.columns import TimerColumn
+    from rig.timers.problems import ProblemList
+    from rig.timers.table import Row, RowBlock, Table
+
 _DAY_S = 86400
-PAUSE_S = 3
-"""Drops that stand one after the other are parted by more than this."""
 _DATE = re.compile(
-    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)"
+    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]{1,15})?)"
     r"(?:Z|[+-][0-9:]{4,6})?"
 )
 
@@ -39,136 +38,194 @@ class Passage(NamedTuple):
         Whether the beam is dark from then on; `None` where the file does not say.
     high
         Whether a signal is high from then on, where that is all that is said.
+    line
+        Of the file.
     """
 
     tick: int
     label: str
     blocked: bool | None = None
     high: bool | None = None
+    line: int = 0
 
 
 @dataclass(slots=True)
-class _Run:
-    """What was read of one run."""
+class Group:
+    """Passages that stand together: those of a run, or of a gate.
 
+    Attributes
+    ----------
+    name
+        What the file calls it; empty where nothing is said.
+    number
+        Of the run, where the file says it; else 0.
+    """
+
+    name: str = ""
+    number: int = 0
     passages: list[Passage] = field(default_factory=list)
-    last: dict[str, int] = field(default_factory=dict)
-    states: dict[str, bool] = field(default_factory=dict)
 
 
-class PassageRows:
-    """Reads rows of passages, run by run."""
+class _Stream(NamedTuple):
+    """A column of times with the column that says what they did; of an input, and of a run."""
 
-    def __init__(self, columns: Columns, separator: str, problems: ProblemList) -> None:
-        self._columns = columns
-        self._separator = separator
-        self._problems = problems
-        self._runs: dict[tuple[int, int], _Run] = {}
-        self._backwards = 0
-        self._rows = 0
-        self._drops = 0
+    time: TimerColumn
+    state: TimerColumn | None
+    label: str
+    run: str
 
-    def runs(self) -> list[tuple[int, list[Passage]]]:
-        """Return each run's number, 0 where rows have none, and its passages."""
-        return [(key[0], run.passages) for key, run in sorted(self._runs.items()) if run.passages]
 
-    @property
-    def up_and_down(self) -> bool:
-        """Whether so many times are before those above them that they are none."""
-        return self._backwards > 1 and self._backwards * 4 > self._rows
+def streams_of(columns: Sequence[TimerColumn]) -> list[_Stream]:
+    """Give each column of times the states that belong to it: of its run, and of its input."""
+    streams = []
+    all_times = [column for column in columns if column.role == "time"]
+    for time in all_times:
+        beside = [other for other in all_times if other.run == time.run]
+        states = [c for c in columns if c.role == "state" and (
+            c.run == time.run or not c.run or not time.run)]  # fmt: skip
+        if len(beside) > 1:
+            like = [state for state in states if time.gate and state.gate == time.gate]
+            nearest = {min(beside, key=lambda t: (t.at > s.at, abs(t.at - s.at))).at: s
+                       for s in states}  # fmt: skip
+            states = like or [state for at, state in nearest.items() if at == time.at]
+        if len(states) < 2:
+            state = next(iter(states), None)
+            label = time.gate or (state.gate if state and len(beside) > 1 else "")
+            plain = state is None and time.blocked is None and not time.run
+            if plain and label and label in time.name:
+                label = time.name
+            streams.append(_Stream(time, state, label, time.run))
+        else:
+            streams += [_Stream(time, state, state.gate or state.name, time.run or state.run)
+                        for state in states]  # fmt: skip
+    return streams
 
-    def add(self, row: Row) -> None:
-        """Read one row; runs that ended earlier have blanks."""
-        columns = self._columns
-        number = self._read_whole(row, columns.run, "run")
-        if columns.row_is_run:
-            key = (number, self._drops)
-            self._drops += 1
-            for column in columns.times:
-                if not self._never(row, column):
-                    self._time(row, column, key, column.label)
+
+class RowReader:
+    """Reads the rows of passages of a block, run by run.
+
+    Attributes
+    ----------
+    groups
+        What was read, by run.
+    silent
+        Lines that only say that nothing changes.
+    """
+
+    def __init__(
+        self, block: RowBlock, columns: Sequence[TimerColumn], table: Table, problems: ProblemList
+    ) -> None:
+        roles = {column.role: column.at for column in columns}
+        self.groups: dict[object, Group] = {}
+        self.silent: set[int] = set()
+        self._run, self._gate, self._edge = roles.get("run"), roles.get("gate"), roles.get("edge")
+        self._streams = streams_of(columns)
+        self._table, self._problems = table, problems
+        self._states: dict[tuple[object, str], bool] = {}
+        self._several = len(self._streams) > 1 and any(s.state for s in self._streams)
+        self._row_is_run = self._is_row_a_run(block)
+        for line in block.rows:
+            self._read_row(table.row(line))
+
+    def _is_row_a_run(self, block: RowBlock) -> bool:
+        """Whether times that stand side by side are one drop: a row each, gate after gate."""
+        times = [stream.time for stream in self._streams]
+        if len(times) < 2 or self._gate is not None or any(s.state for s in self._streams):
+            return False
+        if any(time.run for time in times) or self._edge is not None:
+            return False
+        if not all(time.gate or time.numbered or time.blocked is not None for time in times):
+            return False
+        if len(block.rows) == 1 or self._run is not None:
+            return True
+        firsts = [self._table.row(line).cell(times[0].at) for line in block.rows]
+        ticks = [picoseconds(self._table.with_point(text)) or 0 for text in firsts if text]
+        return any(time.numbered and not time.gate for time in times) or ticks != sorted(ticks)
+
+    def _read_row(self, row: Row) -> None:
+        number = self._whole(row, self._run)
+        for stream in self._streams:
+            text = row.cell(stream.time.at)
+            if not text or text.casefold() == "nan":
+                continue
+            label = stream.label if self._gate is None else row.cell(self._gate)
+            key: tuple[object, ...] = (number, stream.run)
+            if self._row_is_run:
+                never = (
+                    stream is not self._streams[0]
+                    and picoseconds(self._table.with_point(text)) == 0
+                )
+                if never:  # a zero after others: nothing was there
+                    continue
+                key, label = (
+                    (number, row.line),
+                    stream.label
+                    or (
+                        stream.time.name
+                        if stream.time.numbered and stream.time.name[:1] in "tTZ"
+                        else ""
+                    ),
+                )
+            elif not label and not stream.run:
+                key = (number, stream.time.at)
+            run = stream.run
+            group = self.groups.setdefault(key, Group(run, number or number_of(run) or 0))
+            self._add(row, stream, text, label, group)
+
+    def _add(self, row: Row, stream: _Stream, text: str, label: str, group: Group) -> None:
+        time = moment(text, self._table, stream.time.power or 0)
+        if time is None or abs(time) >= 10**24:
+            self._reject(row, stream.time.at, "time", "a time that a drop can have")
             return
-        label = self._label(row)
-        for beside, column in enumerate(columns.times):
-            if column.label:  # side by side stand inputs, and not runs
-                self._time(row, column, (number, 0), column.label)
-            else:
-                self._time(row, column, (number, beside), label)
-
-    def _time(self, row: Row, column: TimeColumn, key: tuple[int, int], label: str) -> None:
-        cell = row.cell(column.at)
-        if not cell.text or cell.text.lower() == "nan":
-            return
-        time = moment(cell.text, self._separator, column.power)
-        if time is None or abs(time) >= 10**12 * TICK_HZ:
-            self._refuse(row, cell, "time", "a time that a drop can have")
-            return
-        blocked, high = column.blocked, None
-        if column.state is not None:
-            state = row.cell(column.state)
-            if column.label and not state.text:
+        blocked, high = stream.time.blocked, None
+        if stream.state is not None:
+            said = row.cell(stream.state.at)
+            if self._several and not said:
                 return  # another input's row
-            blocked = _read_state(state.text, BLOCKED, CLEAR)
+            blocked = _is_yes(said, "blocked", "clear")
             if blocked is None:
-                self._refuse(row, state, "state", "a state: 1 or blocked, 0 or unblocked")
+                self._reject(row, stream.state.at, "state", "a state: 1 or blocked, 0 or unblocked")
                 return
-        elif self._columns.edge is not None:
-            edge = row.cell(self._columns.edge)
-            high = _read_state(edge.text, RISING, FALLING)
+            # Where each row has the states of all inputs, most of them are as they were.
+            whole = self._several and all(
+                row.cell(s.state.at) for s in self._streams if s.state and s.run == stream.run
+            )
+            before = self._states.get((id(group), label), False)
+            self._states[id(group), label] = blocked
+            begins = not group.passages and not blocked and time == 0
+            if (whole and before is blocked) or begins:
+                self.silent.add(row.line)
+                return
+        elif self._edge is not None:
+            high = _is_yes(row.cell(self._edge), "high", "low")
             if high is None:
-                self._refuse(row, edge, "edge", "an edge: rising or falling")
+                self._reject(row, self._edge, "edge", "an edge: rising or falling")
                 return
-        run = self._runs.setdefault(key, _Run())
-        if column.state is not None and column.label and not self._changes(run, label, blocked):
-            return
-        before = run.last.get(label, time)
-        lasting_s = (time - run.passages[0].tick) / TICK_HZ if run.passages else 0.0
-        if lasting_s > _DAY_S:
+        lasting_s = abs(time - group.passages[0].tick) / TICK_HZ if group.passages else 0.0
+        if stream.time.power is not None and lasting_s > _DAY_S:
             values = {"recording": "the recording", "lasting_s": lasting_s, "limit_s": _DAY_S}
-            self._problems.add(row.line, cell.column, "time", "too_long", **values)
-            return
-        self._rows += 1
-        if time < before:
-            self._backwards += 1
-            self._problems.add(row.line, cell.column, "time", "backwards", text=cell.text)
-            return
-        run.last[label] = time
-        run.passages.append(Passage(time, label, blocked, high))
+            place = row.line, self._table.column(row.line, stream.time.at), "time"
+            self._problems.add(*place, "too_long", **values)
+        group.passages.append(Passage(time, label, blocked, high, row.line))
 
-    def _never(self, row: Row, column: TimeColumn) -> bool:
-        """Whether a time side by side was never reached: a zero after others."""
-        zero = picoseconds(with_point(row.cell(column.at).text, self._separator)) == 0
-        return zero and column is not self._columns.times[0]
-
-    @staticmethod
-    def _changes(run: _Run, label: str, blocked: bool | None) -> bool:
-        """Whether an input's state is another one than above; beams begin clear."""
-        changes = run.states.get(label, False) is not blocked
-        run.states[label] = bool(blocked)
-        return changes
-
-    def _label(self, row: Row) -> str:
-        at = self._columns.channel
-        return "" if at is None else row.cell(at).text
-
-    def _read_whole(self, row: Row, at: int | None, key: str) -> int:
+    def _whole(self, row: Row, at: int | None) -> int:
         if at is None:
             return 0
-        cell = row.cell(at)
-        if not cell.text.isdecimal() or len(cell.text) > 6:
-            self._refuse(row, cell, key, "a whole number")
-            return 0
-        return int(cell.text)
+        number = number_of(row.cell(at))
+        if number is None:
+            self._reject(row, at, "run", "a whole number")
+        return number or 0
 
-    def _refuse(self, row: Row, cell: TableCell, key: str, accepted: str) -> None:
-        self._problems.reject(row.line, cell.column, key, cell.text, accepted)
+    def _reject(self, row: Row, at: int, key: str, accepted: str) -> None:
+        place = self._table.column(row.line, at)
+        self._problems.reject(row.line, place, key, row.cell(at), accepted)
 
 
-def moment(text: str, separator: str, power: int) -> int | None:
+def moment(text: str, table: Table, power: int) -> int | None:
     """Read a time as picoseconds: a number, or a date with its time of day."""
     match = _DATE.fullmatch(text)
     if match is None:
-        return picoseconds(with_point(text, separator), -power)
+        return picoseconds(table.with_point(text), -power)
     try:
         day = date.fromisoformat(match[1]).toordinal()
     except ValueError:
@@ -178,22 +235,40 @@ def moment(text: str, separator: str, power: int) -> int | None:
     return ((day * 24 + int(match[2])) * 60 + int(match[3])) * 60 * TICK_HZ + seconds
 
 
-def _read_state(text: str, yes: set[str], no: set[str]) -> bool | None:
-    text = as_state(text)
-    return True if text in yes else False if text in no else None
+def _is_yes(text: str, yes: str, no: str) -> bool | None:
+    state = state_of(text)
+    return True if state in {yes, "one"} else False if state in {no, "zero"} else None
 
 
-def split_at_pauses(passages: list[Passage]) -> list[list[Passage]]:
-    """Part drops that were recorded one after the other, at pauses longer than `PAUSE_S`.
+def split_at_jumps(group: Group, *, in_order: bool) -> list[Group]:
+    """Part what stands one below the other where the times of an input do not go on.
 
-    Only where all together last too long for one.
+    Parameters
+    ----------
+    in_order
+        Whether each row has a single time, so that a time before any above it begins anew; gates
+        may stand one after the other all the same.
     """
-    ordered = sorted(passages, key=lambda passage: passage.tick)
-    if ordered[-1].tick - ordered[0].tick <= MAX_SPAN_S * TICK_HZ:
-        return [passages]
-    drops = [[ordered[0]]]
-    for passage in ordered[1:]:
-        if passage.tick - drops[-1][-1].tick > PAUSE_S * TICK_HZ:
-            drops.append([])
-        drops[-1].append(passage)
-    return drops
+    parts, last = [Group(group.name, group.number)], dict[str, int]()
+    for passage in group.passages:
+        latest = max(last.values(), default=0) if in_order else last.get(passage.label, 0)
+        if passage.label in last and passage.tick < latest:
+            parts.append(Group(group.name))
+            last = {}
+        last[passage.label] = passage.tick
+        parts[-1].passages.append(passage)
+    return parts
+
+
+def widest_pause(ticks: Sequence[int]) -> int:
+    """Return the pause, ps, at which drops one after the other are parted; 0 where there is none.
+
+    Between drops nothing passes for far longer than ever within one: the pauses in order, the
+    widest step from one to the next, by a factor of 3 at least, up to half a second or more.
+    """
+    pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
+    steps = [
+        (b / max(a, TICK_HZ // 1000), b) for a, b in itertools.pairwise(pauses) if 2 * b >= TICK_HZ
+    ]
+    ratio, pause = max(steps, default=(0.0, 0))
+    return pause if ratio >= 3.0 else 0

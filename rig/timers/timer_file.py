@@ -1,49 +1,38 @@
-"""Any other timer's file: what it is, the drops in it, and what had to be supposed.
+"""Any other timer's file: its passages, and what it leaves open.
 
 Loggers of photogates (tables of times, or of times and states), boards that print pin, edge and
 time, logic analysers (a column an input, or value change dumps) and oscilloscopes (volts). What a
-file does not say (which gate, which level is dark, what unit) is supposed where only one thing can
-be meant, told, and else asked of the caller.
+file does not say (which gate, which level is dark, which unit) is left to `rig.timers.layouts`.
 """
 
 from __future__ import annotations
 
-import re
+import itertools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rig.reasons import make_reason
-from rig.records import Edge
-from rig.timers.columns import columns_of
-from rig.timers.edges_csv import HEADER, TICK_HZ, drop_of
-from rig.timers.passages import MAX_SPAN_S, PAUSE_S, PassageRows, split_at_pauses
+from rig.timers.columns import TimerColumn, columns_of, has_levels
+from rig.timers.edges_csv import HEADER, TICK_HZ
+from rig.timers.passages import Group, RowReader, split_at_jumps
 from rig.timers.problems import ProblemList
-from rig.timers.samples import (
-    input_names,
-    level_passages,
-    sample_rate_hz,
-    sample_times,
-    volt_passages,
-)
-from rig.timers.table import is_number, lines_of, read_table, with_point
+from rig.timers.samples import SampleReader, input_names, time_base
+from rig.timers.table import read_lines, read_table
 from rig.timers.vcd import is_vcd, read_vcd
+from rig.timers.vocabulary import number_of, recognise_format
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Sequence
 
     from rig.reasons import Reason
-    from rig.records import Drop
-    from rig.timers.columns import Columns
-    from rig.timers.passages import Passage
     from rig.timers.table import RowBlock, Table
 
 MAX_COLUMNS = 200
 _HINT = (
     "accepted are run,channel,time_s,state; tables with a heading such as time (s), gate, state; "
-    "samples of inputs (0 and 1, or volts) with times; and value change dumps"
+    "samples of inputs (0 and 1, or volts) with times; and value change dumps; see "
+    "rig import --list-formats"
 )
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 
@@ -58,41 +47,44 @@ class TimerFile:
         In words.
     columns
         What each column was taken for, by its heading.
-    runs
-        Passages of each, by number.
+    groups
+        Passages of each run, or of each gate where these stand one below the other.
     begins
         The level that each input begins with, where samples say.
     period_s
         Of samples: no edge is known better than that; `None` for stamps.
+    has_unit
+        Whether the file says the unit of its times; without it they are read as seconds.
+    rows
+        Numbers of the lines of data.
+    silent
+        Of them, those that only say that nothing changes: samples, and states as they were.
     notes
-        What was assumed, a reason each.
+        What is to be said, a reason each.
     """
 
     kind: str
     columns: dict[str, str] = field(default_factory=dict)
-    runs: dict[int, list[Passage]] = field(default_factory=dict)
+    groups: list[Group] = field(default_factory=list)
     begins: dict[str, bool] = field(default_factory=dict)
     period_s: float | None = None
+    has_unit: bool = True
+    rows: list[int] = field(default_factory=list)
+    silent: set[int] = field(default_factory=set)
     notes: list[Reason] = field(default_factory=list)
 
     @property
     def labels(self) -> tuple[str, ...]:
         """What the file calls its inputs, in order; none where it does not say."""
-        labels = {passage.label for run in self.runs.values() for passage in run} - {""}
-        return tuple(sorted(labels, key=lambda label: (label_number(label) or 0, label)))
-
-    def add(self, passages: list[Passage], number: int = 0) -> None:
-        """Add a run, under its number or else the next one."""
-        if number < 1 or number in self.runs:
-            number = max(self.runs, default=0) + 1
-        self.runs[number] = passages
+        labels = {passage.label for group in self.groups for passage in group.passages} - {""}
+        return tuple(sorted(labels, key=lambda label: (number_of(label) or 0, label)))
 
 
 def is_edge_file(path: str | os.PathLike[str]) -> bool:
     """Whether a file has the heading of the project's own format, be it with faults."""
-    lines = lines_of(path)
+    lines = read_lines(path)
     first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
-    return first.lower().replace(" ", "").startswith(",".join(HEADER[:2]))
+    return first[:200].lower().replace(" ", "").startswith(",".join(HEADER[:2]))
 
 
 def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> TimerFile:
@@ -111,224 +103,123 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
         Every fault of the file at its line and column.
     """
     problems = ProblemList(str(path), _HINT)
-    lines = lines_of(path)
+    lines = read_lines(path)
     if is_vcd(lines):
         passages, begins, scale = read_vcd(lines, problems)
         problems.raise_if_any()
         file = TimerFile("a value change dump", begins=begins, period_s=scale / TICK_HZ)
-        if passages:
-            file.add(passages)
+        file.groups = [Group(passages=passages)]
+        file.rows = sorted({passage.line for passage in passages})
     else:
         table = read_table(lines)
         if not table.blocks:
             problems.refuse(1, 1, "no_edges")
-        file = _read_blocks(table, unit, problems)
-    _split_drops(file, problems)
+        name = recognise_format(lines)
+        file = TimerFile(
+            f"a table, its cells separated by {_SEPARATORS[table.separator]}"
+            + (f"; it looks like {name}" if name else "")
+        )
+        _read_blocks(file, table, unit, problems)
     problems.raise_if_any()
-    if not file.runs:
+    file.groups = [group for group in file.groups if group.passages]
+    if not file.groups:
         notes = "".join(f"; {note}" for note in file.notes)
         problems.refuse(1, 1, "nothing_passes", notes=notes)
     return file
 
 
-def _read_blocks(table: Table, unit: str | None, problems: ProblemList) -> TimerFile:
-    file = TimerFile(f"a table, its cells separated by {_SEPARATORS[table.separator]}")
-    columns: Columns | None = None
-    above = None
+def _read_blocks(file: TimerFile, table: Table, unit: str | None, problems: ProblemList) -> None:
+    above: RowBlock | None = None
     for block in table.blocks:
-        if not any(len(row.cells) > 1 or len(block.rows[0].cells) == 1 for row in block.headings):
-            block.headings = [*(above.headings if above else ()), *block.headings]
-        above = block
-        width = len(block.rows[0].cells)
+        width = max(len(table.row(line).texts) for line in block.rows[:50])
         if width > MAX_COLUMNS:
-            line = block.rows[0].line
+            line = block.rows[0]
             problems.refuse(line, 1, "too_many_columns", columns=width, limit=MAX_COLUMNS)
-        _named_inputs(block, table)
-        columns = columns_of(block, table.separator, unit, problems)
+        own = block.headings
+        if not any(len(row.texts) > 1 or width == 1 for row in own) or (
+            above is not None and not any(len(row.texts) == width for row in own)
+        ):
+            block.headings = [*own, *(above.headings if above else ())]
+        above = block
+        columns = _bare_levels(block, table) or columns_of(block, table, unit, problems)
         problems.raise_if_any()
-        file.columns |= columns.meanings
-        if columns.levels or columns.volts:
-            _samples(file, block, columns, table, problems)
+        file.columns |= {column.name: column.meaning for column in columns}
+        roles = {column.role for column in columns}
+        file.has_unit &= all(column.power is not None for column in columns)
+        file.rows += block.rows
+        if roles & {"level", "volts"}:
+            _add_samples(file, SampleReader(block, columns, table, problems), block)
+        elif "time" in roles:
+            _add_rows(file, block, columns, table, problems)
         else:
-            rows = PassageRows(columns, table.separator, problems)
-            for row in block.rows:
-                rows.add(row)
-            if rows.up_and_down:
-                numbers = "these numbers go up and down: they"
-                problems.refuse(block.rows[0].line, 1, "durations", numbers=numbers)
-            if columns.derived and _is_sampled(rows.runs(), columns):
-                unused = ", ".join(columns.unused)
-                problems.refuse(block.rows[0].line, 1, "regular_samples", columns=unused)
-            for number, passages in rows.runs():
-                file.add(passages, number)
-    assert columns is not None
-    if columns.unused:
-        file.notes.append(make_reason("columns_unused", columns=", ".join(columns.unused)))
-    return file
+            durations = [column.name for column in columns if column.role == "duration"]
+            heading = block.headings[0].line if block.headings else block.rows[0]
+            if durations:
+                numbers = repr(durations[0])
+                problems.refuse(heading, 1, "durations", numbers=numbers)
+            problems.refuse(heading, 1, "no_time_column")
+    file.rows = sorted([*file.rows, *table.strays])
 
 
-def _is_sampled(runs: Sequence[tuple[int, list[Passage]]], columns: Columns) -> bool:
-    """Whether all times are as far apart as in a recording at a fixed rate."""
-    if columns.edge is not None or any(column.state is not None for column in columns.times):
-        return False
-    times = [[passage.tick for passage in run] for _, run in runs if run[4:]]
-    steps = [step for ticks in times for step in np.diff(ticks).tolist()]
-    return bool(steps) and max(steps) < 1.5 * min(steps)
+def _bare_levels(block: RowBlock, table: Table) -> list[TimerColumn]:
+    """Return the columns of levels that have no names of their own, only a rate above."""
+    rows = [table.row(line).texts for line in block.rows[:200]]
+    bare = not block.headings or {t.lower() for t in block.headings[-1].texts} <= {
+        "logic",
+        "analog",
+    }
+    if not bare or time_base(block, table) is None or not all(map(has_levels, rows)):
+        return []
+    return [
+        TimerColumn(n, name, "level") for n, name in enumerate(input_names(table, len(rows[0])))
+    ]
 
 
-def _named_inputs(block: RowBlock, table: Table) -> None:
-    """Put the inputs' names that remarks list above columns of levels that have none."""
-    names = input_names(table.remarks)
-    width = len(block.rows[0].cells)
-    rate = sample_rate_hz(table.remarks)
-    bare = not block.headings or all(
-        text.lower() in {"logic", "analog"} for text in block.headings[-1].texts
-    )
-    if rate is None or not bare:
-        return
-    row = block.rows[0]
-    labels = names if len(names) == width else [f"D{n}" for n in range(width)]
-    block.headings = [
-        row._replace(cells=[c._replace(text=_input(name)) for c, name in zip(row.cells, labels,
-                                                                            strict=True)])
-    ]  # fmt: skip
-
-
-def _input(name: str) -> str:
-    """Write a name so that it reads as that of an input."""
-    return name if label_number(name) is not None else f"input {name}"
-
-
-def _samples(
-    file: TimerFile, block: RowBlock, columns: Columns, table: Table, problems: ProblemList
+def _add_rows(
+    file: TimerFile,
+    block: RowBlock,
+    columns: Sequence[TimerColumn],
+    table: Table,
+    problems: ProblemList,
 ) -> None:
-    """Find the passages in samples."""
-    rate = sample_rate_hz(table.remarks)
-    if not columns.times and rate is None:
-        problems.refuse(block.rows[0].line, 1, "no_rate", lacks="a column of times or a rate")
-    times = sample_times(block.rows, columns, table.separator, rate, problems)
+    reader = RowReader(block, columns, table, problems)
     problems.raise_if_any()
-    steps = np.diff(np.array(times, dtype=float)) / TICK_HZ
-    passages: list[Passage] = []
-    if columns.levels:
-        passages, begins = level_passages(block.rows, columns, times, problems)
-        file.begins |= begins
-        file.period_s = None if rate is None else 1.0 / rate
-    for at, heading in columns.volts.items():
-        volts = _volts(block, at, table.separator, problems)
-        problems.raise_if_any()
-        crossed = volt_passages(heading, times, volts)
-        if crossed is None:
-            low, high = float(volts.min()), float(volts.max())
-            file.notes.append(make_reason("no_passage", input=heading, low=low, high=high))
-            continue
-        crossings, file.begins[heading], middle = crossed
-        passages += crossings
-        level = {"input": heading, "level": float(middle)}
-        file.notes.append(make_reason("crossings", crossings=len(crossings), **level))
-        file.period_s = float(np.median(steps)) if steps.size else None
-    if passages:
-        file.add(passages)
+    file.silent |= reader.silent
+    stated = {"edge", "state", "gate", "run"} & {column.role for column in columns}
+    for group in reader.groups.values():
+        lines = [passage.line for passage in group.passages]
+        parts = split_at_jumps(group, in_order=len(set(lines)) == len(lines))
+        ticks = [passage.tick for passage in group.passages]
+        backwards = sum(b < a for a, b in itertools.pairwise(ticks))
+        if not stated and backwards > 1 and backwards * 4 > len(ticks):
+            numbers = "these numbers go up and down: they"
+            problems.refuse(block.rows[0], 1, "durations", numbers=numbers)
+        short = next((p for p in parts[1:] if len(p.passages) < 2), parts[-1])
+        if len(parts) > 1 and (len(short.passages) < 2 or len(parts[0].passages) < 2):
+            line = (short if short is not parts[0] else parts[1]).passages[0].line
+            at = next(column.at for column in columns if column.role == "time")
+            text = table.row(line).cell(at)
+            problems.add(line, table.column(line, at), "time", "backwards", text=text)
+        derived = [column.name for column in columns if column.role == "other"]
+        steps = [b - a for a, b in itertools.pairwise(ticks)]
+        if derived and not stated and len(steps) > 3 and max(steps) < 1.5 * min(steps):
+            problems.refuse(block.rows[0], 1, "regular_samples", columns=", ".join(derived))
+        mark = " ".join(block.headings[0].texts) if block.headings and not group.name else ""
+        for part in parts:
+            part.name = part.name or mark
+        file.groups += parts
+    derived = [column.name for column in columns if column.role == "other"]
+    if derived:
+        file.notes.append(make_reason("columns_unused", columns=", ".join(derived)))
 
 
-def _volts(
-    block: RowBlock, at: int, separator: str, problems: ProblemList
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    values = np.zeros(len(block.rows))
-    for n, row in enumerate(block.rows):
-        cell = row.cell(at)
-        if not is_number(cell.text, separator):
-            problems.reject(row.line, cell.column, "volts", cell.text, "a number of volts")
-            continue
-        values[n] = float(with_point(cell.text, separator))
-    return values
-
-
-def _split_drops(file: TimerFile, problems: ProblemList) -> None:
-    """Part drops that stand one after the other in one recording."""
-    parts = [part for run in file.runs.values() for part in split_at_pauses(run)]
-    if len(parts) > len(file.runs):
-        file.notes.append(make_reason("several_drops", drops=len(parts), pause_s=PAUSE_S))
-        file.runs = dict(enumerate(parts, 1))
-    for number, run in file.runs.items():
-        ticks = [passage.tick for passage in run]
-        span = (max(ticks) - min(ticks)) / TICK_HZ
-        if span > MAX_SPAN_S:
-            values = {"recording": f"run {number}", "lasting_s": span, "limit_s": MAX_SPAN_S}
-            problems.refuse(1, 1, "too_long", **values)
-
-
-def drops_of(
-    file: TimerFile, channels: Mapping[str, int], bars: int, dark: str | None = None
-) -> list[Drop]:
-    """Turn what was understood into drops.
-
-    Parameters
-    ----------
-    file
-        From `read_timer_file`.
-    channels
-        Of each label; of ``""`` where the file names no input.
-    bars
-        How many pass a gate: with no states given, more times than that are of darkening and
-        clearing in turn, and as many or fewer of darkening alone.
-    dark
-        Which level is that of a blocked beam, ``high`` or ``low``; beams are taken to be clear at
-        the beginning if not given.
-
-    Returns
-    -------
-    list of Drop
-        One a run, numbered from 1; as `rig.timers.edges_csv.read_edges` gives them.
-    """
-    high = _dark_is_high(file, dark)
-    drops = []
-    for number, run in sorted(file.runs.items()):
-        edges: list[Edge] = []
-        for label in dict.fromkeys(passage.label for passage in run):
-            if label in channels:
-                ours = [passage for passage in run if passage.label == label]
-                edges += _edges(ours, channels[label], bars, high)
-        if edges:
-            drops.append(drop_of(number, edges))
-    return drops
-
-
-def _dark_is_high(file: TimerFile, dark: str | None) -> bool:
-    """Whether a signal is high where the beam is blocked."""
-    signals = [passage for run in file.runs.values() for passage in run if passage.high is not None]
-    if not signals:
-        return True
-    if dark is None:
-        if file.begins:
-            moved = {passage.label for passage in signals}
-            starts = [high for label, high in file.begins.items() if label in moved]
-        else:  # edges: the first of a beam darkens it
-            first = {
-                (number, passage.label): passage.high
-                for number, run in file.runs.items()
-                for passage in sorted(run, key=lambda passage: -passage.tick)
-            }
-            starts = [high is False for high in first.values()]
-        dark, opposite = ("low", "high") if sum(starts) * 2 > len(starts) else ("high", "low")
-        file.notes.append(make_reason("blocked_level", level=dark, other=opposite))
-    return dark == "high"
-
-
-def _edges(run: Sequence[Passage], channel: int, bars: int, high: bool) -> Iterable[Edge]:
-    both = len(run) > bars
-    for n, passage in enumerate(run):
-        if passage.blocked is not None:
-            blocked = passage.blocked
-        elif passage.high is not None:
-            blocked = passage.high is high
-        else:
-            blocked = n % 2 == 0 if both else True
-        yield Edge(passage.tick, channel, blocked)
-
-
-def label_number(label: str) -> int | None:
-    """The number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3."""
-    text = re.sub(r"[\[(].*", "", label).strip()
-    match = re.search(r"([0-9]+)$", text)
-    return int(match[1]) if match else None
+def _add_samples(file: TimerFile, reader: SampleReader, block: RowBlock) -> None:
+    file.groups.append(Group(passages=reader.passages))
+    file.silent |= set(block.rows)
+    file.begins |= reader.begins
+    file.period_s = reader.step_s or None
+    for label, (low, high) in reader.idle.items():
+        file.notes.append(make_reason("no_passage", input=label, low=low, high=high))
+    for label, (count, level) in reader.crossings.items():
+        values = {"input": label, "level": level}
+        file.notes.append(make_reason("crossings", crossings=count, **values))

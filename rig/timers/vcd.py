@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
 
 _SCALE = re.compile(r"(1|10|100)\s*(s|ms|us|ns|ps|fs)")
+LONGEST = 30
+"""Digits of a time: more would be no number that a computer reads at once."""
 _PS = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3, "ps": 1, "fs": 0}
 
 
@@ -54,21 +56,28 @@ def read_vcd(
                            "$upscope", "$enddefinitions"}:  # fmt: skip
                 text, skipping = word, True
             elif skipping:
-                text += f" {word}"
+                text += f" {word:.200}"
             elif word[0] == "#" and word[1:].isdecimal():
-                at = int(word[1:]) * unit
-                if at < time:
-                    problems.add(number, 1, "time", "backwards", text=word)
-                time = at
+                time = _read_time(word, unit, time, number, problems)
             elif word[0] in "01" and word[1:] in names:
                 name, high = names[word[1:]], word[0] == "1"
                 if name in current and current[name] is not high:
-                    passages.append(Passage(time, name, None, high))
+                    passages.append(Passage(time, name, None, high, number))
                 first.setdefault(name, high)
                 current[name] = high
     if not unit:
         problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
     return passages, first, unit
+
+
+def _read_time(word: str, unit: int, last: int, line: int, problems: ProblemList) -> int:
+    if len(word) > LONGEST:
+        problems.reject(line, 1, "time", word, "a time that a drop can have")
+        return last
+    time = int(word[1:]) * unit
+    if time < last:
+        problems.add(line, 1, "time", "backwards", text=word)
+    return time
 
 
 def _note_wire(text: str, names: dict[str, str]) -> None:

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.timers.columns import as_float
 from rig.timers.problems import ProblemList
-from rig.timers.table import is_number, lines_of, read_table, with_point
+from rig.timers.table import read_lines, read_table
 
 if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
 
-    from rig.timers.table import Row
+    from rig.timers.table import Row, Table
 
     Array = NDArray[np.float64]
 
@@ -46,25 +47,24 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), _HINT)
-    table = read_table(lines_of(path))
+    table = read_table(read_lines(path))
     block = next(iter(table.blocks), None)
     heading = None if block is None else next(filter(_has_columns, reversed(block.headings)), None)
     if block is None or heading is None:
         problems.refuse(1, 1, "no_track")
     at = {name: _column(heading, name) for name in _NAMES}
-    scales = {name: _scale(heading, n, problems) for name, n in at.items()}
+    scales = {name: _scale(heading, n, table, problems) for name, n in at.items()}
     frames: list[list[float]] = []
-    for row in block.rows:
-        cells = {name: row.cell(n) for name, n in at.items()}
-        if any(cell.text.lower() in {"", "nan"} for cell in cells.values()):
+    for row in map(table.row, block.rows):
+        texts = {name: row.cell(n) for name, n in at.items()}
+        if any(text.lower() in {"", "nan"} for text in texts.values()):
             continue
-        for name, cell in cells.items():
-            if not is_number(cell.text, table.separator):
-                problems.reject(row.line, cell.column, name, cell.text, "a number")
-                break
-        else:
-            frames.append([scales[name] * float(with_point(cell.text, table.separator))
-                           for name, cell in cells.items()])  # fmt: skip
+        wrong = next((name for name, text in texts.items() if not table.is_number(text)), None)
+        if wrong is not None:
+            place = table.column(row.line, at[wrong])
+            problems.reject(row.line, place, wrong, texts[wrong], "a number")
+            continue
+        frames.append([scales[name] * as_float(text, table) for name, text in texts.items()])
     problems.raise_if_any()
     track = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)
     if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
@@ -80,15 +80,15 @@ def _column(heading: Row, name: str) -> int:
     return next(n for n, text in enumerate(heading.texts) if _NAMES[name].search(text))
 
 
-def _scale(heading: Row, at: int, problems: ProblemList) -> float:
-    cell = heading.cells[at]
-    match = re.search(r"[(\[/_]\s*([^\W\d_]+)", cell.text)
+def _scale(heading: Row, at: int, table: Table, problems: ProblemList) -> float:
+    text = heading.texts[at]
+    match = re.search(r"[(\[/_]\s*([^\W\d_]+)", text)
     if match is None:
         return 1.0
-    if match[1] not in _SCALES or (match[1] in {"s", "ms"}) is not cell.text[0].lower().startswith(
-        "t"
-    ):
+    is_time = text[0].lower() == "t"
+    if match[1] not in _SCALES or (match[1] in {"s", "ms"}) is not is_time:
         accepted = "a unit of this column: s, ms; m, cm, mm"
-        problems.reject(heading.line, cell.column, cell.text, match[1], accepted)
+        place = table.column(heading.line, at)
+        problems.reject(heading.line, place, text, match[1], accepted)
         return 1.0
     return _SCALES[match[1]]

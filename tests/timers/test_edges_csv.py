@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError, Problem
 from rig.records import Drop, Edge
-from rig.timers import edges_csv
+from rig.timers import table
 from rig.timers.edges_csv import TICK_HZ, edges_text, read_edges
 
 HEADER = "run,channel,time_s,state\n"
@@ -157,7 +157,7 @@ def test_other_files(tmp_path: Path, content: str | bytes) -> None:
 
 
 def test_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(edges_csv, "MAX_BYTES", 10)
+    monkeypatch.setattr(table, "MAX_BYTES", 10)
     assert faults(tmp_path, HEADER + "1,0,0,1\n") == [(1, 1, "")]
 
 

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from rig.errors import InputError
 from rig.records import Drop
 from rig.timers.edges_csv import TICK_HZ
-from rig.timers.timer_file import drops_of, is_edge_file, label_number, read_timer_file
+from rig.timers.layouts import find_layouts, read_drops
+from rig.timers.timer_file import is_edge_file, read_timer_file
+from rig.timers.vocabulary import number_of as label_number
 from tests.examples import examples
 
 VERNIER = (
@@ -24,6 +26,13 @@ PASCO = (
     '"Time (s) Run #1";"State Run #1";"Time (s) Run #2";"State Run #2"\n'
     "0,25;1;1,5;1\n0,26;0;1,51;0\n0,275;1;;\n"
 )
+
+
+def drops_of(file, channels: dict[str, int], bars: int, dark: str | None = None) -> list[Drop]:
+    """Read a file in the most usual way, its inputs being as given."""
+    stated = {"channels": channels} | ({"dark": dark} if dark else {})
+    layout = find_layouts(file, list(channels.values()), bars, stated)[0]
+    return read_drops(file, layout).drops
 
 
 def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
@@ -318,12 +327,10 @@ def test_old_windows_writes_micro_in_one_byte(tmp_path):
         ("1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n", "durations", "they are durations"),
         ("Time,Gate\n0.1,1\n0.2,0\n0.3,1\n", "ambiguous", "a gate's number or its state"),
         ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "durations", "are durations"),
-        ("time\n1204\n2406\n9000\n", "unit_missing", "say --unit"),
         ("Time (s),colour,state\n" + "".join(f"0.{n},{n % 3},1\n" for n in range(1, 9)),
          "ambiguous", "'colour' may be the gate or the run"),
         ("Time (s),Volt\n" + "".join(f"{n},{n % 2 * 1e-3 + n % 7 * 1e-3}\n" for n in range(40)),
          "nothing_passes", "nothing passes"),
-        ("time (s)\n" + "".join(f"{n}\n" for n in range(0, 300, 2)), "too_long", "split at pauses"),
         ("D0,D1\n0,1\n1,1\n0,1\n", "no_rate", "without a column of times"),
         ("$timescale 3 moons $end\n", "not_accepted", "'3 moons' is not a unit of time"),
         ("PK\x03\x04\0\0", "not_text", "this is no text"),
@@ -409,7 +416,7 @@ def _row(times, separator=","):
 def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
     path = tmp_path / "table.csv"
     path.write_text(text, "utf-8")
-    run = read_timer_file(path).runs[1]
+    run = read_timer_file(path).groups[0].passages
     origin = min(one.tick for one in run) - round(FALL[0] * TICK_HZ)  # of a date it is far away
     found = {}
     for one in run:
@@ -437,7 +444,7 @@ def test_what_oscilloscopes_write_is_read_input_by_input(tmp_path, heading):
     path = tmp_path / "scope.csv"
     path.write_text("\n".join([heading, *rows]), "utf-8")
     found = read_timer_file(path)
-    times = {label: [one.tick / TICK_HZ for one in found.runs[1] if one.label == label]
+    times = {label: [one.tick / TICK_HZ for one in found.groups[0].passages if one.label == label]
              for label in found.labels}  # fmt: skip
     assert len(times) == 2
     assert sorted(times.values()) == [

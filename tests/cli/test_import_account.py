@@ -1,0 +1,144 @@
+"""An import accounts for every row, asks what no fall decides, and saves how a file is read."""
+
+from __future__ import annotations
+
+import json
+import time
+import tracemalloc
+
+import pytest
+
+from rig.errors import InputError
+from rig.timers.timer_file import read_timer_file
+from tests.cli.lab import PROTOCOLS
+from tests.timers.shapes import RUNS, shapes
+
+BALL = PROTOCOLS / "falling-ball.yaml"
+
+
+@pytest.fixture
+def look(call, tmp_path):
+    def run(content, *more):
+        path = tmp_path / "file.txt"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return call("import", path, "--protocol", BALL, "--dry-run", *more)
+
+    return run
+
+
+def rows(edges, form="{c},{t:.6f},{d}\n"):
+    return "".join(form.format(t=t, c=c, d=int(d)) for t, c, d in edges)
+
+
+HEAD = "gate,time (s),state\n"
+
+
+def test_every_row_is_counted(look):
+    done = look(HEAD + rows(RUNS[0]))
+    assert done.code == 0, done.err
+    assert "1 runs, 8 rows: 8 edges" in done.err
+    assert "8 of 8 edges where a fall puts them; g 9.8" in done.out
+
+
+def test_rows_that_are_not_used_are_an_error_unless_they_are_allowed(look):
+    content = HEAD + rows(RUNS[0]) + "7,0.8,1\n7,0.81,0\n"
+    options = ("--map", "0=0,1=1,2=2,3=3")
+    done = look(content, *options)
+    assert done.code == 2
+    assert "2 of 10 rows unused: lines 10, 11" in done.err
+    done = look(content, *options, "--allow-unused")
+    assert done.code == 0
+    assert "8 edges; 2 rows unused: lines 10, 11" in done.err
+
+
+def test_a_gate_that_the_file_lacks_is_said(look):
+    done = look(HEAD + rows(edge for edge in RUNS[0] if edge[1] != 2))
+    assert done.code == 0, done.err
+    assert "the file has nothing of the gates at channels 2" in done.err
+
+
+def test_more_edges_than_the_object_makes_are_refused(look):
+    content = HEAD + rows((t, 1, d) for t, _, d in RUNS[0])
+    assert look(content).code == 2
+    assert look(content, "--as-read").code == 0
+
+
+def test_what_no_fall_decides_is_asked_with_the_line_to_add(look):
+    content = "time (s)\n0.1\n0.2\n0.35\n0.9\n"
+    done = look(content)
+    assert done.code == 2
+    assert "--map 'dark=" in done.err
+
+
+@pytest.mark.parametrize("name", ["Gates below each other", "Milliseconds without a unit"])
+def test_what_the_dry_run_prints_is_accepted(look, tmp_path, name):
+    content = shapes()[name].content
+    saved = tmp_path / "map.json"
+    first = look(content, "--map-file", saved)
+    assert first.code == 0, first.err
+    (printed,) = [line for line in first.out.splitlines() if line.startswith("--map ")]
+    runs = [line for line in first.out.splitlines() if line.startswith("run ")]
+    for again in (
+        look(content, "--map", printed.split("'")[1]),
+        look(content, "--map-file", saved),
+    ):
+        assert again.code == 0, again.err
+        assert [line for line in again.out.splitlines() if line.startswith("run ")] == runs
+
+
+@pytest.mark.parametrize(
+    "content",
+    [[], {"unit": "parsec"}, {"dark": "grey"}, {"unit": 3}, {"unit": []}, {"channels": {"a": "b"}},
+     {"pause_s": True}, {"colour": 1}, 7, None],
+)  # fmt: skip
+def test_a_map_file_of_another_content_is_refused(look, tmp_path, content):
+    path = tmp_path / "map.json"
+    path.write_text(json.dumps(content), "utf-8")
+    done = look(HEAD + rows(RUNS[0]), "--map-file", path)
+    assert done.code == 2
+    assert done.err.startswith(f"{path}: ")
+    assert "accepted: " in done.err
+    path.write_bytes(b"\xff{")
+    assert look(HEAD + rows(RUNS[0]), "--map-file", path).code == 2
+
+
+def test_known_formats_are_listed(call):
+    done = call("import", "--list-formats")
+    assert done.code == 0
+    assert "Siglent SDS oscilloscope: " in done.out
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "0.323\n0 1.5\n1 1.6\n0 1.7\n",
+        "$timescale 1 us $end\n$enddefinitions $end\n#" + "9" * 5000 + "\n",
+        "1" * 20_000 + "\n",
+        "gate 1 blocked at " + "1" * 20_000 + "\n" + "gate 1 blocked at 12 us\n",
+        "time (s),state\n" + "1" * 20_000 + ",1\n0.2,0\n",
+        "a=" * 10_000 + "\n",
+        ",".join("1" * 20_000) + "\n",
+    ],
+)
+def test_a_hostile_file_is_read_or_refused_at_once(tmp_path, content):
+    path = tmp_path / "file"
+    path.write_text(content, "utf-8")
+    start = time.process_time()
+    with pytest.raises(InputError):
+        read_timer_file(path)
+    assert time.process_time() - start < 1.0
+
+
+def test_samples_are_read_within_a_second_and_little_memory_for_each_megabyte(tmp_path):
+    path = tmp_path / "scope.csv"
+    path.write_bytes(shapes()["Digilent"].content[:600_000].rpartition(b"\n")[0])
+    megabytes = path.stat().st_size / 1e6
+    start = time.process_time()
+    read_timer_file(path)
+    assert time.process_time() - start < 1.0 * megabytes
+    tracemalloc.start()
+    try:
+        read_timer_file(path)
+        assert tracemalloc.get_traced_memory()[1] < 20e6 * megabytes
+    finally:
+        tracemalloc.stop()

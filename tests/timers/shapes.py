@@ -1,0 +1,330 @@
+"""One known truth, written as the programs of many makers write it."""
+
+from __future__ import annotations
+
+import bisect
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+PROTOCOL = Path(__file__).parents[2] / "protocols" / "falling-ball.yaml"
+HEIGHTS = {0: 0.850, 1: 0.600, 2: 0.350, 3: 0.100}
+DROP, GRAVITY, WIDTH = 0.900, 9.81, 0.020
+RELEASES = (0.31, 0.28, 0.35)
+Truth = list[tuple[float, int, bool]]
+
+
+def run(release: float) -> Truth:
+    """Return time, s, channel and whether it gets dark, of a ball past four gates."""
+    edges = [
+        (release + (2 * (DROP - height + sign * WIDTH / 2) / GRAVITY) ** 0.5, channel, sign < 0)
+        for channel, height in HEIGHTS.items()
+        for sign in (-1, 1)
+    ]
+    return sorted((round(time, 6), channel, dark) for time, channel, dark in edges)
+
+
+RUNS = [run(release) for release in RELEASES]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A file and what it says."""
+
+    content: bytes
+    truth: list[Truth]
+    sampled: float = 0.0
+    options: tuple[str, ...] = ()
+
+
+def text(content: str, runs: int = 1, encoding: str = "utf-8", **more) -> Shape:
+    return Shape(content.encode(encoding), RUNS[:runs], **more)
+
+
+def by_gate(edges: Truth) -> dict[int, Truth]:
+    return {n: [edge for edge in edges if edge[1] == n] for n in HEIGHTS}
+
+
+def table(rows, separator=",") -> str:
+    return "".join(separator.join(map(str, row)) + "\n" for row in rows)
+
+
+def beside(heading, separator=",", comma=False) -> str:
+    """Write all runs side by side, a time and a column of states for each gate."""
+    rows = [separator.join(heading(n) for n in (1, 2, 3))]
+    for three in zip(*RUNS, strict=True):
+        cells = []
+        for time, channel, dark in three:
+            cells.append(f"{time:.6f}")
+            cells += [str(int(dark)) if n == channel else "" for n in HEIGHTS]
+        rows.append(separator.join(cells))
+    out = "\n".join(rows) + "\n"
+    return out.replace(".", ",") if comma else out
+
+
+def levels(edges: Truth, time: float) -> list[int]:
+    return [
+        int(any(dark for t, c, dark in edges[: bisect.bisect_right(edges, (time + 1e-9, 9, True))]
+                if c == n) and [d for t, c, d in edges if c == n and t <= time + 1e-9][-1])
+        for n in HEIGHTS
+    ]  # fmt: skip
+
+
+STEP = 5e-5
+
+
+def volts(edges: Truth, gates, end=0.8, bright=4.6, dark_v=0.2):
+    times = np.arange(0.0, end, STEP)
+    columns = []
+    for n in gates:
+        value = np.full(times.size, bright)
+        for t, channel, dark in edges:
+            if channel == n:
+                share = np.clip((times - t) / 0.2e-3 + 0.5, 0, 1)
+                value += (dark_v - bright if dark else bright - dark_v) * share
+        columns.append(value + 0.03 * np.sin(300 * times + n))
+    return times, np.array(columns)
+
+
+def scope(head: str, row, gates=tuple(HEIGHTS), runs=1, encoding="utf-8", **more) -> Shape:
+    times, columns = volts(RUNS[0], gates)
+    body = "".join(row(k, t, columns[:, k]) for k, t in enumerate(times))
+    truth = [[edge for edge in RUNS[0] if edge[1] in gates]]
+    return Shape((head + body).encode(encoding), truth, sampled=STEP, **more)
+
+
+def csv(k, t, v, form="{:.6e}"):
+    return ",".join([f"{t:.7e}", *(form.format(x) for x in v)]) + "\n"
+
+
+def vcd(edges: Truth) -> str:
+    marks = "!#$%"
+    head = "$date today $end\n$version PulseView 0.4.2 $end\n$timescale 1 us $end\n"
+    head += "$scope module m $end\n"
+    wires = "".join(f"$var wire 1 {marks[n]} D{n} $end\n" for n in HEIGHTS)
+    zero = "#0\n" + "".join(f"0{mark}\n" for mark in marks)
+    changes = "".join(f"#{round(t * 1e6)}\n{int(d)}{marks[c]}\n" for t, c, d in edges)
+    return f"{head}{wires}$upscope $end\n$enddefinitions $end\n{zero}{changes}"
+
+
+def rows(form, runs=1, gap=10.0, mark=None, shift=True):
+    """Write an edge a line, runs one after the other by one clock, or each by its own."""
+    out = []
+    for n, edges in enumerate(RUNS[:runs]):
+        if mark:
+            out.append(mark.format(n + 1) + "\n")
+        out += [form(t + (gap * n if shift else 0.0), c, d) for t, c, d in edges]
+    return "".join(out)
+
+
+def shapes() -> dict[str, Shape]:
+    """Return every shape by its name."""
+    word = {True: "Blocked", False: "Unblocked"}
+    found = {}
+
+    def states(n):
+        return ",".join([f"Run {n}: Time (s)", *(f"Run {n}: Gate {g} State ()" for g in HEIGHTS)])
+
+    found["Logger Pro, runs side by side"] = text(beside(states), 3)
+    found["Graphical Analysis"] = text("\ufeff" + beside(
+        lambda n: states(n).replace("Run 3", "Latest")), 3)  # fmt: skip
+    found["Capstone times blocked"] = Shape(
+        (",".join(f'"Time Blocked, Ch {g} (s) Run #{n}"' for n in (1, 2, 3) for g in HEIGHTS) + "\n"
+         + ",".join(f"{next(t for t, c, d in RUNS[n] if c == g and d):.6f}"
+                    for n in range(3) for g in HEIGHTS) + "\n").encode(),
+        [[e for e in edges if e[2]] for edges in RUNS])  # fmt: skip
+    found["Capstone states"] = text(
+        ",".join(f'"Time (s) Run #{n}",' + ",".join(f'"State, Ch {g} Run #{n}"' for g in HEIGHTS)
+                 for n in (1, 2, 3)) + "\n"
+        + table([cell for t, c, d in three
+                 for cell in (f"{t:.6f}", *(int(d) if g == c else "" for g in HEIGHTS))]
+                for three in zip(*RUNS, strict=True)), 3)  # fmt: skip
+    found["SPARKvue"] = text(
+        '"Time (s)","Gate 0 State (Blocked/Unblocked)",'
+        '"Gate 1 State","Gate 2 State","Gate 3 State"\n'
+        + table([f"{t:.6f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0])
+    )
+    found["Vernier Format 2"] = text("".join(
+        f"Vernier Format 2\nfall.cmbl\nRun {n}\nTime\tGate 0\tGate 1\tGate 2\tGate 3\n"
+        "t\tG0\tG1\tG2\tG3\ns\t\t\t\t\n\n"
+        + table(
+            ([f"{t:.6f}", *(int(d) if g == c else "" for g in HEIGHTS)] for t, c, d in edges), "\t"
+        )
+        for n, edges in enumerate(RUNS, 1)), 3)  # fmt: skip
+
+    def arduino(t, c, d):
+        return f"{c},{t * 1e6:.0f},{int(d)}\n"
+
+    found["Arduino with marks"] = text(
+        "Gate,Micros,State\n" + rows(arduino, 3, mark="--- Run {} ---"), 3
+    )
+    found["Arduino without marks"] = text("Gate,Micros,State\n" + rows(arduino, 3), 3)
+    found["Arduino monitor"] = text(
+        rows(lambda t, c, d: f"10:01:02.345 -> gate={c} t_us={t * 1e6:.0f} state={int(d)}\n")
+    )
+    found["Sentences"] = text(
+        "ready\n"
+        + rows(lambda t, c, d: f"Gate {c} {'blocked' if d else 'unblocked'} at {t * 1e6:.0f} us\n")
+    )
+    found["JSON lines"] = text(
+        rows(
+            lambda t, c, d: (
+                f'{{"t_us": {t * 1e6:.0f}, "gate": {c}, '
+                f'"state": "{"blocked" if d else "clear"}"}}\n'
+            )
+        )
+    )
+    found["Serial plotter"] = text("".join(
+        f"time_us:{t * 1e6:.0f} "
+        + " ".join(f"gate{g}:{v}" for g, v in enumerate(levels(RUNS[0], t)))
+        + "\n"
+        for t, _, _ in [(0.0, 0, False), *RUNS[0]]))  # fmt: skip
+    found["Siglent SDS"] = scope(
+        "Record Length,Analog:16000\nSample Interval,5.0E-05\n"
+        "Vertical Units,CH1:V,CH2:V,CH3:V,CH4:V\n"
+        "Vertical Scale,CH1:1.00,CH2:1.00,CH3:1.00,CH4:1.00\n"
+        "Horizontal Units,S\nModel Number,SDS1104X-E\n"
+        "Source,CH1,CH2,CH3,CH4\nSecond,Volt,Volt,Volt,Volt\n",
+        csv,
+    )
+    found["Tektronix MDO"] = scope(
+        "Model,MDO3024\nFirmware Version,1.26\n\nPoint Format,Y,\nHorizontal Units,S,\n"
+        "Sample Interval,5e-05,\nRecord Length,16000,\n,,\n\nTIME,CH1,CH2,CH3,CH4\n",
+        csv,
+    )
+    found["LeCroy"] = scope(
+        "LECROYHDO4104,1234,Waveform\nSegments,1,SegmentSize,16000\nSegment,TrigTime,TimeSinceSegment1\n"
+        "#1,22-Jan-2015 11:35:11,0\nTime,Ampl1,Ampl2,Ampl3,Ampl4\n",
+        csv,
+    )
+    found["Rigol DS1000Z"] = scope(
+        "X,CH1,CH2,CH3,CH4,Start,Increment,\nSequence,Volt,Volt,Volt,Volt,0.000000e+00,5.000000e-05\n",
+        lambda k, t, v: f"{k}," + ",".join(f"{x:.2e}" for x in v) + ",\n",
+    )
+    found["Rigol MSO5000"] = scope(
+        "CH1V,CH2V,CH3V,CH4V,t0 =0.0000s, tInc = 5.000000e-05,\n",
+        lambda k, t, v: ",".join(f"{x:.3f}" for x in v) + ",,\n",
+    )
+    found["OWON"] = scope(
+        "Unit:(mV)\nSample interval:5.0e-05s\n"
+        "index,CH1_Voltage(V),CH2_Voltage(V),CH3_Voltage(V),CH4_Voltage(V)\n",
+        lambda k, t, v: f"{k}," + ",".join(f"{x:.3f}" for x in v) + "\n",
+    )
+    found["Hantek"] = scope("nr,time,ch1,ch2,ch3,ch4\n",
+        lambda k, t, v: f"{k},{t:.6g}," + ",".join(f"{x:.2f}" for x in v) + "\n")  # fmt: skip
+    found["PicoScope"] = scope(
+        "Time,Channel A,Channel B,Channel C,Channel D\n(ms),(V),(V),(V),(V)\n\n",
+        lambda k, t, v: ",".join([f"{t * 1e3:.8f}", *(f"{x:.8f}" for x in v)]) + "\n",
+    )
+    found["Digilent"] = scope(
+        "#Digilent WaveForms Oscilloscope Acquisition\n#Sample rate: 20000Hz\n#Samples: 16000\n\n"
+        "Time (s),Channel 1 (V),Channel 2 (V),Channel 3 (V),Channel 4 (V)\n",
+        csv,
+    )
+    lvm = (
+        "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
+        "Decimal_Separator\t{}\nMulti_Headings\tNo\nX_Columns\t{}\nTime_Pref\tRelative\n"
+        "***End_of_Header***\t\n\t\nChannels\t4\t\t\t\t\nSamples\t16000\t16000\t16000\t16000\t\n"
+        "Y_Unit_Label\tVolts\tVolts\tVolts\tVolts\t\nX_Dimension\tTime\tTime\tTime\tTime\t\n"
+        "X0\t0.0\t0.0\t0.0\t0.0\t\nDelta_X\t5.0E-5\t5.0E-5\t5.0E-5\t5.0E-5\t\n"
+        "***End_of_Header***\t\t\t\t\t\nX_Value\tGate 0\tGate 1\tGate 2\tGate 3\tComment\n"
+    )
+    for name, encoding in (("with", "utf-16"), ("without", "utf-16-le")):
+        found[f"LabVIEW in UTF-16 {name} its mark"] = scope(
+            lvm.format(".", "One"),
+            lambda k, t, v: "\t".join([f"{t:.6f}", *(f"{x:.6f}" for x in v)]) + "\t\n",
+            encoding=encoding,
+        )
+    found["LabVIEW without times"] = scope(
+        lvm.format(".", "No"), lambda k, t, v: "\t".join(["", *(f"{x:.6f}" for x in v)]) + "\t\n"
+    )
+    found["Saleae"] = text("Time [s],Channel 0,Channel 1,Channel 2,Channel 3\n0.000000000,0,0,0,0\n"
+        + table([f"{t:.9f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0]))  # fmt: skip
+    times = [n * STEP for n in range(16000)]
+    found["sigrok"] = Shape((
+        "; CSV generated by libsigrok\n; Channels (4/8): D0, D1, D2, D3\n; Samplerate: 20 kHz\n"
+        + "".join(",".join(map(str, levels(RUNS[0], t))) + "\n" for t in times)).encode(),
+        RUNS[:1], sampled=STEP)  # fmt: skip
+    found["VCD"] = text(vcd(RUNS[0]))
+    for name, heading, no in (
+        ("German", ("Zeit in ms", "Lichtschranke", "Zustand"), ("unterbrochen", "frei")),
+        ("French", ("Temps (ms)", "porte", "état"), ("bloqué", "libre")),
+        ("Italian", ("Tempo (ms)", "fotocellula", "stato"), ("interrotto", "libero")),
+        ("Spanish", ("Tiempo (ms)", "puerta", "estado"), ("bloqueado", "libre")),
+    ):
+        found[name] = text(
+            ";".join(heading)
+            + "\n"
+            + rows(
+                lambda t, c, d, no=no: (
+                    f"{t * 1e3:.3f}".replace(".", ",") + f";{c};{no[0] if d else no[1]}\n"
+                )
+            )
+        )
+    found["Time at each gate"] = Shape(
+        (
+            ",".join(f"Time at gate {g} (s)" for g in HEIGHTS)
+            + "\n"
+            + table([f"{t:.6f}" for t, _, d in edges if d] for edges in RUNS)
+        ).encode(),
+        [[e for e in edges if e[2]] for edges in RUNS],
+    )
+    found["Blocked and unblocked of each gate"] = Shape(
+        (
+            ",".join(f"Gate {g} {w} (s)" for g in HEIGHTS for w in ("blocked", "unblocked"))
+            + "\n"
+            + table([f"{t:.6f}" for t, _, _ in edges] for edges in RUNS)
+        ).encode(),
+        RUNS,
+    )
+    found["Gates below each other"] = text("".join(
+        f"Gate {g}\nTime (s)\n" + "".join(f"{t:.6f}\n" for t, _, _ in edges)
+        for g, edges in by_gate(RUNS[0]).items()))  # fmt: skip
+    found["Plain numbers of passing gates"] = text(rows(lambda t, c, d: f"{t:.6f}\n"))
+    found["Pin, edge, time"] = text(rows(lambda t, c, d: f"{c}, {int(d)}, {t:.6f}\n"))
+    found["baldaquin"] = text("# baldaquin version: 0.4.0\n# Pin number, Edge type, Time [s]\n"
+        + rows(lambda t, c, d: f"{c}, {int(d)}, {t:.6f}\n"))  # fmt: skip
+    found["Table of events"] = text(
+        "Event\tGate\tTime (ms)\tTime (us)\tState\n"
+        + "".join(
+            f"{n}\t{c}\t{t * 1e3:.0f}\t{t * 1e6:.0f}\t{word[d]}\n"
+            for n, (t, c, d) in enumerate(RUNS[0])
+        )
+    )
+    found["Trial column"] = text(
+        "Trial,Pin,Time (s),State\n"
+        + "".join(
+            f"{n},{c},{t:.6f},{word[d]}\n" for n, edges in enumerate(RUNS, 1) for t, c, d in edges
+        ),
+        3,
+    )
+    found["Milliseconds without a unit"] = text("Gate,Time,State\n"
+        + rows(lambda t, c, d: f"{c},{t * 1e6:.0f},{word[d]}\n"))  # fmt: skip
+    found["Rising and falling"] = text(
+        "pin   micros   edge\n"
+        + rows(lambda t, c, d: f" {c}  {t * 1e6:9.0f}  {'RISING' if d else 'FALLING'}\n")
+    )
+    found["cp1252"] = text(
+        "t (µs);Kanal;Zustand\n" + rows(lambda t, c, d: f"{t * 1e6:.0f};{c};{int(d)}\n"),
+        encoding="cp1252",
+    )
+    found["Run below run, own clocks"] = text(
+        "Time (s),Gate,Blocked\n"
+        + rows(lambda t, c, d: f"{t:.6f},{c},{word[d]}\n", 3, shift=False),
+        3,
+    )
+    tds = ["Record Length,1.6e+04,,", "Sample Interval,5e-05,,", "Trigger Point,0,,",
+           "Source,CH1,,",
+           "Vertical Units,V,,", "Horizontal Units,s,,"]  # fmt: skip
+    t16, v16 = volts(RUNS[0], [0])
+    found["Tektronix TDS"] = Shape(
+        "".join(
+            f"{tds[k] if k < len(tds) else ',,,'}{t:.7e},{v16[0, k]:.5f},\n"
+            for k, t in enumerate(t16)
+        ).encode(),
+        [[e for e in RUNS[0] if e[1] == 0]],
+        sampled=STEP,
+        options=("--channel", "0"),
+    )
+    return found
