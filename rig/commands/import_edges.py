@@ -27,6 +27,7 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.edges_csv import TICK_HZ, read_edges
 from rig.timers.layouts import (
+    GOOD,
     SETTINGS,
     FallMatch,
     check_layout,
@@ -115,7 +116,7 @@ def read_with_protocol(
     if reading.layout.groups == "passing" and file.labels and "groups" not in stated:
         raise refusal(arguments.events, "one_wire", option=str(reading.layout))
     _account(file, reading, bars, arguments)
-    if len(readings) > 1:
+    if len(readings) > 1 or (fit.share < GOOD and not arguments.as_read):
         file.notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=fit.text))
     if pause_s := reading.layout.pause_s:
         drops = len(reading.drops)
@@ -222,8 +223,12 @@ def _read_stated(arguments: Namespace, file: TimerFile, gates: Sequence[int]) ->
             bare = labels == ["input"]
             stated["channels"] = {"" if bare else label: n for label, n in chosen.items()}
     elif arguments.channel is not None and len(file.labels) < 2:
-        label = next(iter(file.labels), "")
-        stated["channels"] = {label: arguments.channel}
+        if arguments.channel not in gates:
+            accepted = f"a gate's channel: {', '.join(map(str, gates))}"
+            raise refusal(
+                "--channel", "not_accepted", text=str(arguments.channel), accepted=accepted
+            )
+        stated["channels"] = {next(iter(file.labels), ""): arguments.channel}
     return stated
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 MAX_SPAN_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
-_GOOD = 0.75
+GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
 _CLOSE = 0.1
 _DECISIVE = 7.0
@@ -334,12 +334,12 @@ def choose(
     best = rough[0][0]
     near = [reading for share, reading in rough if share >= best - _CLOSE][:_FINALISTS]
     ranked = [(fit(reading.drops, True), reading) for reading in near]
-    ranked.sort(key=lambda row: (row[0].share < _GOOD, -row[0].evidence))
+    ranked.sort(key=lambda row: (row[0].share < GOOD, -row[0].evidence))
     (first, reading), *rest = ranked
-    if best < _GOOD or first.share < _GOOD:
+    if best < GOOD or first.share < GOOD:
         options = "; ".join(str(reading.layout) for _, reading in rough[:3])
         raise refusal(place, "no_reading_fits", share=100 * best, options=options)
-    if rest and rest[0][0].share >= _GOOD and first.evidence - rest[0][0].evidence < _DECISIVE:
+    if rest and rest[0][0].share >= GOOD and first.evidence - rest[0][0].evidence < _DECISIVE:
         options = " or ".join(str(row[1].layout) for row in ranked[:2])
         raise refusal(place, "several_readings", options=options)
     return reading, first

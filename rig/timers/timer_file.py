@@ -188,6 +188,8 @@ def _add_rows(
     stated = {"edge", "state", "gate", "run"} & {column.role for column in columns}
     for group in reader.groups.values():
         lines = [passage.line for passage in group.passages]
+        if len(set(lines)) == 1:  # columns of a row may stand in any order
+            group.passages.sort(key=lambda passage: passage.tick)
         parts = split_at_jumps(group, in_order=len(set(lines)) == len(lines))
         ticks = [passage.tick for passage in group.passages]
         backwards = sum(b < a for a, b in itertools.pairwise(ticks))

@@ -38,6 +38,7 @@ def read_vcd(
     unit, time = 0, 0
     first: dict[str, bool] = {}
     current: dict[str, bool] = {}
+    changed: dict[str, int] = {}
     passages: list[Passage] = []
     text, skipping = "", False
     for number, line in enumerate(lines, 1):
@@ -62,9 +63,13 @@ def read_vcd(
             elif word[0] in "01" and word[1:] in names:
                 name, high = names[word[1:]], word[0] == "1"
                 if name in current and current[name] is not high:
+                    if changed[name] == time:
+                        accepted = "a change: this wire has another value at this time already"
+                        problems.reject(number, 1, name, word, accepted)
                     passages.append(Passage(time, name, None, high, number))
                 first.setdefault(name, high)
                 current[name] = high
+                changed[name] = time
     if not unit:
         problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
     return passages, first, unit
