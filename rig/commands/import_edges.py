@@ -98,9 +98,11 @@ def read_with_protocol(
     protocol: Protocol, arguments: Namespace
 ) -> tuple[list[Drop], dict[str, int], list[str], list[Reason]]:
     """Drops of another timer's file, which gate each input is, and what was assumed."""
+    if protocol.gates is None:
+        raise refusal(protocol.source, "no_gates")
     file = read_timer_file(arguments.events, arguments.unit)
-    gates = protocol.gates.gates if protocol.gates else ()
-    passed = [gate.channel for gate in sorted(gates, key=lambda gate: -gate.height)]
+    gates = sorted(protocol.gates.gates, key=lambda gate: -gate.height)
+    passed = [gate.channel for gate in gates]
     bars = max(side.chain.rods for side in protocol.chains.values())
     stated = _read_stated(arguments, file, passed)
     layouts = find_layouts(file, passed, bars, stated)
@@ -121,6 +123,20 @@ def read_with_protocol(
     if pause_s := reading.layout.pause_s:
         drops = len(reading.drops)
         file.notes.append(make_reason("several_drops", drops=drops, pause_s=pause_s))
+    _note_assumptions(file, reading, passed)
+    channels = dict(reading.layout.channels)
+    for note in file.notes:
+        say(note.text)
+    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
+    lines += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
+    lines += [str(reading.layout), *([fit.text] if fit.text else [])]
+    if arguments.map_file is not None and not Path(arguments.map_file).exists():
+        save_layout(reading.layout, arguments.map_file)
+    return reading.drops, channels, lines, file.notes
+
+
+def _note_assumptions(file: TimerFile, reading: FileReading, passed: Sequence[int]) -> None:
+    """Note what is taken to be so, and what the file lacks."""
     channels = dict(reading.layout.channels)
     if file.period_s:
         period_us = file.period_s * 1e6
@@ -135,14 +151,6 @@ def read_with_protocol(
     idle = [label for label in file.labels if label not in channels]
     if idle and reading.layout.groups != "passing":
         file.notes.append(make_reason("inputs_unused", inputs=", ".join(idle)))
-    for note in file.notes:
-        say(note.text)
-    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
-    lines += [f"input {label} is the gate at channel {n}" for label, n in channels.items() if label]
-    lines += [str(reading.layout), *([fit.text] if fit.text else [])]
-    if arguments.map_file is not None and not Path(arguments.map_file).exists():
-        save_layout(reading.layout, arguments.map_file)
-    return reading.drops, channels, lines, file.notes
 
 
 def _account(file: TimerFile, reading: FileReading, bars: int, arguments: Namespace) -> None:
