@@ -100,6 +100,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     mutation.add_argument("--page", metavar="FILE", help="write what came of it there")
 
+    pictures = benches.add_parser("pictures", help="all pages of the terminal as SVG files")
+    pictures.add_argument("--session", required=True, metavar="FILE", help="with a drop at least")
+    pictures.add_argument(
+        "-o", dest="output", required=True, metavar="DIR", help="write a file a page and size there"
+    )
+
     states = benches.add_parser("states", help="every state of a drop, with all that goes wrong")
     states.add_argument(
         "--depths", type=_count, nargs=2, default=[5, 3], metavar="N",

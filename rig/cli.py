@@ -506,7 +506,6 @@ def _tui(tui: argparse.ArgumentParser) -> None:
     tui.add_argument("--keys", metavar="FILE", help="your own keys (TOML)")
     tui.add_argument("--bell", action="store_true", help="ring the bell at every verdict")
     tui.add_argument("--ascii", action="store_true", help="use ASCII characters only")
-    tui.add_argument("--pictures", metavar="DIR", help="write all pages of --session as SVG files")
 
 
 def _sweep(sweep: argparse.ArgumentParser) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
-from rig.files import require_file
 from rig.ports import check_name
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
@@ -26,15 +25,6 @@ def main(arguments: Namespace) -> int:
     """Show the session, and carry it out."""
     options = _options(arguments)
     keys = read_keys(Path(arguments.keys) if arguments.keys else None)
-    if arguments.pictures:
-        from rig.tui.pictures import draw  # noqa: PLC0415 - not for a session
-
-        if options.session is None or not options.session.exists():
-            raise InputError("--pictures needs --session FILE")
-        require_file(options.session)
-        for path in draw(options.session, Path(arguments.pictures), keys, options.files):
-            print(path)
-        return 0
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InputError(
             "rig tui needs a terminal",

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
+from bench.pictures import seen
 from rig.analysis.quantities import COMPUTED
 from rig.measurands import MEASURANDS, Measurand
-from rig.tui.pictures import seen
 from tests.tui.lab import KEYS
 from tests.tui.screen import text_of
 

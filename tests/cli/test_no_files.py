@@ -39,11 +39,10 @@ COMMANDS = {
     ("run", "session"): "FENCE --port sim:// --session X",
     ("sweep", "protocol"): "X --vary drop=100mm..300mm:3 -o OUT.csv",
     ("tui", "keys"): "--keys X",
-    ("tui", "session"): "--session X --pictures OUT",
     ("unblind", "session"): "X",
 }
-WRITTEN = {("import", "session"), ("tui", "protocol")}
-"""A new file, and one that is only read on a terminal."""
+WRITTEN = {("import", "session"), ("tui", "protocol"), ("tui", "session")}
+"""A new file, and those that are only read on a terminal."""
 
 
 @pytest.fixture

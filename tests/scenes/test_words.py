@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from bench import pictures
+from bench.pictures import FakeClient, screenshots, seen
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
 from rig.cli import main
@@ -16,10 +18,8 @@ from rig.ready import ready_protocol
 from rig.records import Job
 from rig.report.method import SOFTWARE
 from rig.results.live import LiveAnalysis
-from rig.tui import pictures
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from rig.tui.pictures import FakeClient, screenshots, seen
 from tests.tui.lab import KEYS
 from tests.tui.screen import text_of
 

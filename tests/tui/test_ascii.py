@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.pictures import QUIET, FakeClient
 from rig.campaign.machine import Flow, Stage
 from rig.tui.app import RigApp
 from rig.tui.ascii import in_ascii
 from rig.tui.context import Options, ascii_only
-from rig.tui.pictures import QUIET, FakeClient
 from rig.tui.state import DaemonState
 from tests.tui.lab import KEYS, run
 from tests.tui.screen import text_of

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.pictures import QUIET, FakeClient, at_rest
 from rig.campaign.machine import Flow, Stage
 from rig.reasons import plain_reason
 from rig.records import Job
@@ -18,7 +19,6 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import THEMES, RigApp
 from rig.tui.context import Options
-from rig.tui.pictures import QUIET, FakeClient, at_rest
 from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.tui.lab import KEYS, run
@@ -47,8 +47,8 @@ MOMENTS = {
 @pytest.fixture
 def looks(tmp_path, monkeypatch):
     """Make a session to look at, with figures that are drawn without a pause."""
-    for module in ("widgets.figure", "pictures"):
-        monkeypatch.setattr(f"rig.tui.{module}.PAUSE_S", 0.05)
+    for module in ("rig.tui.widgets.figure", "bench.pictures"):
+        monkeypatch.setattr(f"{module}.PAUSE_S", 0.05)
     path = tmp_path / "looks.session"
     Session.create(path, short(), "looks.yaml", simulated=True, origin="sim://").close()
     return path

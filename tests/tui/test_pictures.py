@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.tui.pictures import SIZES, draw, seen
+from bench.pictures import SIZES, draw, seen
 from tests.cli.lab import short
 from tests.tui.lab import KEYS
 from tests.tui.screen import text_of

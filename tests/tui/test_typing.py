@@ -14,13 +14,13 @@ from rich.style import Style
 from textual import events
 from textual.widgets import OptionList
 
+from bench.pictures import QUIET, FakeClient
 from rig.campaign.machine import Flow, Stage
 from rig.records import Job
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from rig.tui.pictures import QUIET, FakeClient
 from rig.tui.screens.palette import Palette
 from rig.tui.state import state_of
 from tests.cli.lab import short

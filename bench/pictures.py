@@ -6,24 +6,26 @@ import asyncio
 import re
 from dataclasses import replace
 from html import unescape
+from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
-from rig.files import make_folder
+from rig.files import make_folder, require_file
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
 from rig.tui.braille import COLUMNS, ROWS, dots_of
 from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
+from rig.tui.keys import read_keys
 from rig.tui.replay import Player, end_of
 from rig.tui.state import DaemonState, state_of
 from rig.tui.widgets.figure import PAUSE_S
 
 if TYPE_CHECKING:
+    from argparse import Namespace
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from textual.pilot import Pilot
 
@@ -96,6 +98,16 @@ class FakeClient(ReconnectingClient):
 
     async def _nothing(self) -> None:
         return
+
+
+def main(arguments: Namespace) -> int:
+    """Draw all pages of a session; print the files."""
+    session = Path(arguments.session)
+    require_file(session)
+    protocols = tuple(sorted(Path("protocols").glob("*.yaml")))
+    for path in draw(session, Path(arguments.output), read_keys(None), protocols):
+        print(path)
+    return 0
 
 
 class Screenshot(NamedTuple):
