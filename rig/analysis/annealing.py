@@ -557,7 +557,8 @@ class SideFall:
             x, matrix, change = x[kept], matrix[kept], change[kept]
             if (width > own).any():
                 continue
-            if np.einsum("fp,fpq,fq->f", change, matrix, change).max() < _DONE**2:
+            best = int(np.argmax(explained[kept]))
+            if change[best] @ matrix[best] @ change[best] < _DONE**2:
                 break
             # Starts that have become the same fall go on as one.
             if len(x) > 1:
