@@ -264,8 +264,9 @@ class Pairing:
         edges = found[sides]
         sides, edges = sides[self.other[edges] >= 0], edges[self.other[edges] >= 0]
         other = self.other[edges]
-        length = np.abs(self.times[edges] - self.times[other]) * speeds[edges]
-        found[sides[(length > _LONGER * self.widths[sides]) & ~below[other]]] = -1
+        # At uniform acceleration the mean of both speeds is that of the way between.
+        length = np.abs(self.times[edges] - self.times[other]) * (speeds[edges] + speeds[other])
+        found[sides[(0.5 * length > _LONGER * self.widths[sides]) & ~below[other]]] = -1
         return found
 
     def matched(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:

@@ -86,7 +86,7 @@ class DropModel:
         self.pairings: dict[str, Pairing] = {
             role: made[role].pairings[role]
             if role in made
-            else Pairing.of(record.trains, record.chain.widths)
+            else Pairing.of(record.trains, _widths(record))
             for role, record in self.records.items()
         }
         self.discrepancy: Discrepancy  # where a chain strikes
@@ -320,6 +320,12 @@ class DropModel:
         slopes[second] -= told[second, None] * slopes[second - 1]
         left = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
         return Equations(left, told, slopes, effects.columns)
+
+
+def _widths(record: ChainRecord) -> Sequence[float]:
+    """Return how wide rods are where others may be thrown back in their way; else nothing."""
+    thrown = record.ratios is not None and record.chain.chain.rods > 1
+    return record.chain.widths if thrown else ()
 
 
 def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:
