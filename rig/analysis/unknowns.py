@@ -474,7 +474,7 @@ def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
                     yield row.name, row, sides.get(row.of, first)
 
 
-class Effects(NamedTuple):
+class SideSlopes(NamedTuple):
     """What all unknowns of a drop do to one side, to which path and levels are linear in them.
 
     Attributes
@@ -499,7 +499,7 @@ class Effects(NamedTuple):
     clock: int
 
 
-def effects(model: DropModel, role: str) -> Effects:
+def effects(model: DropModel, role: str) -> SideSlopes:
     """Put together what the rows of the table do to one side."""
     at, side = model.unknowns, Side(model, model.records[role])
     path = np.zeros((side.parameters, len(at)))
@@ -509,12 +509,12 @@ def effects(model: DropModel, role: str) -> Effects:
             if row.path is not None:
                 path[:, at[name]] = row.path(side)
             if row.level is not None:
-                levels[:, at[name]] = row.level(side).reshape(len(levels), -1)
+                levels[:, at[name]] = row.level(side).reshape(levels[:, at[name]].shape)
     moving = np.flatnonzero(path.any(axis=0))
     known = np.append(np.flatnonzero(levels.any(axis=0)), at["clock"].start)
     columns = np.append(moving, np.setdiff1d(known, moving))
     (clock,) = np.flatnonzero(columns == at["clock"].start)
-    return Effects(path, levels, columns, moving.size, int(clock))
+    return SideSlopes(path, levels, columns, moving.size, int(clock))
 
 
 class SharedUnknowns:
