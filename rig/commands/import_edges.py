@@ -20,7 +20,7 @@ from rig.clock.host import SystemClock
 from rig.commands.output import say
 from rig.files import require_file
 from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_measurable
+from rig.protocol.measurable import check_gates, check_measurable, with_gates
 from rig.protocol.plan import runs
 from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
@@ -98,10 +98,8 @@ def read_with_protocol(
     protocol: Protocol, arguments: Namespace
 ) -> tuple[list[Drop], dict[str, int], list[str], list[Reason]]:
     """Drops of another timer's file, which gate each input is, and what was assumed."""
-    if protocol.gates is None:
-        raise refusal(protocol.source, "no_gates")
+    gates = sorted(check_gates(protocol).gates, key=lambda gate: -gate.height)
     file = read_timer_file(arguments.events, arguments.unit)
-    gates = sorted(protocol.gates.gates, key=lambda gate: -gate.height)
     passed = [gate.channel for gate in gates]
     bars = max(side.chain.rods for side in protocol.chains.values())
     stated = _read_stated(arguments, file, passed)
@@ -167,22 +165,23 @@ def _account(file: TimerFile, reading: FileReading, bars: int, arguments: Namesp
             raise refusal(arguments.events, "at_once", run=drop.run, time_s=together / drop.tick_hz)
     unused = sorted(set(file.rows) - reading.lines - file.silent)
     edges = sum(len(drop.edges) for drop in reading.drops)
-    values: dict[str, object] = {"runs": len(reading.drops), "rows": len(file.rows), "edges": edges}
+    counts = {"runs": len(reading.drops), "rows": len(file.rows), "edges": edges}
     if not unused:
-        file.notes.append(
-            make_reason("rows_used", silent=len(file.silent - reading.lines), **values)
-        )
+        silent = len(file.silent - reading.lines)
+        file.notes.append(make_reason("rows_used", silent=silent, **counts))
         return
     listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
-    values |= {"unused": len(unused), "lines": listed}
+    left = {"unused": len(unused), "lines": listed}
     if not arguments.allow_unused:
-        raise refusal(arguments.events, "rows_unused", **values)
-    file.notes.append(make_reason("rows_left_out", **values))
+        raise refusal(arguments.events, "rows_unused", **counts, **left)
+    file.notes.append(make_reason("rows_left_out", **counts, **left))
 
 
 def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMatch:
     """Compare the first drops with falls that the protocol has."""
     planned = {run.number: run for run in runs(protocol)}
+    # Of gates that the file does not have nothing is due.
+    protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
     share = near = received = expected = 0.0
     evidence, gravity = 0.0, []
     for drop in [drop for drop in drops if drop.run in planned][:_COMPARED]:

@@ -7,6 +7,7 @@ inputs and outputs.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS, LONGEST_RECORD_MS
@@ -16,6 +17,8 @@ from rig.protocol.yamltree import load, place_of
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from rig.boards import Capabilities
     from rig.protocol.protocol import Gate, Gates, Protocol
 
@@ -62,6 +65,14 @@ def unmeasurable(protocol: Protocol) -> list[str]:
     if protocol.initial_speed != AT_REST:
         found.append(f"initial_speed: the rig releases {protocol.vocabulary.body} from rest")
     return found
+
+
+def with_gates(protocol: Protocol, channels: Collection[int]) -> Protocol:
+    """Return a scene with those of its gates alone that are at some channels."""
+    if protocol.gates is None:
+        return protocol
+    kept = tuple(gate for gate in protocol.gates.gates if gate.channel in channels)
+    return replace(protocol, gates=replace(protocol.gates, gates=kept))
 
 
 def check_gates(protocol: Protocol) -> Gates:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
 from rig.clock.calibration import Calibrator
 from rig.protocol import reader
+from rig.protocol.measurable import with_gates
 from rig.reasons import notes_in
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
@@ -83,10 +84,7 @@ def protocol_of(session: Reader) -> Protocol:
     """
     protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
     had = next((one["beams"] for _, one in session.identities() if "beams" in one), None)
-    if had is None or protocol.gates is None:
-        return protocol
-    gates = tuple(gate for gate in protocol.gates.gates if gate.channel in had)
-    return replace(protocol, gates=replace(protocol.gates, gates=gates))
+    return protocol if had is None else with_gates(protocol, had)
 
 
 def calibration(session: Reader) -> Calibration:

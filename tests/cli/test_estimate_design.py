@@ -166,7 +166,8 @@ def test_a_logger_s_table_gives_gravity_with_its_uncertainty(call, table, scene,
     session = tmp_path / "s"
     given = ("import", table, "--protocol", scene, "--session", session, "--simulated")
     done = call(*given, "--channel", "1", "--clock-uncertainty", "20 ppm")
-    assert (done.code, done.err) == (0, f"48 edges of 3 runs → {session}\n")
+    assert (done.code, done.err.splitlines()[-1]) == (0, f"48 edges of 3 runs → {session}")
+    assert done.err.startswith("3 runs, 16 rows: 48 edges; 0 rows without a change\n")
     found = json.loads(call("analyze", session, "--json").out)
     assert [run["verdict"] for run in found["runs"]] == ["accepted"] * 3
     (line,) = found["summary"]
@@ -184,7 +185,8 @@ def test_a_column_of_times_of_darkening_is_enough(call, table, scene, tmp_path):
     session = tmp_path / "s"
     given = ("import", column, "--protocol", scene, "--session", session, "--simulated")
     done = call(*given, "--channel", "1", "--clock-uncertainty", "20 ppm")
-    assert (done.code, done.err) == (0, f"8 edges of 1 run → {session}\n")
+    assert (done.code, done.err.splitlines()[-1]) == (0, f"8 edges of 1 run → {session}")
+    assert "8 of 8 edges where a fall puts them" in done.err
     found = json.loads(call("analyze", session, "--json").out)
     (run,) = found["runs"]
     assert run["edges"]["missed"] == 0
@@ -192,13 +194,18 @@ def test_a_column_of_times_of_darkening_is_enough(call, table, scene, tmp_path):
     assert abs(gravity["value"] - 9.81) < gravity["U95"] < 0.2
 
 
-def test_a_table_must_be_of_a_known_gate(call, table, tmp_path):
-    for more in ((), ("--channel", "9")):
-        done = call("import", table, "--protocol", FENCE, "--session", tmp_path / "s", *more)
-        assert done.code == 2
-        assert "--channel" in done.err
-        assert "0 at 50 mm, 1 at 350 mm" in done.err
-        assert not (tmp_path / "s").exists()
+def test_a_table_of_no_named_gate_is_of_that_which_fits_and_of_none_that_is_not_there(
+    call, table, tmp_path
+):
+    """Its times are those of the upper gate, as the protocol's fall tells."""
+    session = tmp_path / "s"
+    given = ("import", table, "--protocol", FENCE, "--session", session, "--simulated")
+    done = call(*given, "--channel", "9")
+    assert done.code == 2
+    assert not session.exists()
+    done = call(*given)
+    assert done.code == 0
+    assert "read as --map 'input=1': 3 runs: 48 of 48 edges where a fall puts them" in done.err
 
 
 def test_a_fault_of_a_table_has_its_place(call, table, tmp_path):
