@@ -13,7 +13,7 @@ from rig.analysis.diagnoses import FEW_GATES, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
-from rig.analysis.faults import Premise, faults
+from rig.analysis.faults import Premise
 from rig.analysis.fit import timed
 from rig.analysis.gate_passages import gate_passages
 from rig.analysis.identified import Identified, identified
@@ -27,7 +27,7 @@ from rig.records import Job
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import MutableMapping, Sequence
+    from collections.abc import MutableMapping
 
     from rig.analysis.fit import Fit
     from rig.clock.calibration import TimeScale
@@ -93,7 +93,8 @@ def fit_drop(
                 strange = [n for n, gate in enumerate(gates) if gate.side in one.poor]
                 if not strange and len(gates) <= FEW_GATES:
                     strange = [*range(len(gates))]  # each may see nearly what another should
-                weigh = _explainer(protocol, run, drop, rough, components, strange)
+                premise = Premise(protocol, run, rough.hz)
+                weigh = Explainer(premise, drop, rough.u, components, strange)
                 why = explained(weigh.explain(None), protocol.vocabulary)
                 one = replace(one, explained=tuple(why))
                 known[job] = one
@@ -114,7 +115,8 @@ def fit_drop(
     end = judge(protocol, run, drop, audit, found, fit, alone, unmatched)
     reasons = end.reasons
     if not end.known and (explain or end.verdict != "void"):
-        weigh = _explainer(protocol, run, drop, scale, components, end.suspects)
+        premise = Premise(protocol, run, scale.hz)
+        weigh = Explainer(premise, drop, scale.u, components, end.suspects)
         if end.odd or weigh.asked(fit):
             whole = [one for one in weigh.explain(fit) if one.whole]
             if why := explained(whole, protocol.vocabulary, end.accused):
@@ -133,16 +135,3 @@ def fit_drop(
         gates=gate_passages(fit, fit.x, partial(measured, fit.model, fit.estimate)),
     )
     return result, fit
-
-
-def _explainer(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components,
-    suspects: Sequence[int],
-) -> Explainer:
-    """Prepare to ask what else than the protocol would explain a drop."""
-    possible = faults(protocol, run, suspects)
-    return Explainer(Premise(protocol, run, scale.hz), drop, scale.u, components, possible)

@@ -22,7 +22,7 @@ from rig.analysis.trajectory import (
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import Unknowns, effects
+from rig.analysis.unknowns import Unknowns, side_slopes
 from rig.predictions import air_of
 from rig.units import Quantity
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rig.analysis.annealing import Guess
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.trajectory import Trajectory
+    from rig.analysis.unknowns import Unknown
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
@@ -78,6 +79,7 @@ class DropModel:
         self.guesses = guesses
         self.clock_u: float = clock_u
         self.components: Components = components or stated(protocol)
+        self.suspects: tuple[Unknown, ...] = ()
         made: dict[str, DropModel] = {role: one for one in sides for role in one.records}
         self.expected: dict[str, Expected] = {
             role: made[role].expected[role] if role in made else Expected.of(record, protocol)
@@ -96,7 +98,7 @@ class DropModel:
             record, edges = self.records["impact"], self.expected["impact"]
             self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
         self.unknowns = Unknowns(self)
-        self._effects = {role: effects(self, role) for role in self.records}
+        self.slopes = {role: side_slopes(self, role) for role in self.records}
         # The last path, levels and matches of each side: nothing older is asked for again.
         self._paths: dict[str, tuple[bytes, Trajectory]] = {}
         self._levels: dict[str, tuple[bytes, Array]] = {}
@@ -173,6 +175,19 @@ class DropModel:
             x[self.unknowns["drag"]] = kappa - self._kappa
         return x
 
+    def suspecting(self, suspect: Unknown) -> DropModel:
+        """Return the same drop with one thing more that is not known, behind all others."""
+        other = copy(self)
+        other.suspects = (suspect,)
+        other.unknowns = Unknowns(other)
+        other.slopes = {role: side_slopes(other, role) for role in other.records}
+        other._paths, other._levels = {}, {}
+        return other
+
+    def rate(self, x: Array) -> float:
+        """How much later each moment is than it was stamped, as a factor."""
+        return 1.0 + float(self.unknowns.rate @ x)
+
     def kappa(self, x: Array) -> float:
         """κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
@@ -187,7 +202,7 @@ class DropModel:
         return known[1]
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
-        record, parameters = self.records[role], self._effects[role].path @ x
+        record, parameters = self.records[role], self.slopes[role].path @ x
         parameters[RELEASE] += self.guesses[role].release
         parameters[START] += self.protocol.drop.value
         parameters[GRAVITY] += self.protocol.gravity.value
@@ -218,7 +233,7 @@ class DropModel:
         ndarray
             Shape ``(…, unknowns)``.
         """
-        return derivatives @ self._effects[role].path
+        return derivatives @ self.slopes[role].path
 
     def stretch(self, x: Array) -> Array:
         """Size of each mode of the stretch, m."""
@@ -230,7 +245,7 @@ class DropModel:
         asked = x.tobytes()
         known = self._levels.get(role)
         if known is None or known[0] != asked:
-            levels = self.expected[role].levels + self._effects[role].levels @ x
+            levels = self.expected[role].levels + self.slopes[role].levels @ x
             known = self._levels[role] = asked, levels
         return known[1]
 
@@ -244,7 +259,7 @@ class DropModel:
     def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """What the unknowns leave over of one side's matched edges."""
         seen = self._matched(role, matches)
-        times = seen.times * (1.0 + x[self.unknowns["clock"]])
+        times = seen.times * self.rate(x)
         height, speed = self.trajectory(role, x).heights(times)
         values = height - self.all_levels(role, x)[seen.pick]
         loose = _loose(self.trajectory(role, x), times, seen)
@@ -288,7 +303,7 @@ class DropModel:
         """
         path = self.trajectory(role, x)
         levels = self.all_levels(role, x)[seen.pick]
-        stamps = seen.times * (1.0 + float(x[self.unknowns["clock"]][0]))
+        stamps = seen.times * self.rate(x)
         height, speed = path.heights(stamps)
         off = height - levels
         loose = _loose(path, stamps, seen)
@@ -303,23 +318,22 @@ class DropModel:
         knew of a stamp's own error would make a slow clock, with which all errors are smaller,
         look likelier.
         """
-        effects, seen = self._effects[role], self._matched(role, matches)
-        rate, path = 1.0 + float(x[self.unknowns["clock"]][0]), self.trajectory(role, x)
+        acts, seen = self.slopes[role], self._matched(role, matches)
+        path = self.trajectory(role, x)
         times, late, levels, loose = self._stamps(role, x, seen)
-        height, speed, moved = path.sights(
-            times, effects.path[:, effects.columns[: effects.moving]]
-        )
+        height, speed, moved = path.sights(times, acts.path[:, acts.columns[: acts.moving]])
         values = height - levels + speed * late
         sigma = self._sigma(seen, speed, loose)
-        slopes = -effects.levels[seen.pick[:, None], effects.columns]
-        slopes[:, : effects.moving] += moved
+        slopes = -acts.levels[seen.pick[:, None], acts.columns]
+        slopes[:, : acts.moving] += moved
         # Of a slow clock the true time is later, and the chain lower by then.
-        slopes[:, effects.clock] -= speed * times / rate
+        rates = self.unknowns.rate[acts.columns[acts.clocks]]
+        slopes[:, acts.clocks] -= np.outer(speed * times / self.rate(x), rates)
         told = self._part(seen, loose > 0.0, values, sigma)
         second = np.flatnonzero(told)
         slopes[second] -= told[second, None] * slopes[second - 1]
         left = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
-        return Equations(left, told, slopes, effects.columns)
+        return Equations(left, told, slopes, acts.columns)
 
 
 def _widths(record: ChainRecord) -> Sequence[float]:

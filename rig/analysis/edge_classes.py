@@ -91,7 +91,7 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     """
     model, x = drop.model, drop.x
     assert model.protocol.gates is not None
-    clock = 1.0 + float(x[model.unknowns["clock"]][0])
+    clock = model.rate(x)
     found: list[UnmatchedEdge] = []
     for role, record in model.records.items():
         path = model.trajectory(role, x)

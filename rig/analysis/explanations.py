@@ -1,16 +1,18 @@
 """Why edges are not those of this protocol: faults of one kind each, weighed against each other.
 
-A drop that cannot be read, or reads badly, is read again as if one thing were otherwise: a chain
-longer or of more rods, another drop height, a post higher, the clock slow, two gates exchanged …
-Each such protocol is judged by the same marginal likelihood as the stated one, with what the fault
-costs beforehand: how improbable it is, and how wide the range of its size. Only a fault that beats
-all others clearly is named.
+Where a drop cannot be read, or reads badly, one thing may be otherwise. What has a size (a chain
+longer, another drop height, a post higher, the clock slow …) is a direction of the unknowns: the
+score tells which to open, and its size is adjusted with all else. What has none (gates exchanged,
+rods too many …) is another protocol, with which the edges are read anew. Both are judged by the
+same marginal likelihood as the protocol as it is, with what the fault costs beforehand: how
+improbable it is, and how wide the range of its size. Rivals of each are all others, and that this
+fall is not the equations'; only a fault that beats all of them clearly is named.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,17 +20,20 @@ import numpy as np
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel, prior_air
-from rig.analysis.fit import settle
+from rig.analysis.faults import Fault, faults
+from rig.analysis.fit import match, settle
 from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weighed, well_read
 from rig.analysis.score_test import scores
 from rig.reasons import make_reason
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
+    from collections.abc import Hashable, Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
-    from rig.analysis.faults import Fault, Premise
+    from rig.analysis.faults import Premise
     from rig.analysis.fit import Fit
     from rig.analysis.identify import Reading
     from rig.analysis.score_test import Score
@@ -36,19 +41,25 @@ if TYPE_CHECKING:
     from rig.records import Drop
     from rig.vocabulary import Vocabulary
 
+    Array = NDArray[np.float64]
+
 CLEAR = math.log(100.0)
 """Log odds by which a fault must beat every other one, and the protocol as it is, to be named."""
 RARE = math.log(100.0)
 """How many drops of a kind there are to one with some fault: what each of them costs beforehand."""
 _NAMED = 3  # faults told where none is clear
 _SOME = 0.6  # share of a side's expected edges without which nothing is tried
-_NEAR = 0.02  # how far off the expected α may be, to count votes by
 _VOTED = 0.8  # share of all expected edges that must vote for a fall with a fault
+_MARGIN = 3  # edges by which votes may fall short of what an adjusted fall matches
 _TRIED = 4  # faults that are weighed: those that most edges ask for
-_STEPS = 4  # of the search for a size
-_DONE = 0.1  # standard uncertainties: a step so short is the last
+_APART = 2.0 * CLEAR  # log odds by which another fault may be less likely than its score has it
+_BEYOND = 10.0  # times what strings do to a chain together, in a fall that is not the equations'
 _TOLD = 3.0  # standard uncertainties: a smaller size may as well be none
 _LEFT = 12.5  # gain that another fault may still have beside one that explains everything: 5 σ
+
+
+NEITHER = Fault("", lambda _size, _u: {})
+"""No fault, but a fall that is not that of the equations."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +97,8 @@ class Explainer:
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters.
-    faults
-        That are weighed.
+    suspects
+        Numbers of the gates of which any two may be exchanged.
     """
 
     def __init__(
@@ -96,25 +107,26 @@ class Explainer:
         drop: Drop,
         clock_u: float,
         components: Components,
-        faults: Sequence[Fault],
+        suspects: Sequence[int],
     ) -> None:
         self.setting = setting
         self.drop = drop
         self.clock_u = clock_u
         self.components = components
-        self.faults = faults
-        self.steady = [one for one in faults if one.shift is not None]
+        every = faults(setting.protocol, setting.run, suspects)
+        self.discrete = [fault for fault in every if fault.shift is None]
+        self.sized = [fault for fault in every if fault.shift is not None]
         # A fault of one side leaves the other as it was.
         self._votes: dict[Hashable, int] = {}
 
     def asked(self, fit: Fit) -> bool:
         """Whether an adjusted drop asks for some size of a fault."""
-        return any(gain > RARE for gain in self._gains(fit))
+        return any(gain > RARE for gain in self._gains(self._scores(fit)))
 
-    def _gains(self, fit: Fit) -> list[float]:
+    def _gains(self, found: Sequence[Score]) -> list[float]:
         """By how much each fault of some size would be likelier than none, if none were rare."""
-        found = zip(self.steady, self._scores(fit), strict=True)
-        return [score.gain - _occam(one, score.u) for one, score in found]
+        pairs = zip(self.sized, found, strict=True)
+        return [score.gain - _occam(fault, score.u) for fault, score in pairs]
 
     def explain(self, fit: Fit | None) -> list[Explanation]:
         """Weigh all faults; the likeliest first, and only those likelier than none.
@@ -124,65 +136,107 @@ class Explainer:
         fit
             How the edges are read as the protocol is; `None` where they cannot be.
         """
-        found: list[Explanation | None] = []
         if fit is None:
             records = self._records(self.setting)
-            if any(possible(one) < _SOME * one.expected for one in records):
+            if any(possible(record) < _SOME * record.expected for record in records):
                 return []  # too few edges came for any fall
-            sides = [
-                read_quickly(self.setting.protocol, [one], self.clock_u, self.components)
-                for one in records
-            ]
-            stated = sum(_freely(one) for one in sides if one is not None)
-            stated = self._absolute(self.setting, stated)
-            others, well = self.faults, False
+            stated = sum(self._read_alone(record) for record in records)
+            explanations = [*self._voted([*self.sized, *self.discrete], stated)]
         else:
             reading = weighed(fit)
-            stated = self._absolute(self.setting, _freely(reading))
-            gains, well = np.array(self._gains(fit)), well_read(reading)
-            ranked = np.argsort(gains)[::-1][:_TRIED]
-            # Of a good reading the score tells beforehand which search would end in vain; air that
-            # seems to push is what a fault may save besides.
-            ranked = ranked[gains[ranked] > min(0.0, held_back(fit))] if well else ranked
-            found += [self._sought(self.steady[n], 0.0, reading, stated) for n in ranked]
-            others = [one for one in self.faults if one.shift is None or not well]
-        found += [self._afresh(one, size, stated) for one, size in self._voted(others)]
-        if well and any(one is not None and one.log_odds > 0.0 for one in found):
-            # A rod at one end too many looks like a chain that hangs a rod's distance higher, which
-            # no score tells that begins a rod off.
-            found += [self._afresh(one, size, stated) for one, size in self._voted(self.steady)]
-        likelier = [one for one in found if one is not None and one.log_odds > 0.0]
-        # What was found in both ways counts once.
-        best = {id(one.fault): one for one in sorted(likelier, key=lambda one: one.log_odds)}
+            stated, well = self._absolute(reading, self.setting.hz), well_read(reading)
+            explanations = [*self._along(fit, stated, well), *self._voted(self.discrete, stated)]
+            likelier = [one for one in explanations if one.log_odds > 0.0]
+            likeliest = max(likelier, key=lambda one: one.log_odds, default=None)
+            sized = likeliest is not None and likeliest.whole and likeliest.fault in self.sized
+            if not sized and (likelier or not well):
+                # A rod at one end too many looks like a chain that hangs a rod's distance higher,
+                # which no score tells that begins a rod off.
+                explanations += self._voted(self.sized, stated)
+            if any(one.whole and one.log_odds > CLEAR for one in explanations):
+                explanations += self._beyond(fit, stated)
+        likelier = sorted(
+            (one for one in explanations if one.log_odds > 0.0), key=lambda one: one.log_odds
+        )
+        best = {id(one.fault): one for one in likelier}  # what was found in both ways counts once
         return sorted(best.values(), key=lambda one: -one.log_odds)
 
-    def _absolute(self, setting: Premise, evidence: float) -> float:
-        """Evidence of a reading, as it can be compared with that of another setting.
+    def _read_alone(self, record: ChainRecord) -> float:
+        """Evidence of a side by itself, where the whole drop cannot be read."""
+        reading = read_quickly(self.setting.protocol, [record], self.clock_u, self.components)
+        if reading is None:
+            return record.expected * math.log(MISSED)
+        return self._absolute(reading, self.setting.hz)
+
+    def _along(self, fit: Fit, stated: float, well: bool) -> Iterator[Explanation]:
+        """Weigh the sized faults for which the score asks most, each along its direction.
+
+        Where one fault explains a drop, another one gains that share of it by which it does the
+        same: those that may be as likely are weighed too, however many these are.
+        """
+        found = self._scores(fit)
+        gains = np.array(self._gains(found))
+        # Of a good reading the score tells beforehand which search would end in vain; air that
+        # seems to push is what a fault may save besides.
+        least = min(0.0, held_back(fit)) if well else -math.inf
+        ranked = [int(n) for n in np.argsort(gains)[::-1] if gains[n] > least]
+        most, first = 0.0, max(gains.max(initial=0.0), 1.0)
+        for rank, n in enumerate(ranked):
+            if rank >= _TRIED and most * (1.0 - gains[n] / first) > _APART:
+                return
+            one = self._open(self.sized[n], 0.0, fit.model, fit.x, stated, found[n])
+            if one is not None:
+                most = max(most, one.log_odds)
+                yield one
+
+    def _beyond(self, fit: Fit, stated: float) -> Iterator[Explanation]:
+        """Weigh that it is no fault, but that this fall is not the equations'."""
+        if "stretch" not in fit.model.unknowns:
+            return
+        wider = replace(self.components, stretch=_BEYOND * self.components.stretch)
+        x = fit.x.copy()
+        model = fit.model.informed(wider, self.clock_u, x)
+        reading = weighed(settle(model, match(model, x), x=x))
+        log_odds = self._absolute(reading, self.setting.hz) - RARE - stated
+        yield Explanation(NEITHER, {}, log_odds, whole=True)
+
+    def _absolute(self, reading: Reading, hz: float) -> float:
+        """Evidence of a reading, as it can be compared with that of another premise.
 
         By itself it is of times, and edges came in ticks; and it is relative to a reading in which
         all edges are strays and every rod was missed, of which others may have fewer.
         """
-        ticks = len(self.drop.edges) * math.log(self.setting.hz / setting.hz)
-        expected = sum(one.expected for one in self._records(setting))
-        return evidence + ticks + expected * math.log(MISSED)
+        ticks = len(self.drop.edges) * math.log(self.setting.hz / hz)
+        expected = sum(record.expected for record in reading.fit.model.records.values())
+        return _freely(reading) + ticks + expected * math.log(MISSED)
 
     def _scores(self, fit: Fit) -> list[Score]:
-        return scores(fit, [one.direction(fit.model) for one in self.steady])
+        return scores(
+            fit, [fault.shift.direction(fit.model) for fault in self.sized if fault.shift]
+        )
 
     def _records(self, setting: Premise) -> list[ChainRecord]:
         return chain_records(setting.protocol, setting.run, self.drop, setting.hz)
 
-    def _voted(self, faults: Sequence[Fault]) -> list[tuple[Fault, float]]:
-        """Faults of the sizes for which most edges vote: enough, and no fewer than for none."""
+    def _voted(self, faults: Sequence[Fault], stated: float) -> Iterator[Explanation]:
+        """Weigh faults of the sizes for which most edges vote: enough, not fewer than for none."""
         least = self._net(self.setting)[1]
         found = []
         for fault in faults:
-            sized = [(*self._net(fault.change(self.setting, size)), size) for size in fault.sizes]
+            sized = [(*self._net(fault.premise(self.setting, size)), size) for size in fault.sizes]
             share, net, size = max(sized, key=lambda row: row[1])
             if share >= _VOTED and net >= least:
                 found.append((net, fault, size))
         found.sort(key=lambda row: -row[0])
-        return [(fault, size) for _, fault, size in found[:_TRIED]]
+        enough = 0
+        for net, fault, size in found[:_TRIED]:
+            if net < enough:
+                return
+            one = self._afresh(fault, size, stated)
+            if one is not None:
+                if one.whole:
+                    enough = max(enough, net - 2 * _MARGIN)
+                yield one
 
     def _net(self, setting: Premise) -> tuple[float, int]:
         """Share of the expected edges that vote for one fall, and votes less edges without."""
@@ -200,14 +254,14 @@ class Explainer:
 
     def _afresh(self, fault: Fault, size: float, stated: float) -> Explanation | None:
         """Weigh a fault of some size, with which the edges are read anew."""
-        setting = fault.change(self.setting, size)
+        premise = fault.premise(self.setting, size)
         reading = read_quickly(
-            setting.protocol, self._records(setting), self.clock_u, self.components
+            premise.protocol, self._records(premise), self.clock_u, self.components
         )
         if reading is None:
             return None
         if fault.shift is not None:
-            return self._sought(fault, size, reading, stated)
+            return self._open(fault, size, reading.fit.model, reading.fit.x, stated)
         u, occam = 0.0, math.log(len(fault.sizes))
         if fault.of_air:
             # Its size was integrated out, as everything that is unknown.
@@ -215,45 +269,70 @@ class Explainer:
             at, estimate = fit.model.unknowns["drag"], fit.estimate
             size = fit.model.kappa(estimate.x)
             u = math.sqrt(estimate.covariance[at, at].item()) * float(estimate.sd[at][0])
-        return self._explanation(fault, size, u, reading, occam, stated)
+        return self._explanation(fault, size, u, reading, premise.hz, stated + occam)
 
-    def _sought(
-        self, fault: Fault, size: float, reading: Reading, stated: float
+    def _open(
+        self,
+        fault: Fault,
+        size: float,
+        model: DropModel,
+        x: Array,
+        stated: float,
+        score: Score | None = None,
+        *,
+        last: bool = False,
     ) -> Explanation | None:
-        """Find a fault's likeliest size by Newton's method, and weigh it."""
-        for _ in range(_STEPS):
-            fit = reading.fit
-            (score,) = scores(fit, [fault.direction(fit.model)])
-            if not abs(score.size) > _DONE * score.u:
-                break
-            tried = float(np.clip(size + score.size, min(fault.sizes), max(fault.sizes)))
-            setting = fault.change(self.setting, tried)
-            model = DropModel(
-                setting.protocol,
-                self._records(setting),
-                fit.model.guesses,
+        """Adjust a drop with the size of a fault as one thing more that is not known, and weigh it.
+
+        Parameters
+        ----------
+        size
+            With which it was read.
+        model, x
+            As it was read.
+        score
+            Of what the fault would do besides, to begin with.
+        last
+            Whether the rods that pass beams are taken as they are: with a size other ones may, and
+            the drop is adjusted once more.
+        """
+        opened, x = model.suspecting(fault.suspect(model)), np.append(x, 0.0)
+        if score is not None:
+            most = max(fault.sizes)
+            x += float(np.clip(score.size, -most, most)) * np.append(score.follow, 1.0)
+        reading = weighed(settle(opened, match(opened, x), x=x))
+        estimate = reading.fit.estimate
+        more, u = float(estimate.x[-1]), math.sqrt(estimate.covariance[-1, -1]) * estimate.sd[-1]
+        if not _TOLD * u < abs(size + more) <= max(fault.sizes):
+            return None  # it is better read for another reason than that
+        premise = fault.premise(self.setting, size + more)
+        if not last and self._expects_others(premise, model):
+            there = DropModel(
+                premise.protocol,
+                self._records(premise),
+                model.guesses,
                 self.clock_u,
                 self.components,
             )
-            other = weighed(settle(model, x=fit.x + (tried - size) * score.follow))
-            if other.evidence < reading.evidence:
-                break
-            size, reading = tried, other
-        if not abs(size) > _TOLD * score.u:
-            return None  # it is better read for another reason than that
-        return self._explanation(fault, size, score.u, reading, _occam(fault, score.u), stated)
+            return self._open(fault, size + more, there, estimate.x[:-1], stated, last=True)
+        hz = fault.premise(self.setting, size).hz / (1.0 + opened.unknowns.rate[-1] * more)
+        return self._explanation(fault, size + more, u, reading, hz, stated)
+
+    def _expects_others(self, premise: Premise, model: DropModel) -> bool:
+        """Whether other rods pass other beams than those of a model."""
+        return any(
+            not np.array_equal(train.rods, other.rods)
+            for record in self._records(premise)
+            for train, other in zip(record.trains, model.records[record.role].trains, strict=True)
+        )
 
     def _explanation(
-        self, fault: Fault, size: float, u: float, reading: Reading, occam: float, stated: float
+        self, fault: Fault, size: float, u: float, reading: Reading, hz: float, stated: float
     ) -> Explanation:
         left = max((score.gain for score in self._scores(reading.fit)), default=0.0)
-        evidence = self._absolute(fault.change(self.setting, size), _freely(reading))
-        return Explanation(
-            fault,
-            fault.values(size, u),
-            evidence - occam - RARE - stated,
-            well_read(reading) and left < _LEFT,
-        )
+        log_odds = self._absolute(reading, hz) - RARE - stated
+        whole = well_read(reading) and left < _LEFT
+        return Explanation(fault, fault.values(size, u), log_odds, whole)
 
 
 def _freely(reading: Reading) -> float:
@@ -298,11 +377,11 @@ def explained(
     accused
         What is said where no fault is clear.
     """
-    second = max([0.0, *(one.log_odds for one in found[1:])])
-    if found and found[0].whole and found[0].log_odds - second > CLEAR:
-        best, log_odds = found[0], found[0].log_odds - second
-        return [make_reason(best.fault.code, words, **best.values, log_odds=log_odds)]
-    if not found or found[0].log_odds < CLEAR:
+    if not found or found[0].log_odds < CLEAR or found[0].fault is NEITHER:
         return [*accused]
-    candidates = [{"code": one.fault.code, "values": one.values} for one in found[:_NAMED]]
+    best, lead = found[0], found[0].log_odds - max([0.0, *(one.log_odds for one in found[1:])])
+    if best.whole and lead > CLEAR:
+        return [make_reason(best.fault.code, words, **best.values, log_odds=lead)]
+    named = [one for one in found if one.fault is not NEITHER]
+    candidates = [{"code": one.fault.code, "values": one.values} for one in named[:_NAMED]]
     return [make_reason("unclear_fault", words, candidates=candidates)]

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rig.analysis.unknowns import Unknown
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -38,13 +39,73 @@ class Premise(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Shift:
+    """What a fault of size 1 does to what a protocol states.
+
+    Attributes
+    ----------
+    drop, clock, gravity
+        To the drop height, m, the rate of the clock, relative, and gravity, m/s².
+    gates
+        To the height of each gate, m; none where it leaves them.
+    chains
+        Names of the chains that are longer or thicker.
+    length, width
+        To their length, relative, and the width of their rods, m.
+    """
+
+    drop: float = 0.0
+    clock: float = 0.0
+    gravity: float = 0.0
+    gates: tuple[float, ...] = ()
+    chains: frozenset[str] = frozenset()
+    length: float = 0.0
+    width: float = 0.0
+
+    def premise(self, stated: Premise, size: float) -> Premise:
+        """Return what a drop is read with as it is with a fault of some size."""
+        protocol, placed = stated.protocol, _placed(stated.protocol)
+        drop, gravity = protocol.drop, protocol.gravity
+        shifts = self.gates or (0.0,) * len(placed.gates)
+        gates = [
+            replace(gate, height=gate.height + size * shift)
+            for gate, shift in zip(placed.gates, shifts, strict=True)
+        ]
+        chains = {name: self._resized(protocol.chains[name], size) for name in self.chains}
+        changed = replace(
+            protocol,
+            drop=Quantity(drop.value + size * self.drop, drop.u),
+            gravity=Quantity(gravity.value + size * self.gravity, gravity.u),
+            gates=replace(placed, gates=tuple(gates)),
+            chains={**protocol.chains, **chains},
+        )
+        return Premise(changed, stated.run, stated.hz * (1.0 - size * self.clock))
+
+    def _resized(self, chain: RodChain, size: float) -> RodChain:
+        heights = tuple(height * (1.0 + size * self.length) for height in chain.chain.heights)
+        widths = tuple(width + size * self.width for width in chain.widths)
+        return replace(chain, chain=replace(chain.chain, heights=heights), widths=widths)
+
+    def direction(self, model: DropModel) -> Array:
+        """Return what it does to all unknowns of a drop, shape ``(unknowns,)``."""
+        at = model.unknowns
+        moved = np.zeros(len(at))
+        for name in ("drop", "clock", "gravity"):
+            moved[at[name]] = getattr(self, name)
+        moved[at["beams"]] = self.gates or 0.0
+        for role, record in model.records.items():
+            if record.chain.name in self.chains:
+                moved[at[f"{role} rods"]] = self.length * np.array(record.chain.chain.heights)
+                moved[at[f"{role} width"]] = self.width
+        return moved
+
+
+@dataclass(frozen=True)
 class Fault:
     """One way in which a rig may differ from its protocol.
 
     Attributes
     ----------
-    change
-        The setting as it is with a fault of some size.
     code
         Of the reason that names it.
     values
@@ -52,26 +113,42 @@ class Fault:
     sizes
         Tried at first; apart by no more than what a reading tolerates.
     shift
-        Where sizes between them count too: what a fault of size 1 does to each of a drop's
-        unknowns, by their blocks.
+        Where sizes between them count too: what a fault of size 1 does.
+    exchange
+        Where they do not: the premise as it is with a fault of some size.
     of_air
         Whether its size is κ, which every drop tells that is not told of the air.
     """
 
-    change: Callable[[Premise, float], Premise]
     code: str
     values: Callable[[float, float], dict[str, Any]]
     sizes: tuple[float, ...] = (0.0,)
-    shift: Callable[[DropModel], Mapping[str, float | Array]] | None = None
+    shift: Shift | None = None
+    exchange: Callable[[Premise, float], Premise] = lambda stated, _size: stated
     of_air: bool = False
 
-    def direction(self, model: DropModel) -> Array:
-        """What a fault of size 1 does to all unknowns, shape ``(unknowns,)``."""
+    def premise(self, stated: Premise, size: float) -> Premise:
+        """Return what a drop is read with as it is with a fault of some size."""
+        return (self.shift.premise if self.shift else self.exchange)(stated, size)
+
+    def suspect(self, model: DropModel) -> Unknown:
+        """Return its size as one thing more that is not known of a drop, in the range of its sizes.
+
+        At its mean a normal distribution has the density of an even one √(2π) times as wide as its
+        standard deviation.
+        """
         assert self.shift is not None
-        found = np.zeros(len(model.unknowns))
-        for name, by in self.shift(model).items():
-            found[model.unknowns[name]] = by
-        return found
+        direction = self.shift.direction(model)
+        span = max(self.sizes) - min(self.sizes)
+        return Unknown(
+            "fault",
+            "edges",
+            lambda _side: span / math.sqrt(2.0 * math.pi),
+            moves="all",
+            path=lambda side: (model.slopes[side.record.role].path @ direction)[:, None],
+            level=lambda side: model.slopes[side.record.role].levels @ direction,
+            rate=float(model.unknowns.rate @ direction),
+        )
 
 
 def faults(protocol: Protocol, run: Run, suspect: Sequence[int]) -> list[Fault]:
@@ -82,161 +159,120 @@ def faults(protocol: Protocol, run: Run, suspect: Sequence[int]) -> list[Fault]:
     suspect
         Numbers of the gates of which any two may be exchanged.
     """
-    placed = _placed(protocol)
-    gates = placed.gates
-    sides = [placed.on(post) for post in placed.posts]
-    found = [*_chain_faults(protocol, run), *_rig_faults(protocol)]
-    if len(sides) > 1:
-        found += [_post(side[0].side) for side in sides if len(side) > 1]
-    if len(gates) > 1:
-        found += [_gate_off(n, gate) for n, gate in enumerate(gates)]
-    found += [_exchange(gates, a, b) for a, b in combinations(suspect, 2)]
-    return found
+    gates = _placed(protocol).gates
+    exchanges = [_exchange(gates, a, b) for a, b in combinations(suspect, 2)]
+    return [*_chain_faults(protocol, run), *_rig_faults(protocol), *_gate_faults(gates), *exchanges]
 
 
-def _grid(limit: float, step: float) -> tuple[float, ...]:
+def _sized(
+    code: str,
+    values: Callable[[float, float], dict[str, Any]],
+    limit: float,
+    step: float,
+    shift: Shift,
+) -> Fault:
+    """A fault of any size up to a limit, tried in steps."""
     count = math.ceil(limit / step)
-    return tuple(step * n for n in range(-count, count + 1) if n)
+    sizes = tuple(step * n for n in range(-count, count + 1) if n)
+    return Fault(code, values, sizes, shift)
 
 
 def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
     """Faults of each chain, of both where they are alike, and of their places."""
     names = {role: name for role, name in (("impact", run.impact), ("free", run.free)) if name}
-    groups = [({name}, name) for name in names.values()]
+    groups = [(frozenset({name}), name) for name in names.values()]
     if len(names) > 1:
-        groups.append((set(names.values()), ""))
+        groups.append((frozenset(names.values()), ""))
     for group, name in groups:
-        one = protocol.chains[next(iter(group))]
-        if one.chain.rods > 1:  # one object has no length, and is no chain with rods missing
-            yield _length(group, name, one.chain.heights[-1])
-            yield _rods(group, name, one.chain.rods)
-        yield _thickness(group, name, min(one.widths))
+        chain = protocol.chains[min(group)]
+        if chain.chain.rods > 1:  # one object has no length, and is no chain with rods missing
+            yield _length(group, name, chain.chain.heights[-1])
+            yield _rods(group, name, chain.chain.rods)
+        yield _thickness(group, name, _WIDER * min(chain.widths))
     for role, name in names.items():
         if upside_down(protocol.chains[name]) is not None:
             yield _turned(name, role)
     if len(names) > 1 and protocol.unlike_chains:
         yield Fault(
-            lambda setting, _: setting._replace(
-                run=replace(setting.run, impact=setting.run.free, free=setting.run.impact)
-            ),
             "chains_exchanged",
             lambda _s, _u: {"impact": run.impact, "free": run.free},
+            exchange=lambda stated, _: stated._replace(
+                run=replace(stated.run, impact=stated.run.free, free=stated.run.impact)
+            ),
         )
 
 
-def _length(names: set[str], name: str, top: float) -> Fault:
-    return Fault(
-        _with_chains(names, _stretched),
-        "chain_length",
-        lambda s, u: {"name": name, "size_m": s * top, "U95_m": 2.0 * u * top},
-        _grid(0.06, 0.015),
-        lambda model: {
-            f"{role} rods": np.array(record.chain.chain.heights)
-            for role, record in model.records.items()
-            if record.chain.name in names
-        },
-    )
+def _length(names: frozenset[str], name: str, top: float) -> Fault:
+    def values(share: float, u: float) -> dict[str, Any]:
+        return {"name": name, **_size(share * top, u * top)}
+
+    return _sized("chain_length", values, 0.06, 0.015, Shift(chains=names, length=1.0))
 
 
-def _rods(names: set[str], name: str, rods: int) -> Fault:
-    counts = tuple(float(n) for n in range(-_MORE, _MORE + 1) if n and rods + n >= 2)
+def _thickness(names: frozenset[str], name: str, most: float) -> Fault:
+    def values(metres: float, u: float) -> dict[str, Any]:
+        return {"name": name, **_size(metres, u)}
+
+    return _sized("thickness", values, most, most, Shift(chains=names, width=1.0))
+
+
+def _rods(names: frozenset[str], name: str, rods: int) -> Fault:
     return Fault(
-        _with_chains(names, _with_more),
         "rod_count",
         lambda n, _: {"name": name, "rods": rods + round(n), "stated": rods},
-        counts,
-    )
-
-
-def _thickness(names: set[str], name: str, width: float) -> Fault:
-    return Fault(
-        _with_chains(names, _widened),
-        "thickness",
-        lambda d, u: {"name": name, **_size(d, u)},
-        (-_WIDER * width, _WIDER * width),
-        lambda model: {
-            f"{role} width": 1.0
-            for role, record in model.records.items()
-            if record.chain.name in names
-        },
+        tuple(float(n) for n in range(-_MORE, _MORE + 1) if n and rods + n >= 2),
+        exchange=_with_chains(names, _with_more),
     )
 
 
 def _turned(name: str, role: str) -> Fault:
     return Fault(
-        _with_chains({name}, lambda chain, _: upside_down(chain) or chain),
         "upside_down",
         lambda _s, _u: {"name": name, "side": role},
+        exchange=_with_chains({name}, lambda chain, _: upside_down(chain) or chain),
     )
 
 
 def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
     """Faults of everything that both chains share."""
-    yield Fault(
-        lambda setting, d: _protocol(
-            setting,
-            drop=Quantity(setting.protocol.drop.value + d, setting.protocol.drop.u),
-        ),
-        "drop_height",
-        _size,
-        _grid(60e-3, 10e-3),
-        lambda _: {"drop": 1.0},
-    )
-    yield Fault(
-        lambda setting, e: setting._replace(hz=setting.hz * (1.0 - e)),
-        "clock",
-        _share,
-        _grid(0.05, 0.01),
-        lambda _: {"clock": 1.0},
-    )
+    yield _sized("drop_height", _size, 60e-3, 10e-3, Shift(drop=1.0))
+    yield _sized("clock", _share, 0.05, 0.01, Shift(clock=1.0))
     if protocol.drag is not None:
         yield Fault(
-            lambda setting, _: _protocol(setting, drag=None),
             "air",
             lambda kappa, u: {"kappa": kappa, "U95": 2.0 * u},
+            exchange=lambda stated, _: stated._replace(
+                protocol=replace(stated.protocol, drag=None)
+            ),
             of_air=True,
         )
-    if protocol.surface is None:
-        return  # from beam to beam nobody knows the contact point, and gravity is what is measured
-    yield Fault(
-        lambda setting, c: _moved(setting, c, lambda _gate: True),
-        "all_gates",
-        _size,
-        _grid(40e-3, 10e-3),
-        lambda _: {"datum": 1.0},
-    )
-    yield Fault(
-        lambda setting, e: _protocol(
-            setting,
-            gravity=Quantity(
-                setting.protocol.gravity.value * (1.0 + e), setting.protocol.gravity.u
-            ),
-        ),
-        "gravity",
-        _share,
-        _grid(0.10, 0.02),
-        lambda model: {"gravity": model.protocol.gravity.value},
-    )
+    if protocol.surface is not None:
+        # From beam to beam nobody knows the contact point, and gravity is what is measured.
+        everywhere = (1.0,) * len(_placed(protocol).gates)
+        yield _sized("all_gates", _size, 40e-3, 10e-3, Shift(gates=everywhere))
+        yield _sized("gravity", _share, 0.10, 0.02, Shift(gravity=protocol.gravity.value))
 
 
-def _post(side: str) -> Fault:
-    return Fault(
-        lambda setting, c: _moved(setting, c, lambda gate: gate.side == side),
-        "post",
-        lambda c, u: {"side": side, **_size(c, u)},
-        _grid(40e-3, 10e-3),
-        lambda model: {"datum": np.array(_placed(model.protocol).posts) == side},
-    )
+def _gate_faults(gates: Sequence[Gate]) -> Iterator[Fault]:
+    """Faults of the post of several gates, and of each gate."""
+    sides = [gate.side for gate in gates]
+    for side in dict.fromkeys(sides):
+        if 1 < sides.count(side) < len(sides):
+            yield _raised(gates, [gate for gate in gates if gate.side == side])
+    if len(gates) > 1:
+        yield from (_raised(gates, [gate]) for gate in gates)
 
 
-def _gate_off(number: int, gate: Gate) -> Fault:
-    return Fault(
-        lambda setting, c: _moved(setting, c, lambda one: one.channel == gate.channel),
-        "gate_height",
-        lambda c, u: {**gate_values(gate), **_size(c, u)},
-        _grid(40e-3, 10e-3),
-        lambda model: {"beams": np.eye(len(_placed(model.protocol).gates))[number]},
-    )
+def _raised(gates: Sequence[Gate], wrong: Sequence[Gate]) -> Fault:
+    code, where = ("gate_height", gate_values(wrong[0]))
+    if len(wrong) > 1:
+        code, where = "post", {"side": wrong[0].side}
+
+    def values(metres: float, u: float) -> dict[str, Any]:
+        return {**where, **_size(metres, u)}
+
+    shift = Shift(gates=tuple(float(gate in wrong) for gate in gates))
+    return _sized(code, values, 40e-3, 10e-3, shift)
 
 
 def _placed(protocol: Protocol) -> Gates:
@@ -245,14 +281,15 @@ def _placed(protocol: Protocol) -> Gates:
 
 
 def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
-    def change(setting: Premise, _: float) -> Premise:
-        found = list(gates)
-        found[a] = replace(gates[a], channel=gates[b].channel)
-        found[b] = replace(gates[b], channel=gates[a].channel)
-        return _with_gates(setting, found)
+    def exchange(stated: Premise, _: float) -> Premise:
+        protocol, changed = stated.protocol, [*gates]
+        changed[a] = replace(gates[a], channel=gates[b].channel)
+        changed[b] = replace(gates[b], channel=gates[a].channel)
+        placed = replace(_placed(protocol), gates=tuple(changed))
+        return stated._replace(protocol=replace(protocol, gates=placed))
 
     both = [gate_values(gates[a]), gate_values(gates[b])]
-    return Fault(change, "gates_exchanged", lambda _s, _u: {"at": both})
+    return Fault("gates_exchanged", lambda _s, _u: {"at": both}, exchange=exchange)
 
 
 def gate_values(gate: Gate) -> dict[str, Any]:
@@ -261,85 +298,48 @@ def gate_values(gate: Gate) -> dict[str, Any]:
     return {"channel": gate.channel, "side": gate.side, "height_m": height}
 
 
-def _protocol(setting: Premise, **changes: object) -> Premise:
-    return setting._replace(protocol=replace(setting.protocol, **changes))  # type: ignore[arg-type]
-
-
-def _with_gates(setting: Premise, gates: Sequence[Gate]) -> Premise:
-    return _protocol(setting, gates=replace(_placed(setting.protocol), gates=tuple(gates)))
-
-
-def _moved(setting: Premise, by: float, which: Callable[[Gate], bool]) -> Premise:
-    moved = [
-        replace(one, height=one.height + by) if which(one) else one
-        for one in _placed(setting.protocol).gates
-    ]
-    return _with_gates(setting, moved)
-
-
 def _with_chains(
-    names: set[str], other: Callable[[RodChain, float], RodChain]
+    names: Collection[str], other: Callable[[RodChain, float], RodChain]
 ) -> Callable[[Premise, float], Premise]:
     def change(setting: Premise, size: float) -> Premise:
         chains = {
             name: other(chain, size) if name in names else chain
             for name, chain in setting.protocol.chains.items()
         }
-        return _protocol(setting, chains=chains)
+        return setting._replace(protocol=replace(setting.protocol, chains=chains))
 
     return change
 
 
-def _stretched(chain: RodChain, by: float) -> RodChain:
-    heights = tuple(height * (1.0 + by) for height in chain.chain.heights)
-    return replace(chain, chain=replace(chain.chain, heights=heights))
+def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) -> RodChain:
+    """Hang rods of a chain, by their numbers, at other heights above the lowest one."""
 
+    def chosen(values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(values[n] for n in order)
 
-def _widened(chain: RodChain, by: float) -> RodChain:
-    return replace(chain, widths=tuple(width + by for width in chain.widths))
+    rods = chain.chain
+    inertias = rods.inertias and chosen(rods.inertias)
+    hung = replace(rods, masses=chosen(rods.masses), heights=tuple(heights), inertias=inertias)
+    widths, diameters = chosen(chain.widths), chosen(chain.diameters)
+    return replace(chain, chain=hung, widths=widths, diameters=diameters)
 
 
 def _with_more(chain: RodChain, more: float) -> RodChain:
     """Add rods like the top one at the top, or take some off."""
-    rods, extra = chain.chain, round(more)
-    if extra < 0:
-        kept = slice(0, rods.rods + extra)
-        inertias = rods.inertias and rods.inertias[kept]
-        less = replace(
-            rods, masses=rods.masses[kept], heights=rods.heights[kept], inertias=inertias
-        )
-        return replace(
-            chain, chain=less, widths=chain.widths[kept], diameters=chain.diameters[kept]
-        )
-    pitch = rods.heights[-1] - rods.heights[-2] if rods.rods > 1 else 0.0
-    added = tuple(rods.heights[-1] + pitch * (n + 1) for n in range(extra))
-    inertias = rods.inertias and rods.inertias + rods.inertias[-1:] * extra
-    longer = replace(
-        rods,
-        masses=rods.masses + rods.masses[-1:] * extra,
-        heights=rods.heights + added,
-        inertias=inertias,
-    )
-    return replace(
-        chain,
-        chain=longer,
-        widths=chain.widths + chain.widths[-1:] * extra,
-        diameters=chain.diameters + chain.diameters[-1:] * extra,
-    )
+    heights, count = chain.chain.heights, chain.chain.rods + round(more)
+    top, pitch = len(heights) - 1, heights[-1] - heights[-2] if len(heights) > 1 else 0.0
+    order = [min(n, top) for n in range(count)]
+    return _with_rods(chain, order, [heights[k] + pitch * (n - k) for n, k in enumerate(order)])
 
 
 def upside_down(chain: RodChain) -> RodChain | None:
     """Turn a chain round; `None` where that makes no difference."""
-    rods = chain.chain
-    top = rods.heights[-1]
-    heights = tuple(top - height for height in rods.heights[::-1])
-    widths = chain.widths[::-1]
-    alike = all(abs(a - b) < 1e-3 for a, b in zip(heights, rods.heights, strict=True))
-    if alike and widths == chain.widths:
+    heights = chain.chain.heights
+    turned = [heights[-1] - height for height in heights[::-1]]
+    alike = all(abs(a - b) < 1e-3 for a, b in zip(turned, heights, strict=True))
+    if alike and chain.widths[::-1] == chain.widths:
         return None
-    inertias = rods.inertias and rods.inertias[::-1]
-    turned = replace(rods, masses=rods.masses[::-1], heights=heights, inertias=inertias)
-    return replace(chain, chain=turned, widths=widths)
+    return _with_rods(chain, range(len(heights))[::-1], turned)
 
 
 def _size(metres: float, u: float) -> dict[str, Any]:

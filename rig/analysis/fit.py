@@ -141,10 +141,9 @@ def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
     width
         How far off an edge may be, m.
     """
-    clock = 1.0 + float(x[model.unknowns["clock"]][0])
     found: Matches = {}
     for role, pairing in model.pairings.items():
-        heights, speeds = model.trajectory(role, x).heights(pairing.times * clock)
+        heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
         found[role] = pairing.matched(model.all_levels(role, x), heights, speeds, width)
     return found
 

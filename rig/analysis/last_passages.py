@@ -129,7 +129,7 @@ def _passages(fit: Fit, role: str) -> _Passages:
     places = np.array(record.chain.chain.heights)
     # The reference is at the level when the edge comes, and the top rod as much higher.
     heights = expected.levels[pick] + places[-1]
-    clock = 1.0 + float(fit.x[model.unknowns["clock"]][0])
+    clock = model.rate(fit.x)
     sigma = model.residuals(role, fit.x, fit.matches[role]).sigma
     sign, landed = expected.sign[pick], model.components.landed * expected.landed[pick]
     return _Passages(expected.times[edge] * clock, heights, gate, rod, sigma, sign, landed)

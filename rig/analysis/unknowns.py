@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -83,36 +84,6 @@ class Side(NamedTuple):
         """That of the drop's more tilted chain."""
         return max(Side(self.model, record).slope for record in self.model.records.values())
 
-    @property
-    def parameters(self) -> int:
-        """How many numbers its trajectory has; see `rig.analysis.trajectory.struck_trajectory`."""
-        return COMMON if self.record.ratios is None else COMMON + 2 * self.record.ratios.size
-
-    def path_slopes(self, first: int, slopes: Array) -> Array:
-        """Derivatives of all parameters from those of some of them.
-
-        Parameters
-        ----------
-        first
-            Of these in the trajectory's parameters.
-        slopes
-            Shape ``(some,)`` or ``(some, members)``.
-        """
-        slopes = slopes.reshape(slopes.shape[0], -1)
-        found = np.zeros((self.parameters, slopes.shape[1]))
-        found[first : first + slopes.shape[0]] = slopes
-        return found
-
-    def gain_slopes(self, slopes: Array) -> Array:
-        """Derivatives of all parameters from those of each impact's α."""
-        return self.path_slopes(COMMON, slopes)
-
-    def place_slopes(self, slopes: Array) -> Array:
-        """Derivatives of all parameters from those of the rods' places as they strike."""
-        if self.record.ratios is None:  # of a free chain no rod strikes
-            return np.zeros((COMMON, 1))
-        return self.path_slopes(COMMON + self.record.ratios.size, slopes)
-
 
 @dataclass(frozen=True)
 class Unknown:
@@ -132,10 +103,14 @@ class Unknown:
         chain has its own, ``all`` for what both have in common.
     shared
         In which drops it is the same.
+    moves
+        Which parameters of a side's trajectory it acts on, see `parameters`.
     path
-        Derivatives of a side's trajectory, shape ``(parameters, members)``.
+        Their derivatives, of any shape that fits ``(parameters, members)``.
     level
         Derivatives of the levels of its expected edges, shape ``(edges, members)``.
+    rate
+        That of the time scale: how much later by it each moment is, relative.
     scale
         Of `rig.analysis.components.Components`, which multiplies the prior and which its members
         tell in turn.
@@ -148,8 +123,10 @@ class Unknown:
     sd: Callable[[Side], float | Sequence[float] | Array | None]
     of: Literal["all", "each", "impact", "free"] = "all"
     shared: Literal["rig", "chain", "condition", "drop"] = "drop"
-    path: Effect | None = None
+    moves: str = ""
+    path: Effect = lambda _side: np.ones(1)
     level: Effect | None = None
+    rate: float = 0.0
     scale: str = ""
     absent: Callable[[Side], float | Array] = lambda _side: 0.0
 
@@ -161,11 +138,6 @@ class Unknown:
         scale = float(getattr(side.model.components, self.scale)) if self.scale else 1.0
         prior: Array = scale * np.atleast_1d(sd)
         return prior
-
-
-def _parameter(place: int) -> Effect:
-    """Move one of the parameters that every trajectory has."""
-    return lambda side: side.path_slopes(place, np.ones(1))
 
 
 def _by_gate(side: Side) -> Array:
@@ -197,7 +169,7 @@ def _swing_sd(side: Side) -> float | None:
 def _swung(side: Side) -> Array:
     """How much lower each rod is as it strikes."""
     levers = lever(side.record.chain.chain)
-    return side.place_slopes(-drawn(levers, side.protocol, -side.record.strikes))
+    return -drawn(levers, side.protocol, -side.record.strikes)[:, None]
 
 
 def _impulse_sd(side: Side) -> Array:
@@ -236,180 +208,151 @@ def _late_sd(side: Side) -> float:
 
 def _contact(side: Side) -> Array:
     """Results are at the stated level: where the top rod would be if others struck elsewhere."""
-    return side.place_slopes(np.append(-np.ones(side.rods - 1), 0.0))
+    return np.append(-np.ones(side.rods - 1), 0.0)[:, None]
 
 
 def _top(side: Side) -> Array:
-    return side.place_slopes(np.append(np.zeros(side.rods - 1), 1.0))
+    return np.append(np.zeros(side.rods - 1), 1.0)[:, None]
 
 
 def _all(_: Side) -> float:
     return 1.0
 
 
+_rig = partial(Unknown, shared="rig")
+_chain = partial(Unknown, of="each")
+_struck = partial(Unknown, of="impact")
+_stretch = partial(
+    _struck,
+    line="stretch",
+    sd=_stretch_sd,
+    level=lambda side: side.model.discrepancy.stretch,
+    scale="stretch",
+    absent=_all,
+)
+
 TABLE = (
-    Unknown("clock", "clock", lambda side: side.model.clock_u, shared="rig"),
-    Unknown(
+    _rig("clock", "clock", lambda side: side.model.clock_u, rate=1.0),
+    _rig(
         "gravity",
         "gravity",
         lambda side: None if side.protocol.surface is None else side.protocol.gravity.u,
-        shared="rig",
-        path=_parameter(GRAVITY),
+        moves="gravity",
     ),
     Unknown(  # Where gravity is the result, each drop measures it for itself.
         "gravity",
         "gravity",
         lambda side: ANY_GRAVITY if side.protocol.surface is None else None,
-        path=_parameter(GRAVITY),
+        moves="gravity",
     ),
-    Unknown(
-        "drop",
-        "drop height",
-        lambda side: side.protocol.drop.u,
-        shared="rig",
-        path=_parameter(START),
-    ),
-    Unknown(
+    _rig("drop", "drop height", lambda side: side.protocol.drop.u, moves="start"),
+    _rig(
         "side",
         "side",
         lambda side: side.protocol.priors.side if len(side.model.records) > 1 else None,
         of="free",
-        shared="rig",
-        path=_parameter(START),
+        moves="start",
     ),
-    Unknown(
+    _rig(
         "drag",
         "air",
         lambda side: side.model.kappa_u,
-        shared="rig",
-        path=_parameter(DRAG),
+        moves="drag",
         absent=lambda side: float(side.protocol.drag is None),
     ),
-    Unknown(
-        "datum",
-        "datum",
-        lambda side: [side.gates.datum_u] * len(side.gates.posts),
-        shared="rig",
-        level=_by_post,
+    _rig(
+        "datum", "datum", lambda side: [side.gates.datum_u] * len(side.gates.posts), level=_by_post
     ),
-    Unknown(
+    _rig(
         "beams",
         "beam heights",
         lambda side: [side.gates.height_u] * len(side.gates.gates),
-        shared="rig",
         level=_by_gate,
         scale="gates",
     ),
-    Unknown("ripple", "beam offsets", _ripple_sd, shared="rig", level=_rippled, scale="beam"),
-    Unknown(  # Told by the edges alone, so its uncertainty counts as theirs.
-        "release", "edges", lambda _: ANYTHING, of="each", path=_parameter(RELEASE)
+    _rig("ripple", "beam offsets", _ripple_sd, level=_rippled, scale="beam"),
+    _chain(  # Told by the edges alone, so its uncertainty counts as theirs.
+        "release", "edges", lambda _: ANYTHING, moves="release"
     ),
-    Unknown("hang", "start height", _all, of="each", path=_parameter(START), scale="hang"),
-    Unknown(
+    _chain("hang", "start height", _all, moves="start", scale="hang"),
+    _chain(
         "rods",
         "spacing",
         lambda side: [side.record.chain.position_u] * side.rods,
-        of="each",
         shared="chain",
-        path=lambda side: side.place_slopes(np.eye(side.rods)),
+        moves="places",
+        path=lambda side: np.eye(side.rods),
         level=lambda side: -np.eye(side.rods)[side.edges.rods],
         scale="rods",
     ),
-    Unknown(
+    _chain(
         "off centre",
         "beam offsets",
         lambda side: side.protocol.priors.off_centre * side.slope if side.steepest else None,
-        of="each",
         level=lambda side: -side.edges.turn,
     ),
-    Unknown(
+    _chain(
         "width",
         "width",
         lambda side: side.record.chain.width_u,
-        of="each",
         shared="chain",
         level=lambda side: -side.edges.sign,
     ),
-    Unknown(
+    _chain(
         "swing",
         "swing",
         _swing_sd,
-        of="each",
+        moves="places",
         path=_swung,
         level=lambda side: side.edges.drawn,
         scale="swing",
     ),
-    Unknown(
-        "alpha",
-        "edges",
-        lambda _: ANYTHING,
-        of="impact",
-        path=lambda side: side.gain_slopes(np.ones(side.rods)),
-    ),
-    Unknown(
+    _struck("alpha", "edges", lambda _: ANYTHING, moves="gains"),
+    _struck(
         "impulses",
         "single impulses",
         _impulse_sd,
-        of="impact",
-        path=lambda side: side.gain_slopes(np.eye(side.rods)),
+        moves="gains",
+        path=lambda side: np.eye(side.rods),
         absent=_bounces,
     ),
-    Unknown(
+    _struck(
         "contact",
         "contact",
         lambda side: side.protocol.contact.level.u,
-        of="impact",
         shared="condition",
+        moves="places",
         path=_contact,
     ),
-    Unknown("strike", "contact", lambda side: side.protocol.contact.strike.u, of="impact"),
-    Unknown(
+    _struck("strike", "contact", lambda side: side.protocol.contact.strike.u),
+    _struck(
         "top",
         "top rod",
         _top_sd,
-        of="impact",
+        moves="places",
         path=_top,
         level=lambda side: -side.edges.alone.astype(np.float64),
     ),
-    Unknown(
+    _struck(
         "landed",
         "contact",
         lambda side: side.model.components.landed,
-        of="impact",
         level=lambda side: -side.edges.landed,
     ),
-    Unknown(
+    _struck(
         "strings",
         "single impulses",
         lambda side: side.protocol.priors.strings * abs(side.record.alpha),
-        of="impact",
         shared="condition",
-        path=lambda side: side.gain_slopes(above(side.rods) ** -2.0),
+        moves="gains",
+        path=lambda side: above(side.rods)[:, None] ** -2.0,
         absent=_all,
     ),
-    Unknown(
-        "stretch",
-        "stretch",
-        _stretch_sd,
-        of="impact",
-        level=lambda side: side.model.discrepancy.stretch,
-        scale="stretch",
-        absent=_all,
-    ),
-    Unknown(
-        "usual stretch",
-        "stretch",
-        _stretch_sd,
-        of="impact",
-        shared="condition",
-        level=lambda side: side.model.discrepancy.stretch,
-        scale="stretch",
-        absent=_all,
-    ),
-    Unknown("late", "late pull", _late_sd, of="impact", absent=_all),
+    _stretch("stretch"),
+    _stretch("usual stretch", shared="condition"),
+    _struck("late", "late pull", _late_sd, absent=_all),
 )
-"""In the order of a drop's vector. The clock acts on stamps, `strike` and `late` on results alone.
-"""
+"""In the order of a drop's vector. `strike` and `late` act on results alone."""
 
 
 class Unknowns:
@@ -428,6 +371,8 @@ class Unknowns:
         Blocks of each line of the uncertainty budget.
     sd
         Prior standard uncertainties, shape ``(unknowns,)``.
+    rate
+        Derivatives of the time scale, see `Unknown.rate`; likewise.
     """
 
     def __init__(self, model: DropModel) -> None:
@@ -435,6 +380,7 @@ class Unknowns:
         self.blocks: dict[str, slice] = {}
         self.groups: dict[str, list[slice]] = {}
         priors: list[Array] = []
+        rates: list[Array] = []
         size = 0
         for name, row, side in _named(model):
             prior = row.prior(side)
@@ -444,8 +390,10 @@ class Unknowns:
             self.blocks[name] = block = slice(size, size + prior.size)
             self.groups.setdefault(row.line, []).append(block)
             priors.append(prior)
+            rates.append(np.full(prior.size, row.rate))
             size = block.stop
         self.sd: Array = np.concatenate(priors)
+        self.rate: Array = np.concatenate(rates)
 
     def __len__(self) -> int:
         return self.sd.size
@@ -462,7 +410,7 @@ class Unknowns:
 def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
     """Go through the rows for the chains that there are."""
     sides = {role: Side(model, record) for role, record in model.records.items()}
-    for own, rows in groupby(TABLE, lambda row: row.of == "each"):
+    for own, rows in groupby((*TABLE, *model.suspects), lambda row: row.of == "each"):
         if own:
             each = [*rows]
             for role, side in sides.items():
@@ -472,6 +420,14 @@ def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
             for row in rows:
                 if row.of == "all" or row.of in sides:
                     yield row.name, row, sides.get(row.of, first)
+
+
+def parameters(struck: int) -> dict[str, slice]:
+    """Return which parameters of a trajectory are what, for so many rods that strike."""
+    places = {"release": RELEASE, "start": START, "gravity": GRAVITY, "drag": DRAG}
+    found = {name: slice(place, place + 1) for name, place in places.items()}
+    ends = [COMMON, COMMON + struck, COMMON + 2 * struck]
+    return found | {"gains": slice(*ends[:2]), "places": slice(*ends[1:]), "all": slice(0, ends[2])}
 
 
 class SideSlopes(NamedTuple):
@@ -488,33 +444,34 @@ class SideSlopes(NamedTuple):
         move its trajectory. Shape ``(columns,)``.
     moving
         How many do.
-    clock
-        Which of the columns is the clock.
+    clocks
+        Which of the columns change the time scale.
     """
 
     path: Array
     levels: Array
     columns: Index
     moving: int
-    clock: int
+    clocks: Index
 
 
-def effects(model: DropModel, role: str) -> SideSlopes:
+def side_slopes(model: DropModel, role: str) -> SideSlopes:
     """Put together what the rows of the table do to one side."""
     at, side = model.unknowns, Side(model, model.records[role])
-    path = np.zeros((side.parameters, len(at)))
+    moved = parameters(0 if side.record.ratios is None else side.rods)
+    path = np.zeros((moved["all"].stop, len(at)))
     levels = np.zeros((side.edges.rods.size, len(at)))
     for name, row in at.rows.items():
         if row.of in {"all", role} or (row.of == "each" and name.startswith(role)):
-            if row.path is not None:
-                path[:, at[name]] = row.path(side)
+            place = moved.get(row.moves, slice(0, 0))
+            if place.stop > place.start:
+                path[place, at[name]] = row.path(side)
             if row.level is not None:
                 levels[:, at[name]] = row.level(side).reshape(levels[:, at[name]].shape)
     moving = np.flatnonzero(path.any(axis=0))
-    known = np.append(np.flatnonzero(levels.any(axis=0)), at["clock"].start)
+    known = np.union1d(np.flatnonzero(levels.any(axis=0)), np.flatnonzero(at.rate))
     columns = np.append(moving, np.setdiff1d(known, moving))
-    (clock,) = np.flatnonzero(columns == at["clock"].start)
-    return SideSlopes(path, levels, columns, moving.size, int(clock))
+    return SideSlopes(path, levels, columns, moving.size, np.flatnonzero(at.rate[columns]))
 
 
 class SharedUnknowns:

@@ -11,7 +11,7 @@ from bench.studies.layout_catalogue import KINDS, STANDARD, Kind, under
 from rig.analysis import unknowns
 from rig.analysis.drop_model import DropModel
 from rig.analysis.joint_fit import joint_fit
-from rig.analysis.unknowns import TABLE, Unknown, Unknowns, effects
+from rig.analysis.unknowns import TABLE, Unknown, Unknowns
 from rig.protocol import reader
 from rig.units import Quantity
 from tests.analysis.drops import PROTOCOLS, SCENES, case
@@ -40,7 +40,7 @@ def test_every_row_moves_path_and_levels_by_its_derivatives(scene):
     model = model_of(scene)
     x, at = somewhere(model), model.unknowns
     for role in model.records:
-        acts, path = effects(model, role), model.trajectory(role, x)
+        acts, path = model.slopes[role], model.trajectory(role, x)
         # Not at an impact, where the height has a kink.
         begins = np.append(path.time[0] + 0.05, path.time[1:])
         times = 0.5 * (begins + np.append(begins[1:], begins[-1] + 0.02))
