@@ -104,7 +104,6 @@ def adjust(
     x: Array,
     centre: Array | None = None,
     done: float = DONE,
-    steps: int = STEPS,
     *,
     rough: bool = False,
 ) -> Estimate:
@@ -122,8 +121,6 @@ def adjust(
         Prior means of the unknowns, zero if not given.
     done
         How short a step is the last, see `length`.
-    steps
-        How many there are at most.
     rough
         Whether only the way matters, and edges are weighed as they were.
     """
@@ -132,7 +129,7 @@ def adjust(
         return linearize(model, matches, at, inflation)
 
     sd = model.unknowns.sd
-    return least_squares(about, sd, x, centre, done, steps, rough=rough)
+    return least_squares(about, sd, x, centre, done, rough=rough)
 
 
 @np.errstate(all="ignore")  # a step may lead to where there is no number, and is taken back

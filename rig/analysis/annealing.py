@@ -11,7 +11,7 @@ first.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -315,6 +315,25 @@ class Legs(NamedTuple):
     kappa: Array
 
 
+class Flights(NamedTuple):
+    """Where falls are on their legs, shape ``(falls, times)``; the last two may be ``(falls, 1)``.
+
+    Attributes
+    ----------
+    leg, height
+        Which, and where it begins, m.
+    lasted, speed
+        For how long each is on it, s, and how fast it began there, m/s.
+    """
+
+    leg: Index
+    height: Array
+    lasted: Array
+    speed: Array
+    gravity: Array
+    kappa: Array
+
+
 class Annealed(NamedTuple):
     """A fall whose edges found their rods.
 
@@ -364,7 +383,6 @@ class SideFall:
     kappa: float
     sd: Array
     sigma: Array
-    centre: Array = field(default_factory=lambda: np.zeros(UNKNOWNS))
 
     @cached_property
     def levels(self) -> Array:
@@ -452,18 +470,23 @@ class SideFall:
         times[levels >= legs.height[:, :1]] = np.nan
         return times, arrival
 
-    def _legs_at(self, legs: Legs, since: Array) -> tuple[Index, Array]:
-        """On which leg each fall is at each time since its release, and for how long."""
+    def _flights(self, legs: Legs, unknowns: Array, times: Array) -> Flights:
+        """On which leg each fall is at each time, and how it fares there."""
         count, size = legs.time.shape
-        if size == 1:
-            return np.zeros(since.shape, dtype=np.intp), np.maximum(since, 0.0)
-        last = float(legs.time[:, -1].max())
-        row = (last + 1.0) * np.arange(count)[:, None]
-        clipped = np.clip(since, 0.0, last + 0.5)
-        leg = np.searchsorted((legs.time + row).ravel(), clipped + row, side="right") - 1
-        leg -= size * np.arange(count)[:, None]
-        leg = np.clip(leg, 0, size - 1)
-        return leg, np.maximum(since - np.take_along_axis(legs.time, leg, axis=1), 0.0)
+        since = times * (1.0 + unknowns[:, CLOCK, None]) - unknowns[:, RELEASE, None]
+        leg = np.zeros(since.shape, dtype=np.intp)
+        if size > 1:
+            # One row after the other in one line.
+            last, row = float(legs.time[:, -1].max()), np.arange(count)[:, None]
+            line, sought = legs.time + (last + 1.0) * row, np.clip(since, 0.0, last + 0.5)
+            leg += np.searchsorted(line.ravel(), sought + (last + 1.0) * row, side="right")
+            leg = np.clip(leg - 1 - size * row, 0, size - 1)
+        begin, height, speed = (np.take_along_axis(part, leg, axis=1) for part in legs[:3])
+        share = np.broadcast_to(self.record.air, size)[leg]
+        lasted = np.maximum(since - begin, 0.0)
+        return Flights(
+            leg, height, lasted, speed, legs.gravity[:, None], legs.kappa[:, None] * share
+        )
 
     def heights(self, unknowns: Array, times: Array) -> tuple[Array, Array]:
         """Where falls are at some times by the edges' clock, and how fast.
@@ -478,52 +501,34 @@ class SideFall:
         ndarray, ndarray
             m, m/s; shape ``(falls, times)``.
         """
-        legs = self.legs(unknowns)
-        since = times * (1.0 + unknowns[:, CLOCK, None]) - unknowns[:, RELEASE, None]
-        leg, lasted = self._legs_at(legs, since)
-        share = np.broadcast_to(self.record.air, legs.height.shape[1])[leg]
-        speed = np.take_along_axis(legs.speed, leg, axis=1)
-        kappa = legs.kappa[:, None] * share
-        fallen, speed = fall_for(lasted, speed, legs.gravity[:, None], kappa)
-        height: Array = np.take_along_axis(legs.height, leg, axis=1) - fallen
-        return height, speed
+        _, height, *flight = self._flights(self.legs(unknowns), unknowns, times)
+        fallen, speed = fall_for(*flight)
+        return height - fallen, speed
 
     def sights(self, unknowns: Array, times: Array) -> tuple[Array, Array, Array]:
         """What `heights` says, and the derivatives by all unknowns; ``(falls, times, UNKNOWNS)``.
 
         Those of when a leg begins and how fast are differences; on a leg they are exact.
         """
-        count = len(unknowns)
-        moved = [START, PULL, DRAG, ALPHA, GROWTH] if self.record.ratios is not None else []
-        moved = [name for name in moved if self.sd[name] > 0.0]
-        steps = _SMALL * self.sd[moved]
-        tried = np.repeat(unknowns[None], 1 + len(moved), axis=0)
-        for n, (name, step) in enumerate(zip(moved, steps.tolist(), strict=True), 1):
-            tried[n, :, name] += step
-        legs = self.legs(tried.reshape(-1, UNKNOWNS))
-        every = [
-            part.reshape(1 + len(moved), count, -1) for part in (legs.time, legs.height, legs.speed)
-        ]
-        gravity, kappa = legs.gravity[:count, None], legs.kappa[:count]
-        now = Legs(every[0][0], every[1][0], every[2][0], legs.gravity[:count], kappa)
-        since = times * (1.0 + unknowns[:, CLOCK, None]) - unknowns[:, RELEASE, None]
-        leg, lasted = self._legs_at(now, since)
-        share = np.broadcast_to(self.record.air, now.height.shape[1])[leg]
-        speed = np.take_along_axis(now.speed, leg, axis=1)
-        fallen, falling, by_speed, by_gravity, by_kappa = leg_slopes(
-            lasted, speed, gravity, kappa[:, None] * share
-        )
-        slopes = np.zeros((*since.shape, UNKNOWNS))
+        struck = self.record.ratios is not None
+        moved = [n for n in (START, PULL, DRAG, ALPHA, GROWTH) if struck and self.sd[n] > 0.0]
+        steps = _SMALL * self.sd * np.eye(UNKNOWNS)[[RELEASE, *moved]]
+        steps[0] = 0.0
+        legs = self.legs((unknowns + steps[:, None]).reshape(-1, UNKNOWNS))
+        every = [part.reshape(len(steps), len(unknowns), *part.shape[1:]) for part in legs]
+        leg, height, *flight = self._flights(Legs(*(part[0] for part in every)), unknowns, times)
+        fallen, falling, by_speed, by_gravity, by_kappa = leg_slopes(*flight)
+        slopes = np.zeros((*leg.shape, UNKNOWNS))
         slopes[..., RELEASE] = falling
         slopes[..., CLOCK] = -falling * times
         slopes[..., START] = leg == 0
         slopes[..., PULL] = -by_gravity
-        slopes[..., DRAG] = -share * by_kappa
-        for n, (name, step) in enumerate(zip(moved, steps.tolist(), strict=True), 1):
-            later, faster = ((every[part][n] - every[part][0]) / step for part in (0, 2))
+        slopes[..., DRAG] = -by_kappa * np.broadcast_to(self.record.air, legs.time.shape[1])[leg]
+        for n, name in enumerate(moved, 1):
+            later, faster = ((every[of][n] - every[of][0]) / steps[n, name] for of in (0, 2))
             slopes[..., name] += falling * np.take_along_axis(later, leg, axis=1)
             slopes[..., name] -= by_speed * np.take_along_axis(faster, leg, axis=1)
-        return np.take_along_axis(now.height, leg, axis=1) - fallen, falling, slopes
+        return height - fallen, falling, slopes
 
     def anneal(self, starts: Array) -> list[Annealed]:
         """Let falls find their edges, σ from wide to narrow; shape ``(falls, UNKNOWNS)``."""
@@ -545,8 +550,7 @@ class SideFall:
             across = np.swapaxes(slopes, 1, 2)
             matrix = (across * part.sum(axis=2)[:, None, :]) @ slopes + prior
             right = (across @ (part * weights.off).sum(axis=2)[..., None])[..., 0]
-            y = np.divide(x - self.centre, sd, out=np.zeros_like(x), where=sd > 0.0)
-            right += y @ prior
+            right += (x / unit) @ prior
             change = self._bounded(matrix, right, (x - high) / unit, (x - low) / unit)
             # No chain moves on by more than its rods are sought within.
             taken = weights.weight.sum(axis=2)
@@ -567,7 +571,7 @@ class SideFall:
                 x, matrix = x[alike], matrix[alike]
         height, speed = self.heights(x, times)
         weights = self.pairing.weights(self.levels, height, speed, own)
-        y = np.divide(x - self.centre, sd, out=np.zeros_like(x), where=sd > 0.0)
+        y = x / unit
         lost = 0.5 * ((y @ prior) * y).sum(axis=1) + 0.5 * np.linalg.slogdet(matrix)[1]
         return [
             self._judged(
@@ -612,7 +616,7 @@ class SideFall:
         free, none is off by more than the first step allows.
         """
         low, high = self.bounds
-        stated = np.clip(self.centre, low, high)[None]
+        stated = np.clip(np.zeros((1, UNKNOWNS)), low, high)
         times = self.passages(stated)[0][0]
         times = times[np.isfinite(times)]
         grid = np.zeros((1, UNKNOWNS))

@@ -13,7 +13,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from rig.analysis.equations import HUBER, scaled
 from rig.analysis.fit import Fit, count_matched, settle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
+
+Weighed = TypeVar("Weighed", "Annealed", "Reading")
 
 _ANY_ALPHA = 0.25  # standard deviation of α about what the model expects
 _CLEAR = 0.97  # share of all that could be matched with which no other start is tried
@@ -135,15 +137,14 @@ def identify(
         Within which chains were let go, s since the release fired.
     """
     sides: list[_Side] = []
-    # The free chain first: it tells what the air does to both, and when they were let go.
-    near, centre = window, np.zeros(UNKNOWNS)
+    # The free chain first: it tells when both were let go.
+    near = window
     for record in reversed(records):
-        side = _Side(protocol, record, clock_u, components, centre)
+        side = _Side(protocol, record, clock_u, components)
         side.search(near)
         if near != window and not side.convincing(_FAIR):
             side.search(window)
         if side.convincing(_FAIR):
-            centre = side.common()
             near = _around([one.unknowns[RELEASE] for one in side.found], window)
         sides.insert(0, side)
     if not all(side.found for side in sides):
@@ -207,11 +208,6 @@ def _around(releases: Sequence[float], window: Span) -> Span:
 class _Side:
     """One chain's edges, to be read by themselves.
 
-    Parameters
-    ----------
-    centre
-        What is known already of the air and the clock.
-
     Attributes
     ----------
     found
@@ -224,13 +220,11 @@ class _Side:
         record: ChainRecord,
         clock_u: float,
         components: Components,
-        centre: Array | None = None,
     ) -> None:
         self.record = record
         self.found: list[Annealed] = []
         stated = Guess(0.0, protocol.drop.value, record.alpha, prior_air(protocol)[0])
         self.model = DropModel(protocol, [record], {record.role: stated}, clock_u, components)
-        self._centre = np.zeros(UNKNOWNS) if centre is None else centre
         self._tried = np.zeros((0, UNKNOWNS))
         self._most = 0
 
@@ -254,7 +248,6 @@ class _Side:
             kappa,
             sd,
             self._sigma(),
-            self._centre,
         )
 
     def _sigma(self) -> Array:
@@ -284,13 +277,6 @@ class _Side:
         enough = max(_LEAST * self.record.expected, clear * possible(self.record))
         return best.scatter < _CALM and best.matched >= enough
 
-    def common(self) -> Array:
-        """What the best reading says of the air and the clock, which both sides share."""
-        centre = np.zeros(UNKNOWNS)
-        for name in (CLOCK, DRAG):
-            centre[name] = self.found[0].unknowns[name]
-        return centre
-
     def search(self, window: Span, batches: int | None = None) -> None:
         """Anneal from one batch of starts after another while none explains the edges."""
         fall = self.fall
@@ -305,36 +291,28 @@ class _Side:
             annealed = fall.anneal(fresh)
             self._most = max(self._most, *(one.matched for one in annealed))
             # Likelier than that all edges are strays and every rod was missed.
-            self._keep([*self.found, *(one for one in annealed if one.evidence > 0.0)])
+            likely = (one for one in annealed if one.evidence > 0.0)
+            self.found = _ranked([*self.found, *likely], lambda one: [one.edges])
             if self.convincing(_CLEAR):
                 return
 
-    def _keep(self, readings: Iterable[Annealed]) -> None:
-        """Order readings, and leave out what is the same as a likelier one."""
-        self.found = []
-        for reading in sorted(readings, key=lambda one: -one.evidence):
-            if all(_unlike(reading.edges, other.edges) for other in self.found):
-                self.found.append(reading)
 
-
-def _best(readings: Iterable[Reading]) -> list[Reading]:
+def _ranked(readings: Iterable[Weighed], edges: Callable[[Weighed], list[Index]]) -> list[Weighed]:
     """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
-    found: list[Reading] = []
+    found: list[Weighed] = []
     for reading in sorted(readings, key=lambda one: -one.evidence):
-        if all(different(reading.fit, other.fit) for other in found):
+        if all(any(map(_unlike, edges(reading), edges(other))) for other in found):
             found.append(reading)
     return found
 
 
-def different(one: Fit, other: Fit) -> bool:
-    """Whether two readings give really different rods to the same edges of a side."""
-    return any(
-        _unlike(np.concatenate(matches), np.concatenate(other.matches[role]))
-        for role, matches in one.matches.items()
-    )
+def _edges(fit: Fit) -> list[Index]:
+    """For each side the edge of every expected one, counted in its train."""
+    return [np.concatenate(side) for side in fit.matches.values()]
 
 
 def _unlike(mine: Index, theirs: Index) -> bool:
+    """Whether two readings give really different rods to the same edges."""
     matched = int(np.count_nonzero((mine >= 0) | (theirs >= 0)))
     return bool(np.count_nonzero(mine != theirs) > max(_FEW, _OTHER * matched))
 
@@ -416,7 +394,7 @@ def _together(
         models = [side.model for side in sides]
         model = DropModel(protocol, records, begin, clock_u, components, models)
         tried.append(weighed(settle(model, matches)))
-    best, *rest = _best(tried)
+    best, *rest = _ranked(tried, lambda one: _edges(one.fit))
     if not best.evidence > 0.0:
         return Identification(None, _shares(best.fit))
     odds = best.evidence - rest[0].evidence if rest else math.inf
