@@ -417,7 +417,7 @@ class SideFall:
         """Say a fall by what it is instead of what it is off."""
         alpha = self.record.alpha + float(unknowns[ALPHA])
         return Guess(
-            float(unknowns[RELEASE]),
+            float(unknowns[RELEASE] * (1.0 + unknowns[CLOCK])),
             self.start + float(unknowns[START]),
             alpha if self.record.ratios is not None else 0.0,
             self.kappa + float(unknowns[DRAG]),
@@ -473,7 +473,8 @@ class SideFall:
     def _flights(self, legs: Legs, unknowns: Array, times: Array) -> Flights:
         """On which leg each fall is at each time, and how it fares there."""
         count, size = legs.time.shape
-        since = times * (1.0 + unknowns[:, CLOCK, None]) - unknowns[:, RELEASE, None]
+        # The clock's rate counts from the release: hours after the fire it is not told from it.
+        since = (times - unknowns[:, RELEASE, None]) * (1.0 + unknowns[:, CLOCK, None])
         leg = np.zeros(since.shape, dtype=np.intp)
         if size > 1:
             # One row after the other in one line.
@@ -519,8 +520,8 @@ class SideFall:
         leg, height, *flight = self._flights(Legs(*(part[0] for part in every)), unknowns, times)
         fallen, falling, by_speed, by_gravity, by_kappa = leg_slopes(*flight)
         slopes = np.zeros((*leg.shape, UNKNOWNS))
-        slopes[..., RELEASE] = falling
-        slopes[..., CLOCK] = -falling * times
+        slopes[..., RELEASE] = falling * (1.0 + unknowns[:, CLOCK, None])
+        slopes[..., CLOCK] = -falling * (times - unknowns[:, RELEASE, None])
         slopes[..., START] = leg == 0
         slopes[..., PULL] = -by_gravity
         slopes[..., DRAG] = -by_kappa * np.broadcast_to(self.record.air, legs.time.shape[1])[leg]
@@ -665,7 +666,7 @@ class SideFall:
         due = np.where(np.isnan(due), np.inf, due)
         near = self.pairing.times[edge] - due.min(axis=0)[side] >= window[0] - 2.0 * _LONGEST
         edge, side = edge[near], side[near]
-        release = self.pairing.times[edge] * (1.0 + nodes[:, CLOCK, None]) - due[:, side]
+        release = self.pairing.times[edge] - due[:, side] / (1.0 + nodes[:, CLOCK, None])
         there = (release >= max(window[0], -1e9) - _LONGEST) & (release <= window[1] + _LONGEST)
         if not there.any():
             return np.zeros((0, UNKNOWNS)), np.zeros(0)
