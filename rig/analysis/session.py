@@ -15,9 +15,9 @@ from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
 from rig.errors import InputError
-from rig.protocol.measurable import check_measurable
+from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.plan import runs as planned_runs
-from rig.reasons import make_reason
+from rig.reasons import make_error, make_reason
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -141,11 +141,7 @@ def analyze(
     InputError
         A drop of a run that is not planned, or a scene that cannot be measured.
     """
-    if protocol.gates is None:
-        raise InputError(
-            "this protocol has no gates, so there is nothing to analyse",
-            "rig predict PROTOCOL says what the model expects",
-        )
+    check_gates(protocol)
     check_measurable(protocol)
     planned = {run.number: run for run in planned_runs(protocol)}
     rejected = rejected or {}
@@ -172,6 +168,8 @@ def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
         There is none.
     """
     if drop.run not in planned:
+        if drop.damage:  # its number is what was altered
+            raise make_error(InputError, "record_damaged", text=f"run {drop.run}: {drop.damage}")
         raise InputError(
             f"run {drop.run} is not in the plan, which has {len(planned)} runs",
             "is it the right protocol? rig check PROTOCOL shows the plan",

@@ -364,6 +364,9 @@ def test_a_run_that_is_not_planned_or_a_scene_without_gates_is_bad_input():
     drop = replace(attempts((1, 1))[0], run=13)
     with pytest.raises(InputError, match="run 13 is not in the plan, which has 12"):
         analyze(SINGLE, [drop], scale)
+    damaged = replace(drop, damage="its bytes say otherwise")
+    with pytest.raises(InputError, match="damaged: run 13: its bytes say otherwise; see rig recov"):
+        analyze(SINGLE, [damaged], scale)
     with pytest.raises(InputError, match="no gates"):
         analyze(replace(SINGLE, gates=None), [drop], scale)
 
