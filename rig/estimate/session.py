@@ -220,7 +220,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     """
     if protocol.surface is None:
         raise InputError(
-            "nothing strikes anything in this session, so there are no impacts to estimate",
+            "this scene has no coefficients to estimate",
             "rig analyze SESSION gives the acceleration of free fall",
         )
     good = {(one.run.number, one.attempt): one.run for one in analysis.runs if one.verdict in GOOD}

@@ -218,7 +218,7 @@ def test_one_chain_and_few_drops_are_estimated_too():
 
 
 def test_where_nothing_strikes_there_is_nothing_to_estimate():
-    with pytest.raises(InputError, match="nothing strikes"):
+    with pytest.raises(InputError, match="no coefficients"):
         estimate(FENCE, analyzed(cases((1, 2), scene="fence")))
 
 

@@ -120,6 +120,31 @@ def test_commands_and_page_speak_the_words_of_their_scene(recorded, tmp_path, ca
         assert_own_words(scene, "page", unescape(re.sub(r"<[^>]+>", "\n", html)))
 
 
+def test_what_goes_before_and_after_an_analysis_speaks_the_words_of_its_scene(
+    recorded, tmp_path, capsys
+):
+    scene, protocol, sessions = recorded
+    session = str(next(iter(sessions)))
+    csv, again = tmp_path / "csv", str(tmp_path / "again.session")
+    commands = [
+        ["check", str(protocol)],
+        ["predict", str(protocol)],
+        ["design", str(protocol)],
+        ["run", str(protocol), "--port", "sim://?seed=2", "--session", again, "--yes"],
+        ["export", session, "--csv", str(csv)],
+        ["import", f"{csv}/edges.csv", "--protocol", str(protocol), "--session", f"{again}.csv"],
+        ["estimate", session],
+        ["replay", session],
+        ["recover", session],
+        ["doctor", "--session", session],
+    ]
+    for command in commands:
+        capsys.readouterr()
+        main(command)
+        text = re.sub(r"\nLeft out\n.*", "", "".join(capsys.readouterr()), flags=re.DOTALL)
+        assert_own_words(scene, command[0], re.sub(NAMES, "", text))
+
+
 def test_screens_speak_the_words_of_their_scene(recorded, monkeypatch):
     scene, protocol, sessions = recorded
     monkeypatch.setattr(pictures, "LiveAnalysis", sessions.__getitem__)
