@@ -104,6 +104,8 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 def _densest(releases: Array) -> Span:
     """Return the first and the last of the fullest seconds of a record that may last hours."""
+    if float(np.ptp(releases)) <= _RECORD:
+        return float(releases.min()), float(releases.max())
     some = np.sort(releases)
     held = np.searchsorted(some, some + _RECORD, side="right") - np.arange(some.size)
     begin = int(np.argmax(held))
@@ -358,6 +360,25 @@ class Annealed(NamedTuple):
     def matched(self) -> int:
         """Number of edges that belong to a rod."""
         return int(np.count_nonzero(self.edges >= 0))
+
+
+class Ballot(NamedTuple):
+    """How many edges vote for each release of some falls.
+
+    Attributes
+    ----------
+    table
+        Votes, shape ``(falls, releases)``.
+    first, step
+        Where the releases begin, and how far apart they are, s.
+    fastest
+        Of all passages, m/s.
+    """
+
+    table: Index
+    first: float
+    step: float
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -655,11 +676,22 @@ class SideFall:
         """
         nodes, begin, size = self.nodes(), 0, _BATCH
         while begin < len(nodes):
-            yield self._agreed(nodes[begin : begin + size], window, least)
+            some = nodes[begin : begin + size]
+            ballot = self._ballot(some, window)
+            yield (
+                (np.zeros((0, UNKNOWNS)), np.zeros(0))
+                if ballot is None
+                else self._peaks(some, ballot, least)
+            )
             begin, size = begin + size, 2 * size
 
-    def _agreed(self, nodes: Array, window: Span, least: float) -> tuple[Array, Array]:
-        """Find the releases for which most edges vote, with each node's fall."""
+    def most_votes(self) -> int:
+        """Count the edges that agree on one of the likeliest falls of the grid, at most."""
+        ballot = self._ballot(self.nodes()[:_BATCH], EVER)
+        return 0 if ballot is None else int(ballot.table.max())
+
+    def _ballot(self, nodes: Array, window: Span) -> Ballot | None:
+        """Let every edge vote, for each node, for the releases from which it would be a rod's."""
         due, speeds = self.passages(nodes)
         edge, side = np.nonzero(self.pairing.kind[:, None] == self.pairing.kinds)
         # What no fall passes votes for no moment, and what is outside the window either.
@@ -669,7 +701,7 @@ class SideFall:
         release = self.pairing.times[edge] - due[:, side] / (1.0 + nodes[:, CLOCK, None])
         there = (release >= max(window[0], -1e9) - _LONGEST) & (release <= window[1] + _LONGEST)
         if not there.any():
-            return np.zeros((0, UNKNOWNS)), np.zeros(0)
+            return None
         first, last = _densest(release[there])
         there &= (release >= first) & (release <= last)
         half = np.clip(self.slack / np.maximum(speeds, 1e-9), _SHORTEST, _LONGEST)
@@ -683,15 +715,14 @@ class SideFall:
             bound = np.clip(np.rint(place + sign * reach), 0, bins).astype(np.intp)
             votes -= sign * np.bincount(row + bound, minlength=votes.size)
         table = np.cumsum(votes.reshape(len(nodes), bins + 1), axis=1)
-        return self._peaks(nodes, table, speeds, first, step, least)
+        return Ballot(table, first, step, float(speeds.max()))
 
-    def _peaks(
-        self, nodes: Array, table: Index, speeds: Array, first: float, step: float, least: float
-    ) -> tuple[Array, Array]:
+    def _peaks(self, nodes: Array, ballot: Ballot, least: float) -> tuple[Array, Array]:
         """Take the highest counts of which no two are the same fall."""
+        table, step = ballot.table, ballot.step
         found, votes = [], []
         row = np.arange(len(nodes))
-        width = max(1, int(0.5 * _PART * self.slack / float(speeds.max()) / step))
+        width = max(1, int(0.5 * _PART * self.slack / ballot.fastest / step))
         width = min(width, max(1, int(_LONGEST / step)))
         near = np.arange(-width, width + 1)
         for _ in range(_PEAKS):
@@ -703,7 +734,7 @@ class SideFall:
             )
             middle = at + np.maximum(end - 1, 0) // 2
             starts = nodes.copy()
-            starts[:, RELEASE] = first + step * (middle + 0.5)
+            starts[:, RELEASE] = ballot.first + step * (middle + 0.5)
             found.append(starts)
             votes.append(count)
             table[row[:, None], np.clip(middle[:, None] + near, 0, table.shape[1] - 1)] = 0

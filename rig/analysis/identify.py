@@ -170,9 +170,7 @@ def most_votes(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> int:
     """Count the expected edges of a side that agree on one fall near the stated one, at most."""
-    fall = _Side(protocol, record, clock_u, components).fall
-    _, votes = next(fall.starts(), (None, np.zeros(0)))
-    return int(votes.max(initial=0))
+    return _Side(protocol, record, clock_u, components).fall.most_votes()
 
 
 def well_read(reading: Reading) -> bool:
