@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from sim.dials import Dials
+    from .dials import Dials
 
 NOT_A_ROD = -1
 

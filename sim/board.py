@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Decoder, crc16
 from rig.link.messages import Phase
-from sim.controller import Microcontroller
-from sim.counter import Counter
-from sim.inputs import Inputs
-from sim.transmitter import Transmitter
+
+from .controller import Microcontroller
+from .counter import Counter
+from .inputs import Inputs
+from .transmitter import Transmitter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from sim.lab_interface import Lab
+    from .lab_interface import Lab
 
 CAPACITY = 1024
 MAX_PULSE_US = 500_000

@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.link import messages as wire
 from rig.link.messages import DisarmReason, Phase, RefusalReason
-from sim.recording import Recording
-from sim.release import Release
-from sim.snapshots import take_snapshots
+
+from .recording import Recording
+from .release import Release
+from .snapshots import take_snapshots
 
 if TYPE_CHECKING:
     import random
 
     from rig.link.frames import Frame
-    from sim.counter import Counter
-    from sim.inputs import Inputs
-    from sim.lab_interface import Lab
+
+    from .counter import Counter
+    from .inputs import Inputs
+    from .lab_interface import Lab
 
 _NO_PULSE = (0, wire.PulseEnd.ORDERED)
 _SILENCE_NS = wire.HOST_SILENCE_MS * 10**6

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.units import Dimension, UnitError, parse
-from sim.resolved_dials import NAMES as RESOLVED
+
+from .resolved_dials import NAMES as RESOLVED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

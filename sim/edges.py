@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.link.messages import pack_label
 from rig.ports import read_settings
 from rig.protocol import reader
-from sim.dials import read_dials
-from sim.scene import choose_world
+
+from .dials import read_dials
+from .scene import choose_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from sim.scene import Hang
-    from sim.truth import Truth
+    from .scene import Hang
+    from .truth import Truth
 
     Choose = Callable[[dict[str, str]], tuple[Hang, dict[str, str]]]
 

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from sim import resolved
+from . import resolved
 
 KEPT = 2000
 """Files at most, of some 0.1 MB each; the oldest go."""

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sim.resolved.hanging import board_height, hang
+from .resolved.hanging import board_height, hang
 
 if TYPE_CHECKING:
-    from sim.resolved.scene import Chain, Fall
+    from .resolved.scene import Chain, Fall
 
 SKIPPED_S, SHOWN_S = 0.02, 0.005
 """Between two moments before the first touch, and after it."""

@@ -21,18 +21,20 @@ from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import GUESSED
 from rig.units import Quantity
-from sim.air import air
-from sim.beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
-from sim.camera import camera_reading
-from sim.dials import known
-from sim.path import Path
-from sim.truth import Truth
+
+from .air import air
+from .beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
+from .camera import camera_reading
+from .dials import known
+from .path import Path
+from .truth import Truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
-    from sim.dials import Dials
+
+    from .dials import Dials
 
 AnyTruth = TypeVar("AnyTruth", bound=Truth)
 

@@ -10,10 +10,11 @@ which the first of them waits some seconds.
 from __future__ import annotations
 
 from rig.ports import read_settings
-from sim.board import VirtualBoard
-from sim.clock import VirtualClock
-from sim.scene import set_scene
-from sim.serial_port import SimulatedSerial
+
+from .board import VirtualBoard
+from .clock import VirtualClock
+from .scene import set_scene
+from .serial_port import SimulatedSerial
 
 
 class Serial(SimulatedSerial):

@@ -21,16 +21,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.link.messages import Phase
-from sim.board import VirtualBoard
-from sim.board_interface import Board
-from sim.line import BadLine
-from sim.scene import set_scene
-from sim.terminal import Terminal
+
+from .board import VirtualBoard
+from .board_interface import Board
+from .line import BadLine
+from .scene import set_scene
+from .terminal import Terminal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from sim.scene import Scene
+    from .scene import Scene
 
 DEAF_S = 0.065
 """So long an Arduino's reset pin is held low when its port is opened."""
@@ -214,7 +215,7 @@ def main(
     int
         Exit code.
     """
-    parser = argparse.ArgumentParser(prog="python -m sim.pty", description=__doc__)
+    parser = argparse.ArgumentParser(prog=f"python -m {__package__}.pty", description=__doc__)
     parser.add_argument("--protocol", required=True, help="the scene whose chains fall")
     parser.add_argument("--seed", default="0")
     parser.add_argument("--link", type=Path, required=True, help="symbolic link to the terminal")

@@ -18,14 +18,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
-from sim.paper_chain import BETA, GRAVITY, MU, paper_chain
-from sim.resolved.fall import fall
-from sim.resolved.scene import Chain, Rods, Strings
+
+from .paper_chain import BETA, GRAVITY, MU, paper_chain
+from .resolved.fall import fall
+from .resolved.scene import Chain, Rods, Strings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from sim.resolved.scene import Fall, Numbers
+    from .resolved.scene import Fall, Numbers
 
 FALLS = 16
 GREWAL_DROP, GREWAL_RODS = 0.75, (15, 20, 25)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.beam import Shadow
+from .beam import Shadow
 
 if TYPE_CHECKING:
-    from sim.resolved.scene import Fall, Numbers
+    from .resolved.scene import Fall, Numbers
 
 
 def shadows(fall: Fall, height: float, aside: float, widths: Numbers, reach: float) -> list[Shadow]:

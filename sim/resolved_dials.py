@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError
 from rig.units import Dimension, UnitError, parse
-from sim.resolved.contact_law import DEADEST
+
+from .resolved.contact_law import DEADEST
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,30 +12,32 @@ import numpy as np
 from rig.errors import InputError
 from rig.link.messages import pack_label, unpack_label
 from rig.model.chain import XI
-from sim import fall_cache
-from sim.ahead import Ahead
-from sim.air import stated_air
-from sim.beam import SeenEdge, Shadow, receive, string_shadows
-from sim.camera import camera_reading
-from sim.film import film
-from sim.lab import ChainLab, is_test
-from sim.resolved.compiled import is_compiled
-from sim.resolved.contact_law import DEADEST
-from sim.resolved.fall import fall, usual_step
-from sim.resolved.foresight import MOST_ROD_STEPS, impossible, processor_time, rod_steps
-from sim.resolved.motion import LONGEST
-from sim.resolved.scene import Board, Bounce, Chain, Rods, Strings
-from sim.resolved_beam import shadows
-from sim.truth import Truth
+
+from . import fall_cache
+from .ahead import Ahead
+from .air import stated_air
+from .beam import SeenEdge, Shadow, receive, string_shadows
+from .camera import camera_reading
+from .film import film
+from .lab import ChainLab, is_test
+from .resolved.compiled import is_compiled
+from .resolved.contact_law import DEADEST
+from .resolved.fall import fall, usual_step
+from .resolved.foresight import MOST_ROD_STEPS, impossible, processor_time, rod_steps
+from .resolved.motion import LONGEST
+from .resolved.scene import Board, Bounce, Chain, Rods, Strings
+from .resolved_beam import shadows
+from .truth import Truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol, RodChain, Run, Side
-    from sim.dials import Dials
-    from sim.resolved.scene import Fall
-    from sim.resolved_dials import ResolvedDials
+
+    from .dials import Dials
+    from .resolved.scene import Fall
+    from .resolved_dials import ResolvedDials
 
 log = logging.getLogger(__name__)
 

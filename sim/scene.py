@@ -11,16 +11,18 @@ from typing import TYPE_CHECKING, TypedDict
 from rig.errors import InputError
 from rig.link.messages import pack_label
 from rig.protocol import reader
-from sim.dials import read_dials
-from sim.lab import ChainLab
-from sim.truth import append_truth
+
+from .dials import read_dials
+from .lab import ChainLab
+from .truth import append_truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rig.protocol.protocol import Protocol
-    from sim.dials import Dials
-    from sim.truth import Truth
+
+    from .dials import Dials
+    from .truth import Truth
 
     Hang = Callable[[Protocol, Dials, int, Callable[[Truth], None]], ChainLab]
 
@@ -132,8 +134,8 @@ def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Hang
         raise InputError(
             f"{scheme}://: dynamics: {dynamics!r} is not known", "model or resolved is accepted"
         )
-    from sim.resolved_dials import NAMES, read_resolved_dials  # noqa: PLC0415 - few ask for it
-    from sim.resolved_lab import ResolvedLab  # noqa: PLC0415
+    from .resolved_dials import NAMES, read_resolved_dials  # noqa: PLC0415 - few ask for it
+    from .resolved_lab import ResolvedLab  # noqa: PLC0415
 
     world = read_resolved_dials(rest, scheme)
     left = {name: text for name, text in rest.items() if name not in NAMES}

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from serial import PortNotOpenError, SerialBase, SerialException
 
-from sim.clock import VirtualClock
-from sim.line import LineFaults
+from .clock import VirtualClock
+from .line import LineFaults
 
 if TYPE_CHECKING:
-    from sim.board_interface import Board
+    from .board_interface import Board
 
 _CALL_NS = 1_000  # a call takes time too: without this, polling would stop the clock
 

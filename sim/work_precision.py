@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim import paper_chain as paper
-from sim.integrators import euler, runge_kutta, strike
-from sim.resolved.fall import STEP, fall
-from sim.resolved.scene import Strings
+from . import paper_chain as paper
+from .integrators import euler, runge_kutta, strike
+from .resolved.fall import STEP, fall
+from .resolved.scene import Strings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from sim.integrators import Follow
-    from sim.resolved.scene import Chain
+    from .integrators import Follow
+    from .resolved.scene import Chain
 
 RODS = 3
 INCLINES = (40.0, 50.0, 60.0, 70.0)
@@ -113,7 +113,7 @@ def speeds() -> Iterator[dict[str, float | str | None]]:
     command = [
         sys.executable,
         "-c",
-        "from sim.work_precision import *; print(time_of_many(SHORT_S))",
+        f"from {__package__}.work_precision import *; print(time_of_many(SHORT_S))",
     ]
     plain = run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, stdout=PIPE, check=True)  # noqa: S603 - our own
     yield _speed(f"{paper.RODS} rods until {SHORT_S:g} s, not compiled", float(plain.stdout))

@@ -13,6 +13,7 @@ import numpy as np
 
 from rig.clock.calibration import TimeScale
 from rig.errors import RigError
+from rig.ports import simulation_package
 from rig.records import Drop, Edge
 
 if TYPE_CHECKING:
@@ -56,8 +57,13 @@ STRAY = -1
 """The truth's rod number of what was no rod."""
 
 
-def falls(asked: Sequence[Asked], module: str = "sim.edges") -> Iterator[SimulatedDrop]:
+def falls(asked: Sequence[Asked], module: str = "") -> Iterator[SimulatedDrop]:
     """Let the simulation, run as a module, make the drops of one rig after another.
+
+    Parameters
+    ----------
+    module
+        That makes them; by default the simulation's own.
 
     Raises
     ------
@@ -69,7 +75,7 @@ def falls(asked: Sequence[Asked], module: str = "sim.edges") -> Iterator[Simulat
         for url, seeds, runs in asked
         for text in (url, json.dumps([*seeds]), json.dumps([*runs]))
     ]
-    command = [sys.executable, "-m", module, *requests]
+    command = [sys.executable, "-m", module or f"{simulation_package()}.edges", *requests]
     with Popen(command, stdout=PIPE, text=True) as simulation:  # noqa: S603 - our own
         assert simulation.stdout is not None
         for line in simulation.stdout:

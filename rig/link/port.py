@@ -15,13 +15,12 @@ import serial
 
 from rig.clock.host import Clock, SystemClock
 from rig.errors import DeviceError, InputError, RigError
-from rig.ports import check_name
+from rig.ports import check_name, simulation_package
 from rig.reasons import make_error
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
 READ_TIMEOUT_S = 0.02
-_HANDLERS = ("sim", "rig_emulator")  # packages where pyserial finds sim:// and emu://
 _CODES = {
     errno.ENOENT: "no_port",
     errno.ENODEV: "no_port",
@@ -124,7 +123,7 @@ def check_url(url: str) -> None:
 
 
 def _add_handlers() -> None:
-    for package in _HANDLERS:
+    for package in (simulation_package(), "rig_emulator"):  # of sim:// and emu://
         if package not in serial.protocol_handler_packages:
             serial.protocol_handler_packages.append(package)
 

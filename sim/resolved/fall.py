@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.resolved import motion
-from sim.resolved.hanging import gaps, hang, lengths, stable_step
-from sim.resolved.motion import FRAME, SAMPLE, Clock, Pages
-from sim.resolved.scene import Fall
+from . import motion
+from .hanging import gaps, hang, lengths, stable_step
+from .motion import FRAME, SAMPLE, Clock, Pages
+from .scene import Fall
 
 if TYPE_CHECKING:
-    from sim.resolved.motion import World
-    from sim.resolved.scene import Chain, Numbers
+    from .motion import World
+    from .scene import Chain, Numbers
 
 STEP = 1e-5
 """s; ``./run bench resolved --work`` shows the error that this leaves and what smaller steps

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sim.resolved.compiled import is_compiled
-from sim.resolved.fall import AFTER, skip, usual_step
-from sim.resolved.hanging import gaps, hang
-from sim.resolved.motion import LONGEST, SAMPLE, closest
+from .compiled import is_compiled
+from .fall import AFTER, skip, usual_step
+from .hanging import gaps, hang
+from .motion import LONGEST, SAMPLE, closest
 
 if TYPE_CHECKING:
-    from sim.resolved.motion import World
-    from sim.resolved.scene import Chain
+    from .motion import World
+    from .scene import Chain
 
 MOST_ROD_STEPS = 1e8
 """Rods times steps of the longest fall that is made: less than a minute, and half a gigabyte."""

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.resolved.contact_law import damping
-from sim.resolved.motion import AIR, Bodies, Ground, Neighbours, Record, StringPairs, World, rim
+from .contact_law import damping
+from .motion import AIR, Bodies, Ground, Neighbours, Record, StringPairs, World, rim
 
 if TYPE_CHECKING:
-    from sim.resolved.scene import Board, Bounce, Chain, Numbers, Rods
+    from .scene import Board, Bounce, Chain, Numbers, Rods
 
 _FIXED = 1e6  # kg: in a second 10 kN move it by 5 mm
 _SOUND = 0.5  # of 2, where the leapfrog of the stiffest string would break

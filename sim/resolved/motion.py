@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from sim.resolved.compiled import compiled
+from .compiled import compiled
 
 if TYPE_CHECKING:
-    from sim.resolved.scene import Numbers
+    from .scene import Numbers
 
     Vector = tuple[float, float, float]
 
