@@ -29,8 +29,6 @@ _MARKERS = {
     "Euler": "x",
     "RK4": "+",
     "Gauss–Legendre": ">",
-    "tanh–sinh": "<",
-    "motion": "P",
 }
 _PRECISION_PANELS = (
     ("separation_error", "relative error of Δz"),

@@ -15,13 +15,9 @@ from scipy.integrate import solve_ivp
 
 from rig.bench.precision_reference import GATE_M
 from rig.errors import RigError
-from rig.model import continuum, density_ode
+from rig.model import continuum
 from rig.model.chain import Chain
-from rig.model.contact import contact_fall
-from rig.model.contact_ode import IMPLICIT, integrate_contact
-from rig.model.density import Uniform
 from rig.model.fall import fall, hits
-from rig.model.motion import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -29,32 +25,27 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.bench.precision_reference import Model, PrecisionScene
-    from rig.model.density import Density
 
     Stage = tuple[float, ...]
     Slope = Callable[[Stage], Stage]
     Advance = Callable[[Slope, Stage, float], Stage]
+    Body = tuple[Chain, Sequence[float]]
 
 Solver = Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
 SOLVERS: tuple[Solver, ...] = get_args(Solver)
-EVALUATION_BUDGET = 60_000
-"""Evaluations of the right-hand side that all legs of one fall may take."""
-CONTINUUM_LIMIT = 5_000
-"""After a setting that took more evaluations than this, tighter ones are left out."""
-STEP_BUDGET, QUICK_STEP_BUDGET = 10_000, 5_000
-"""Steps that one fall with impacts that last may take, in all and in a quick sweep."""
-CONTACT_RTOL, CONTACT_ATOL = 1e-6, 1e-10
+IMPLICIT: frozenset[Solver] = frozenset({"Radau", "BDF", "LSODA"})
+EVALUATION_BUDGET, QUICK_BUDGET = 60_000, 30_000
+"""Evaluations that all legs of a fall may take; the latter in a quick sweep."""
+CONTACT_RTOL = 1e-6
 ABSOLUTE = 1e-3
 """Absolute tolerance (m, m/s) per relative one, leg by leg."""
 
 _TOLERANCES = tuple(10.0**-n for n in range(2, 14))
 _STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 _GAUSS = (2, 3, 4, 6, 8, 12, 16, 24)
-_END_RULE = (11, 21, 31, 41, 61, 81, 121, 161)
 _QUICK_TOLERANCES = (1e-3, 1e-6, 1e-9)
 _QUICK_STEPS = (1e-2, 1e-3)
 _QUICK_SOLVERS: tuple[Solver, ...] = ("RK45", "LSODA")
-_SOLVED_CONTACTS = (1e-2, 1e-4, 1e-6, 1e-9)
 _MANY_RODS = 1000
 
 
@@ -118,14 +109,11 @@ class Method:
     ----------
     settings
         Cheapest first.
-    limit
-        Evaluations after which the settings that follow are left out.
     """
 
     name: str
     model: Model
     settings: tuple[Setting, ...]
-    limit: int | None = None
 
 
 def methods(scene: PrecisionScene, *, quick: bool = False) -> list[Method]:
@@ -146,15 +134,9 @@ def methods(scene: PrecisionScene, *, quick: bool = False) -> list[Method]:
 def absent(scene: PrecisionScene) -> list[tuple[str, str]]:
     """What does not apply to a scene: method and reason."""
     gone = []
-    if scene.density is None:
-        reason = "the rods are not evenly spaced, and Eq. 11 has one s for all"
+    if not scene.even:
+        reason = "Eq. 14 holds for like rods at equal distances"
         gone.append(("continuum, every method", reason))
-    elif not isinstance(scene.density, Uniform):
-        reason = "holds for an even density only"
-        gone += [
-            (name, reason)
-            for name in ("continuum Eq. 14", "continuum Gauss–Legendre", "continuum tanh–sinh")
-        ]
     if scene.chain.rods > _MANY_RODS:
         reason = (
             f"a solver started afresh for each of {scene.chain.rods} legs takes 30,000 evaluations "
@@ -164,185 +146,105 @@ def absent(scene: PrecisionScene) -> list[tuple[str, str]]:
     return gone
 
 
+def _solvers(scene: PrecisionScene, *, quick: bool) -> tuple[Solver, ...]:
+    if scene.chain.rods > _MANY_RODS:
+        return ()
+    return _QUICK_SOLVERS if quick else SOLVERS
+
+
+def _bodies(scene: PrecisionScene) -> tuple[Body, Body]:
+    """The whole chain and the one cut off at the gate, with the gains of their impacts."""
+    return (scene.chain, scene.gains), cut_at_gate(scene.chain, scene.gains)
+
+
+def _swept(
+    name: str,
+    model: Model,
+    solve: Callable[[Any, float], Answer],
+    bodies: tuple[Any, Any],
+    values: Sequence[float],
+    text: str,
+) -> Method:
+    """A method over its parameter, each value for the whole chain and as far as the gate."""
+    return Method(
+        name,
+        model,
+        tuple(
+            Setting(
+                text.format(value),
+                value,
+                *(partial(solve, body, value) for body in bodies),
+                contact_time_s=value if model == "contact" else None,
+            )
+            for value in values
+        ),
+    )
+
+
 def _discrete(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
-    chain, gains, drop, gravity = scene.chain, scene.gains, scene.drop, scene.gravity
-    cut, cut_gains = cut_at_gate(chain, gains)
+    chain, where = scene.chain, (scene.drop, scene.gravity)
+    bodies = _bodies(scene)
+    steps = _QUICK_STEPS if quick else _STEPS
+    tolerances = _QUICK_TOLERANCES if quick else _TOLERANCES
 
     def direct() -> Answer:
-        end = fall(chain, scene.alpha, scene.gamma, drop, gravity)
-        return Answer(end.separation_m, end.speed_m_s, end.time_s, chain.rods, chain.rods)
-
-    def whole_motion() -> Answer:
-        motion = Motion(chain, gains, drop, gravity)
-        end = motion.at(motion.end_s)
+        end = fall(chain, scene.alpha, scene.gamma, *where)
         return Answer(end.separation_m, end.speed_m_s, end.time_s, chain.rods, chain.rods)
 
     def gate() -> Answer:
-        last = hits(cut, cut_gains, drop, gravity)[-1]
-        return Answer(None, last.speed_before, last.time_s, cut.rods, cut.rods)
+        last = hits(*bodies[1], *where)[-1]
+        return Answer(None, last.speed_before, last.time_s, chain.rods, chain.rods)
 
-    exact = "event-exact"
-    yield Method(f"discrete {exact}", "discrete", (Setting("–", 0.0, direct, gate),))
-    yield Method("discrete whole motion", "discrete", (Setting("–", 0.0, whole_motion, gate),))
-    solvers = _QUICK_SOLVERS if quick else SOLVERS
-    for solver in () if chain.rods > _MANY_RODS else solvers:
-        yield Method(
-            f"legs {solver}",
-            "discrete",
-            tuple(
-                Setting(
-                    f"rtol {rtol:.0e}",
-                    rtol,
-                    partial(leg_by_leg, chain, gains, drop, gravity, solver, rtol),
-                    partial(leg_by_leg, cut, cut_gains, drop, gravity, solver, rtol),
-                )
-                for rtol in (_QUICK_TOLERANCES if quick else _TOLERANCES)
-            ),
-        )
-    advances: tuple[tuple[str, Advance], ...] = (("Euler", euler), ("RK4", rk4))
-    for name, advance in advances:
-        yield Method(
-            f"fixed-step {name}",
-            "discrete",
-            tuple(
-                Setting(
-                    f"step {step:.0e} s",
-                    step,
-                    partial(step_by_step, chain, gains, drop, gravity, step, advance),
-                    partial(step_by_step, cut, cut_gains, drop, gravity, step, advance),
-                )
-                for step in (_QUICK_STEPS if quick else _STEPS)
-            ),
-        )
+    def stepped(advance: Advance, body: Body, step: float) -> Answer:
+        return step_by_step(*body, *where, step, advance)
+
+    def solved(solver: Solver, body: Body, rtol: float) -> Answer:
+        return leg_by_leg(*body, *where, solver, rtol)
+
+    yield Method("discrete event-exact", "discrete", (Setting("–", 0.0, direct, gate),))
+    for solver in _solvers(scene, quick=quick):
+        solve = partial(solved, solver)
+        yield _swept(f"legs {solver}", "discrete", solve, bodies, tolerances, "rtol {:.0e}")
+    for name, advance in (("Euler", euler), ("RK4", rk4)):
+        solve = partial(stepped, advance)
+        yield _swept(f"fixed-step {name}", "discrete", solve, bodies, steps, "step {:.0e} s")
 
 
 def _continuum(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
-    if scene.density is None:
+    """Closed form and quadrature."""
+    if not scene.even:
         return
-    if isinstance(scene.density, Uniform):
-        yield from _even(scene, scene.density, quick=quick)
-    cut = _CutDensity(scene.density, GATE_M)
-    for solver in _QUICK_SOLVERS if quick else SOLVERS:
-        yield Method(
-            f"continuum {solver}",
-            "continuum",
-            tuple(
-                Setting(
-                    f"rtol {rtol:.0e}",
-                    rtol,
-                    partial(_integrated, scene, scene.density, solver, rtol),
-                    partial(_integrated, scene, cut, solver, rtol),
-                )
-                for rtol in (_QUICK_TOLERANCES if quick else _TOLERANCES)
-            ),
-            CONTINUUM_LIMIT,
-        )
-
-
-def _even(scene: PrecisionScene, density: Uniform, *, quick: bool) -> Iterator[Method]:
-    """Closed form and quadratures."""
     reach = scene.gamma * scene.spacing_m
     rest = (scene.alpha, 1.0, scene.drop, scene.gravity)
-    whole = continuum.UniformChain(density.length_m, reach, *rest)
+    whole = continuum.UniformChain(scene.chain.length, reach, *rest)
     # Lower by the gate's height, z + γs and z₀ + γs are the same: so is the fall as far as there.
-    cut = continuum.UniformChain(density.length_m - GATE_M, reach + GATE_M, *rest)
+    cut = continuum.UniformChain(scene.chain.length - GATE_M, reach + GATE_M, *rest)
 
     def eq14() -> Answer:
         return Answer(None, continuum.speed(whole, 0.0), None, 1, 1)
 
-    def gauss(chain: continuum.UniformChain, nodes: int) -> Answer:
-        return _ended(continuum.end(chain, nodes=nodes), nodes)
-
-    def end_rule(chain: continuum.UniformChain, nodes: int) -> Answer:
-        return _ended(continuum.end_tanh_sinh(chain, nodes=nodes), nodes)
+    def gauss(chain: continuum.UniformChain, nodes: float) -> Answer:
+        end = continuum.end(chain, nodes=int(nodes))
+        return Answer(end.separation_m, end.speed_m_s, end.time_s, end.evaluations, int(nodes))
 
     yield Method("continuum Eq. 14", "continuum", (Setting("–", 0.0, eq14, None),))
-    for name, rule, counts in (
-        ("Gauss–Legendre", gauss, _GAUSS),
-        ("tanh–sinh", end_rule, _END_RULE),
-    ):
-        yield Method(
-            f"continuum {name}",
-            "continuum",
-            tuple(
-                Setting(f"{n} nodes", float(n), partial(rule, whole, n), partial(rule, cut, n))
-                for n in (counts[::3] if quick else counts)
-            ),
-        )
-
-
-def _ended(end: continuum.ContinuumEnd, nodes: int) -> Answer:
-    return Answer(end.separation_m, end.speed_m_s, end.time_s, end.evaluations, nodes)
-
-
-def _integrated(scene: PrecisionScene, density: Density, solver: Solver, rtol: float) -> Answer:
-    end = density_ode.end(
-        density,
-        scene.alpha,
-        scene.gamma,
-        scene.spacing_m,
-        scene.drop,
-        scene.gravity,
-        method=solver,
-        rtol=rtol,
-    )
-    return Answer(end.separation_m, end.speed_m_s, end.time_s, end.evaluations, end.steps)
-
-
-@dataclass(frozen=True, slots=True)
-class _CutDensity:
-    """What of a density is above a height as the top end comes down to it."""
-
-    whole: Density
-    height_m: float
-
-    @property
-    def length_m(self) -> float:
-        return self.whole.length_m - self.height_m
-
-    def mass_over_density(self, z: float) -> float:
-        return self.whole.mass_over_density(z + self.height_m)
+    counts = _GAUSS[::3] if quick else _GAUSS
+    name = "continuum Gauss–Legendre"
+    yield _swept(name, "continuum", gauss, (whole, cut), counts, "{:.0f} nodes")
 
 
 def _contact(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
-    chain, gains = scene.chain, scene.gains
-    cut, cut_gains = cut_at_gate(chain, gains)
-    fell = (scene.drop, scene.gravity)
+    """Impacts that last: the stiff form of the discrete fall."""
+    budget = QUICK_BUDGET if quick else EVALUATION_BUDGET
+    taus = scene.contact_times[::2] if quick else scene.contact_times
+    where = scene.drop, scene.gravity
 
-    def closed(which: Chain, kicked: Sequence[float], tau: float) -> Answer:
-        end = contact_fall(which, kicked, *fell, tau)
-        return Answer(end.separation_m, end.speed_m_s, end.time_s, which.rods, which.rods)
+    def solved(solver: Solver, body: Body, tau: float) -> Answer:
+        return leg_by_leg(*body, *where, solver, CONTACT_RTOL, tau, budget=budget)
 
-    def solved(solver: Solver, which: Chain, kicked: Sequence[float], tau: float) -> Answer:
-        done = integrate_contact(
-            which,
-            kicked,
-            *fell,
-            tau,
-            method=solver,
-            rtol=CONTACT_RTOL,
-            atol=CONTACT_ATOL,
-            step_budget=QUICK_STEP_BUDGET if quick else STEP_BUDGET,
-        )
-        end = done.fall
-        return Answer(end.separation_m, end.speed_m_s, end.time_s, done.nfev, done.steps)
-
-    taus = scene.contact_times[::4] if quick else scene.contact_times
-    yield Method("contact closed form", "contact", tuple(
-        Setting(f"τ {tau:.0e} s", tau, partial(closed, chain, gains, tau),
-                partial(closed, cut, cut_gains, tau), tau)
-        for tau in taus
-    ))  # fmt: skip
-    if scene.chain.rods > _MANY_RODS:
-        return
-    for solver in _QUICK_SOLVERS if quick else SOLVERS:
-        yield Method(f"contact {solver}", "contact", tuple(
-            Setting(f"τ {tau:.0e} s, rtol {CONTACT_RTOL:.0e}", tau,
-                    partial(solved, solver, chain, gains, tau),
-                    partial(solved, solver, cut, cut_gains, tau), tau)
-            for tau in taus
- if quick or tau in _SOLVED_CONTACTS
-        ))  # fmt: skip
+    for solver in _solvers(scene, quick=quick):
+        solve, text = partial(solved, solver), f"τ {{:.0e}} s, rtol {CONTACT_RTOL:.0e}"
+        yield _swept(f"contact {solver}", "contact", solve, _bodies(scene), taus, text)
 
 
 def cut_at_gate(chain: Chain, gains: Sequence[float]) -> tuple[Chain, list[float]]:
@@ -363,16 +265,29 @@ def leg_by_leg(
     gravity: float,
     solver: Solver,
     rtol: float,
+    contact_time: float | None = None,
+    *,
     budget: int = EVALUATION_BUDGET,
 ) -> Answer:
-    """Integrate height, speed and Δz from impact to impact, each found as an event.
+    """Integrate height z, speed v, Δz and the speed gained u from impact to impact, each an event.
+
+    An impact that lasts does not act at once but through a critically damped response: the pull is
+    ΔV · (t/τ'²) · exp(−t/τ') with τ' = τ/2, so that τ is its mean delay and the whole of it is ΔV
+    (Eq. 9). With p and q its two stages,
+
+        z' = −v,   v' = g + p/τ',   Δz' = u,   u' = p/τ',   p' = (q − p)/τ',   q' = −q/τ',
+
+    linear, with the eigenvalue −1/τ' twice: an explicit solver must take steps of the order of τ.
 
     Parameters
     ----------
     chain, gains, drop, gravity
         As in `rig.model.fall.hits`.
     solver, rtol
-        Of `scipy.integrate.solve_ivp`; the absolute tolerance is `ABSOLUTE` of it in m and m/s.
+        Of `scipy.integrate.solve_ivp`; the absolute tolerance is `ABSOLUTE` of it in m and m/s. The
+        implicit ones are given the Jacobian.
+    contact_time
+        τ, s; `None` for impacts that take no time.
     budget
         Evaluations that all legs together may take.
 
@@ -380,17 +295,37 @@ def leg_by_leg(
     ------
     BudgetError
         When it is spent.
+    RigError
+        When the solver gives up.
     """
-    state = np.array([drop, 0.0, 0.0])
-    time = gained = arrival = 0.0
-    evaluations = steps = 0
-    matrix = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    matrix = np.zeros((6, 6))
+    matrix[0, 1], matrix[2, 3] = -1.0, 1.0
+    if contact_time is None:
+        matrix, struck = matrix[:4, :4], [1, 3]
+    else:
+        matrix[[1, 3, 4, 4, 5], [4, 4, 4, 5, 5]] = np.array([1, 1, -1, 1, -1]) * (
+            2.0 / contact_time
+        )
+        struck = [5]
+    state, falling = np.zeros(len(matrix)), np.zeros(len(matrix))
+    state[0], falling[1] = drop, gravity
     options: dict[str, Any] = {"jac": lambda _time, _state: matrix} if solver in IMPLICIT else {}
-    for number, (height, gain) in enumerate(zip(chain.heights, gains, strict=True)):
-        speed = float(state[1])
-        longest = 2.0 * float(state[0] + height) / (speed or (2.0 * gravity * drop) ** 0.5)
+    evaluations = steps = 0
+    time = 0.0
+
+    def slope(_time: float, now: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal evaluations
+        evaluations += 1
+        if evaluations > budget:
+            raise BudgetError(f"more than {budget} evaluations, and the chain is not down yet")
+        return matrix @ now + falling
+
+    for height, gain in zip(chain.heights, gains, strict=True):
+        speed, distance = float(state[1]), float(state[0]) + height
+        # No leg is longer than that of a free fall.
+        longest = 2.0 * distance / (speed + (speed * speed + 2.0 * gravity * distance) ** 0.5)
         run = solve_ivp(
-            partial(_falling, gravity, gained),
+            slope,
             (time, time + 2.0 * longest),
             state,
             method=solver,
@@ -399,24 +334,13 @@ def leg_by_leg(
             atol=ABSOLUTE * rtol,
             **options,
         )
+        if run.status != 1:
+            raise RigError(f"{solver}: {run.message}")
         state, time = run.y[:, -1].copy(), float(run.t[-1])
-        evaluations += int(run.nfev)
         steps += run.t.size - 1
-        if evaluations > budget:
-            raise BudgetError(
-                f"more than {budget} evaluations: {number + 1} of {chain.rods} legs took them"
-            )
         arrival = float(state[1])
-        gained += arrival * gain
-        state[1] += arrival * gain
+        state[struck] += arrival * gain
     return Answer(float(state[2]), arrival, time, evaluations, steps)
-
-
-def _falling(
-    gravity: float, gained: float, _time: float, state: NDArray[np.float64]
-) -> tuple[float, float, float]:
-    """Free fall: z' = −v, v' = g, Δz' = speed gained so far."""
-    return -float(state[1]), gravity, gained
 
 
 class _Landing:

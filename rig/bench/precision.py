@@ -253,10 +253,7 @@ def _tried(
                 times = [took] if slow else []
                 turns = min(turns, _QUICK_TURNS) if quick else turns
                 trials.append(_Trial(method, setting, answer, when, times, turns - len(times)))
-                if method.limit is None or answer.evaluations <= method.limit:
-                    continue
-                reason = f"{answer.evaluations} evaluations"
-                place += 1  # noqa: PLW2901 - this one is in
+                continue
             # What follows is dearer still.
             for rest in method.settings[place:]:
                 why = reason if rest is setting else f"not tried: {_after(setting, reason)}"
@@ -283,7 +280,7 @@ def _take_turns(trials: Sequence[_Trial]) -> None:
 def _truths(scene: PrecisionScene, trials: Sequence[_Trial]) -> tuple[ExactAnswer, Truths]:
     """50 digits of each model: the discrete one, and by contact time (`None`: the continuum)."""
     others: Truths = {}
-    if scene.density is not None:
+    if scene.even:
         others[None] = continuum_truth(scene)
     for trial in trials:
         tau = trial.setting.contact_time_s

@@ -25,9 +25,6 @@ _HEAD = """\
 `rig bench precision`: error against 50 digits, and run time, of every method and tolerance. Times
 are of one machine: compare them with each other. Every point is in `precision.csv`."""
 
-_PRINTED_CONTACTS = (1e-3, 1e-4, 1e-6)
-"""Contact times whose rows are printed; the others are in ``precision.json``, s."""
-
 
 def main(arguments: Namespace) -> int:
     """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
@@ -44,8 +41,7 @@ def summary(found: Precision) -> str:
         lines.append(f"{title}: cheapest method for a relative error of Δz, with its run time")
         rows: dict[str, list[Cheapest]] = {}
         for one in found.cheapest:
-            tau = one.contact_time_s
-            if one.scene == name and (tau is None or tau in _PRINTED_CONTACTS):
+            if one.scene == name:
                 rows.setdefault(_model(one), []).append(one)
         width = max(map(len, rows))
         for model, row in rows.items():
@@ -56,7 +52,7 @@ def summary(found: Precision) -> str:
             f"  {_model(gap):<{width}}  less discrete: Δz {gap.separation_relative:+.2e}, "
             f"V {gap.speed_relative:+.2e}, gate {gap.gate_difference_s:+.2e} s"
             for gap in found.gaps
-            if gap.scene == name and gap.contact_time_s in {None, *_PRINTED_CONTACTS}
+            if gap.scene == name
         ]
         gone = sum(out.scene == name for out in found.left_out)
         lines += [f"  left out: {gone}, each with its reason in precision.json"] * (gone > 0)

@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.errors import DomainError
-from rig.model.quadrature import gauss, tanh_sinh
+from rig.model.quadrature import gauss
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -185,7 +185,7 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
         Panels of equal width in p; `None` takes what full precision needs at 16 nodes.
     """
     span = _span(chain)
-    square, line = substitution(chain, span)
+    square, line = _substitution(chain, span)
     if panels is None:
         panels = 1 + math.ceil(math.sqrt(span) + 0.2 * chain.alpha * span)
     rule, half = gauss(nodes), 0.5 / panels
@@ -198,51 +198,21 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     whole = gaining @ rule.weights
     before = np.concatenate(([0.0], np.cumsum(whole[:-1])))
     gained = before[:, None] + gaining @ rule.running.T
-    return _ended(
-        chain,
-        separation=chain.alpha * float(np.sum((gained * passing) @ rule.weights)),
-        lay_down=float(np.sum(passing @ rule.weights)),
+    lay_down = float(np.sum(passing @ rule.weights))
+    return ContinuumEnd(
+        separation_m=chain.alpha * float(np.sum((gained * passing) @ rule.weights)),
+        speed_m_s=speed(chain, 0.0),
+        time_s=chain.drop_time_s + lay_down,
+        lay_down_s=lay_down,
         evaluations=v.size,
     )
 
 
-def end_tanh_sinh(chain: UniformChain, *, nodes: int = 161) -> ContinuumEnd:
-    """The same by the tanh–sinh rule in x itself, which needs no substitution.
-
-    For U at each outer node the rule is applied once more from 0 to there, so that there are
-    ``nodes (nodes + 1)`` evaluations: a second opinion, not the quick way. It is slow to converge
-    for a drop that is tiny but not 0, where V² has its zero just outside the interval: 161 nodes
-    leave 5e-12 of Δz at h = 1e-12 m and full precision at h = 0 and from h = 1e-3 m up.
-
-    Parameters
-    ----------
-    nodes
-        Nodes of the outer and of every inner rule.
-    """
-    span = _span(chain)
-    rule = tanh_sinh(nodes)
-    x = span * rule.nodes
-    passing = (chain.length_m + chain.reach_m) * np.exp(-x) / _speeds(chain, x) * rule.weights
-    inner = _speeds(chain, np.multiply.outer(x, rule.nodes))
-    gained = x * (inner @ rule.weights)
-    return _ended(
-        chain,
-        separation=chain.alpha * span * float(gained @ passing),
-        lay_down=span * float(np.sum(passing)),
-        evaluations=x.size + inner.size,
-    )
-
-
-def substitution(chain: UniformChain, span: float) -> tuple[float, float]:
+def _substitution(chain: UniformChain, span: float) -> tuple[float, float]:
     """Coefficients a and b of x = X p (a p + b), that is 1/(1 + q) and q/(1 + q).
 
     V² is zero at x = −x₀ (x₀ ≈ V_h²/2gA for a small drop), and x + x₀ is to be the square of
     p + q/2 but for a factor: q²/(4(1 + q)) = x₀/X.
-
-    Parameters
-    ----------
-    span
-        X, or as much of it as is integrated over.
     """
     power = 1.0 + 2.0 * chain.alpha
     gravity = 2.0 * chain.gravity * (chain.length_m + chain.reach_m)
@@ -341,12 +311,3 @@ def _speeds(chain: UniformChain, x: NDArray[np.float64]) -> NDArray[np.float64]:
     bracket = chain.strike_speed**2 - gravity * np.expm1(-power * x) / power
     grown: NDArray[np.float64] = np.exp(chain.alpha * x) * np.sqrt(bracket)
     return grown
-
-
-def _ended(
-    chain: UniformChain, *, separation: float, lay_down: float, evaluations: int
-) -> ContinuumEnd:
-    """What both quadratures have in common."""
-    return ContinuumEnd(
-        separation, speed(chain, 0.0), chain.drop_time_s + lay_down, lay_down, evaluations
-    )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.errors import DomainError
-from rig.model.continuum import UniformChain, end, end_tanh_sinh, speed
+from rig.model.continuum import UniformChain, end, speed
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 from tests.model.continuum_reference import closed_end, printed_end, printed_squared_speed
@@ -53,7 +53,6 @@ def check(found, wanted, relative):
 def test_agrees_with_the_printed_equations_in_50_digits(case):
     wanted = printed_end(*case)
     check(end(chain_of(*case)), wanted, 1e-14)
-    check(end_tanh_sinh(chain_of(*case), nodes=241), wanted, 1e-13)
     if case[4] > 0.0:
         with mp.workdps(50):
             for printed, closed in zip(wanted, closed_end(*case), strict=True):
@@ -65,16 +64,6 @@ def test_agrees_with_the_printed_equations_in_50_digits(case):
 def test_agrees_with_the_closed_form(length, reach, alpha, drop, gravity, initial_speed):
     case = (length, reach, alpha, drop, gravity, initial_speed)
     check(end(chain_of(*case)), closed_end(*case), TIGHT)
-
-
-@examples(60)
-@given(decades(-3, 3), REACHES, ALPHAS, st.sampled_from([0.0, 1e-3, 1.0, 1e6]), GRAVITIES)
-def test_a_second_rule_agrees_without_the_substitution(length, reach, alpha, share, gravity):
-    chain = chain_of(length, reach, alpha, share * length, gravity)
-    one, other = end(chain), end_tanh_sinh(chain)
-    assert close(one.separation_m, other.separation_m, 1e-12)
-    assert close(one.lay_down_s, other.lay_down_s, 1e-12)
-    assert one.speed_m_s == other.speed_m_s
 
 
 @examples(150)
@@ -170,11 +159,6 @@ def test_nodes_and_panels_can_be_chosen_and_are_counted():
     assert errors[2] < 1e-8
     assert errors[3] < 1e-12
     assert errors[4] < 2e-15
-    assert end_tanh_sinh(PAPER, nodes=51).evaluations == 51 * 52
-    coarse, better = (
-        abs(end_tanh_sinh(PAPER, nodes=n).separation_m / fine.separation_m - 1) for n in (21, 41)
-    )
-    assert better < 1e-3 * coarse
 
 
 @pytest.mark.parametrize(

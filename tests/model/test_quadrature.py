@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from rig.model.quadrature import gauss, tanh_sinh
-from tests.model.chains import close
+from rig.model.quadrature import gauss
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 8, 16, 40, 100])
@@ -45,27 +43,3 @@ def test_rules_are_shared_and_cannot_be_spoilt():
     assert gauss(7) is gauss(7)
     with pytest.raises(ValueError, match="read-only"):
         gauss(7).weights[0] = 0.0
-    with pytest.raises(ValueError, match="read-only"):
-        tanh_sinh(7).nodes[0] = 0.0
-
-
-@pytest.mark.parametrize(
-    ("function", "exact"),
-    [
-        (np.ones_like, 1.0),
-        (np.sqrt, 2 / 3),
-        (lambda x: 1 / np.sqrt(x), 2.0),
-        (lambda x: -np.log(x), 1.0),
-        (lambda x: 1 / (1 + x), math.log(2)),
-    ],
-)
-def test_tanh_sinh_does_not_mind_what_happens_at_an_end(function, exact):
-    rule = tanh_sinh(121)
-    assert close(float(rule.weights @ function(rule.nodes)), exact, 3e-15)
-
-
-def test_tanh_sinh_nodes_keep_their_digits_near_zero():
-    nodes = tanh_sinh(81).nodes
-    assert 0.0 < nodes[0] < 1e-37
-    for u, x in ((-4.0, nodes[0]), (-2.0, nodes[20]), (0.0, nodes[40])):
-        assert close(x, float(1 / (1 + Fraction(math.exp(-math.pi * math.sinh(u))))), 1e-13)
