@@ -29,7 +29,7 @@ DIGITS = 50
 _SPARE = 30  # lost to differences; x³ of a leg that is short against the contact time is the worst
 GATE_M = 0.025
 """Of the gate above the contact point, m."""
-CONTACT_TIMES = (1e-3, 1e-4, 1e-6, 1e-9)
+CONTACT_TIMES = (1e-3, 1e-6, 1e-9)
 """s."""
 
 Model = Literal["discrete", "continuum", "contact"]

@@ -1,0 +1,98 @@
+"""Each room is at most as large as docs/architecture.md says, however its lines are set."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs/architecture.md").read_text("utf-8")
+NODES_A_LINE = 11  # what the formatter puts on one line, on average over the project
+STALE = 0.95  # of a limit: below that the page has to follow
+UNCOUNTED = (ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop)
+TOPS = ("rig", "sim", "bench", "firmware", "tests")
+
+
+def rooms() -> dict[tuple[str, ...], tuple[int, int]]:
+    """Return what each room may have now and what it is to have, by the paths that make it."""
+    rows = re.findall(r"^\| (`.+`) \| ([\d,]+) \| ([\d,]+) \|$", PAGE, re.MULTILINE)
+    return {
+        tuple(re.findall(r"`(.+?)`", paths)): (int(now.replace(",", "")), int(goal.replace(",", "")))
+        for paths, now, goal in rows
+    }
+
+
+def nodes(statement: ast.stmt) -> int:
+    """Count a statement's own nodes: those of statements inside it are theirs."""
+    count, rest = 0, [statement]
+    while rest:
+        node = rest.pop()
+        count += 1
+        rest += [
+            child
+            for child in ast.iter_child_nodes(node)
+            if not isinstance(child, (ast.stmt, *UNCOUNTED))
+        ]
+    return count
+
+
+def is_docstring(node: ast.AST) -> bool:
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )
+
+
+def code_lines(text: str) -> int:
+    return sum(
+        math.ceil(nodes(node) / NODES_A_LINE)
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.stmt) and not is_docstring(node)
+    )
+
+
+def room_of(path: str) -> tuple[str, ...]:
+    """The room with the longest path that the file's begins with."""
+    within = [(len(place), room) for room in rooms() for place in room if path.startswith(place)]
+    return max(within)[1]
+
+
+@pytest.fixture(scope="module")
+def counts() -> Counter[tuple[str, ...]]:
+    found: Counter[tuple[str, ...]] = Counter()
+    for top in TOPS:
+        for path in (ROOT / top).rglob("*.py"):
+            found[room_of(path.relative_to(ROOT).as_posix())] += code_lines(path.read_text("utf-8"))
+    return found
+
+
+@pytest.mark.parametrize("room", rooms(), ids=" ".join)
+def test_a_room_keeps_to_its_limit(room, counts):
+    now, goal = rooms()[room]
+    assert counts[room] <= max(now, goal), "a feature pays for its lines: take some away"
+    assert now <= goal or counts[room] > STALE * now, f"write {counts[room]} into the page"
+
+
+def test_every_room_has_a_limit(counts):
+    assert counts.keys() == rooms().keys()
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("a = 1; b = 2", 2),
+        ("a = 1\n\n# why\nb = 2", 2),
+        ("def double(x):\n    '''Return twice x.'''\n    return 2 * x", 2),
+        ("table = [\n    1,\n    2,\n]", 1),
+        ("if x: f(x)", 2),
+        (f"table = [{', '.join('1' * 30)}]", 3),
+    ],
+)
+def test_only_syntax_counts(text, lines):
+    assert code_lines(text) == lines
