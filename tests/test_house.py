@@ -20,10 +20,10 @@ TOPS = ("rig", "sim", "bench", "firmware", "tests")
 
 def rooms() -> dict[tuple[str, ...], tuple[int, int]]:
     """Return what each room may have now and what it is to have, by the paths that make it."""
-    rows = re.findall(r"^\| (`.+`) \| ([\d,]+) \| ([\d,]+) \|$", PAGE, re.MULTILINE)
+    page = re.sub(r"(?<=\d),(?=\d)", "", PAGE)
+    rows = re.findall(r"^\| (`.+`) \| (\d+) \| (\d+) \|$", page, re.MULTILINE)
     return {
-        tuple(re.findall(r"`(.+?)`", paths)): (int(now.replace(",", "")), int(goal.replace(",", "")))
-        for paths, now, goal in rows
+        tuple(re.findall(r"`(.+?)`", paths)): (int(now), int(goal)) for paths, now, goal in rows
     }
 
 

@@ -25,18 +25,18 @@ def work() -> list[dict[str, Any]]:
     RigError
         The simulation gave up.
     """
-    return _lines("sim.work_precision")
+    return _lines("bench.studies.resolved_precision")
 
 
 def published() -> list[dict[str, Any]]:
-    """Let the chains of other experiments fall, see `sim.published`.
+    """Let the chains of other experiments fall, see `bench.studies.published_falls`.
 
     Raises
     ------
     RigError
         The simulation gave up.
     """
-    return _lines("sim.published")
+    return _lines("bench.studies.published_falls")
 
 
 def _lines(module: str) -> list[dict[str, Any]]:

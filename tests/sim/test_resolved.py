@@ -13,10 +13,10 @@ from subprocess import PIPE, run
 import numpy as np
 import pytest
 
+from bench.studies import resolved_precision
+from bench.studies.integrators import euler, runge_kutta
+from bench.studies.published_falls import folded_time
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
-from sim import work_precision
-from sim.integrators import euler, runge_kutta
-from sim.published import folded_time
 from sim.resolved.contact_law import damping
 from sim.resolved.fall import AFTER, fall
 from sim.resolved.foresight import duration, impossible
@@ -149,9 +149,9 @@ def test_loops_that_are_not_compiled_give_the_same_bits():
 
 _SHORT_FALL = """
 import json
-from sim import work_precision
+from bench.studies import resolved_precision
 from sim.resolved.fall import fall
-found = fall(work_precision.chains()[0], until=0.2)
+found = fall(resolved_precision.chains()[0], until=0.2)
 assert found.touched_s[0] < 0.195
 print(json.dumps(found.heights[-1].tolist()))
 """
@@ -265,25 +265,25 @@ def test_error_against_run_time(monkeypatch):
         touch = chains[0].board.bounce.time_s
         return [0.1 + 100.0 * step**2 + touch], 1.0 / step
 
-    monkeypatch.setattr(work_precision, "separations", made_up)
-    lines = list(work_precision.settings())
+    monkeypatch.setattr(resolved_precision, "separations", made_up)
+    lines = list(resolved_precision.settings())
     steps = [one for one in lines if one["changed"] == "step"]
-    assert [one["step_s"] for one in steps] == list(work_precision.STEPS)
+    assert [one["step_s"] for one in steps] == list(resolved_precision.STEPS)
     for one in steps:
-        wanted = 100.0 * (one["step_s"] ** 2 - work_precision.REFERENCE**2)
+        wanted = 100.0 * (one["step_s"] ** 2 - resolved_precision.REFERENCE**2)
         assert one["rms_m"] == one["worst_m"] == pytest.approx(wanted, rel=1e-6)
     touches = [one for one in lines if one["changed"] == "touch"]
-    assert [one["touch_s"] for one in touches] == list(work_precision.TIMES)
+    assert [one["touch_s"] for one in touches] == list(resolved_precision.TIMES)
     assert touches[-1]["rms_m"] == 0.0 < touches[0]["rms_m"]
 
 
 def test_other_integrators_come_to_the_same_fall():
     """Each with an error of its own order, at one step."""
-    some = work_precision.chains()[-1:]
-    (exact,), _ = work_precision.separations(some, 2e-6)
+    some = resolved_precision.chains()[-1:]
+    (exact,), _ = resolved_precision.separations(some, 2e-6)
     assert 0.0 < exact < 5e-3  # at 70° two of three rods pull a little
     for follow, within in ((euler, 1e-4), (runge_kutta, 1e-5)):
         plain = getattr(follow, "py_func", follow)  # it would take long to compile
-        (found,), spent = work_precision.separations(some, 1e-5, plain)
+        (found,), spent = resolved_precision.separations(some, 1e-5, plain)
         assert found == pytest.approx(exact, abs=within)
         assert spent > 0.0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .resolved.scene import Board, Bounce, Chain, Rods, Strings
+from sim.resolved.scene import Board, Bounce, Chain, Rods, Strings
 
 if TYPE_CHECKING:
     from numpy.random import Generator

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .resolved.compiled import compiled
-from .resolved.fall import skip
-from .resolved.hanging import hang
-from .resolved.motion import LONGEST, SAMPLE, act_here, drift
+from sim.resolved.compiled import compiled
+from sim.resolved.fall import skip
+from sim.resolved.hanging import hang
+from sim.resolved.motion import LONGEST, SAMPLE, act_here, drift
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .resolved.motion import World
-    from .resolved.scene import Chain, Numbers
+    from sim.resolved.motion import World
+    from sim.resolved.scene import Chain, Numbers
 
     Follow = Callable[[World, float, float], None]
 

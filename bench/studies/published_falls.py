@@ -1,4 +1,4 @@
-"""What others published, as resolved falls: ``python -m sim.published`` prints JSON lines.
+"""What others published, as resolved falls; run as a module, it prints JSON lines.
 
 Grewal, Johnson and Ruina (2011) dropped chains of tilted rods from 75 cm onto a table; how many
 rods is not known here, so there are several. Calkin and March (1989) let a folded chain fall with
@@ -17,16 +17,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.studies.resolved_chain import BETA, GRAVITY, MU, paper_chain
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
-
-from .paper_chain import BETA, GRAVITY, MU, paper_chain
-from .resolved.fall import fall
-from .resolved.scene import Chain, Rods, Strings
+from sim.resolved.fall import fall
+from sim.resolved.scene import Chain, Rods, Strings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from .resolved.scene import Fall, Numbers
+    from sim.resolved.scene import Fall, Numbers
 
 FALLS = 16
 GREWAL_DROP, GREWAL_RODS = 0.75, (15, 20, 25)

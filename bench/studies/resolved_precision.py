@@ -1,4 +1,4 @@
-"""Error against run time of the resolved world: ``python -m sim.work_precision`` prints JSON lines.
+"""Error against run time of the resolved world; run as a module, it prints JSON lines.
 
 Chains of three rods, which do not touch each other: longer falls are chaotic, and no step makes a
 single one exact. A tilt that differs by 1 nrad moves Δz of three rods by up to 0.1 nm, of five by
@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import paper_chain as paper
-from .integrators import euler, runge_kutta, strike
-from .resolved.fall import STEP, fall
-from .resolved.scene import Strings
+from bench.studies import resolved_chain as paper
+from bench.studies.integrators import euler, runge_kutta, strike
+from sim.resolved.fall import STEP, fall
+from sim.resolved.scene import Strings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from .integrators import Follow
-    from .resolved.scene import Chain
+    from bench.studies.integrators import Follow
+    from sim.resolved.scene import Chain
 
 RODS = 3
 INCLINES = (40.0, 50.0, 60.0, 70.0)
@@ -113,7 +113,7 @@ def speeds() -> Iterator[dict[str, float | str | None]]:
     command = [
         sys.executable,
         "-c",
-        f"from {__package__}.work_precision import *; print(time_of_many(SHORT_S))",
+        f"from {__package__}.resolved_precision import *; print(time_of_many(SHORT_S))",
     ]
     plain = run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, stdout=PIPE, check=True)  # noqa: S603 - our own
     yield _speed(f"{paper.RODS} rods until {SHORT_S:g} s, not compiled", float(plain.stdout))
