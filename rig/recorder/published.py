@@ -8,10 +8,11 @@ is that of the state itself, however fast the device talks.
 from __future__ import annotations
 
 import threading
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
 EDGES_LIMIT = 1 << 16
 """Edges shown of one drop; all of them are in the session file."""
@@ -60,55 +61,37 @@ class PublishedState:
 
     def set(self, **sections: Any) -> None:
         """Give sections new values; equal ones are no change."""
-        with self._guard:
-            first = self._clean
+        with self._changing():
             for name, value in sections.items():
                 if self._sections[name] != value:
                     self._sections[name] = value
                     self._dirty.add(name)
-            first = first and not self._clean
-        if first:
-            self.changed()
 
     def plan(self, runs: Iterable[dict[str, Any]]) -> None:
         """Show another plan."""
-        with self._guard:
-            first = self._clean
+        with self._changing():
             self._runs = {run["run"]: run for run in runs}
             self._dirty.add("runs")
-        if first:
-            self.changed()
 
     def run(self, number: int, **fields: Any) -> None:
         """Change what is said of one run."""
-        with self._guard:
-            first = self._clean
+        with self._changing():
             if number in self._runs:
                 self._runs[number] = self._runs[number] | fields
                 self._dirty_runs.add(number)
-            first = first and not self._clean
-        if first:
-            self.changed()
 
     def edges(self, more: Iterable[Edge3]) -> None:
         """Show more edges of the current drop."""
-        with self._guard:
-            first = self._clean
+        with self._changing():
             self._edges.extend(more)
             del self._edges[EDGES_LIMIT:]
-            first = first and not self._clean
-        if first:
-            self.changed()
 
     def replace_edges(self, edges: Iterable[Edge3]) -> None:
         """Show these edges instead."""
-        with self._guard:
-            first = self._clean
+        with self._changing():
             self._edges = list(edges)[:EDGES_LIMIT]
             self._told = len(self._edges)
             self._dirty.add("edges")
-        if first:
-            self.changed()
 
     def planned(self, number: int) -> bool:
         """Whether the plan has this run."""
@@ -145,6 +128,16 @@ class PublishedState:
             self._dirty.clear()
             self._dirty_runs.clear()
             return change
+
+    @contextmanager
+    def _changing(self) -> Iterator[None]:
+        """Keep others out; tell of the first change after a `take`, once they are in again."""
+        with self._guard:
+            clean = self._clean
+            yield
+            changed = clean and not self._clean
+        if changed:
+            self.changed()
 
     @property
     def _clean(self) -> bool:

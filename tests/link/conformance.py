@@ -5,6 +5,7 @@ The bench is the device with hands around it, see `tests.link.bench`.
 
 from __future__ import annotations
 
+from tests.link.suite_checks import CheckSuite
 from tests.link.suite_drop import DropSuite
 from tests.link.suite_hold import HoldSuite
 from tests.link.suite_input import InputSuite
@@ -15,6 +16,6 @@ from tests.link.suite_safe import SafetySuite
 
 
 class DeviceConformance(
-    DropSuite, HoldSuite, MemorySuite, RefusalSuite, SafetySuite, InputSuite, LineSuite
+    CheckSuite, DropSuite, HoldSuite, MemorySuite, RefusalSuite, SafetySuite, InputSuite, LineSuite
 ):
     """What every device must do."""

@@ -7,7 +7,7 @@ import pytest
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import Phase, RefusalReason, pack_label
+from rig.link.messages import Phase, RefusalReason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
@@ -41,31 +41,6 @@ class HoldSuite(Suite):
         assert line.ask(wire.Read(LABEL + 1, 0, 1), 12) == wire.Refused(
             RefusalReason.NO_SUCH_DROP, 0
         )
-
-    def test_only_the_right_crc_releases_a_drop(self, device):
-        self.refused(RefusalReason.NO_SUCH_DROP, device.fetch, LABEL)
-        drop = self.drop(device)
-        self.refused(RefusalReason.WRONG_CRC, device.acknowledge, LABEL, drop.certificate.crc32 ^ 1)
-        self.refused(
-            RefusalReason.NO_SUCH_DROP, device.acknowledge, LABEL ^ 1, drop.certificate.crc32
-        )
-        assert device.status().phase is Phase.HOLDING
-        self.release(device, drop)
-        self.refused(RefusalReason.NO_SUCH_DROP, self.release, device, drop)
-
-    def test_a_held_drop_forbids_arming(self, device):
-        self.drop(device)
-        error = self.refused(RefusalReason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
-        assert "run 7" in error.message
-        self.refused(RefusalReason.HOLDING_A_DROP, arm, device, LABEL)
-
-    def test_after_abort_the_same_label_may_be_armed_again(self, device):
-        self.drop(device)
-        device.abort()
-        assert device.status().phase is Phase.HOLDING
-        self.refused(RefusalReason.HOLDING_A_DROP, arm, device, pack_label(8, 1))
-        drop = self.drop(device)
-        assert drop.faults == ()
 
     def test_abort_ends_a_recording_and_keeps_it(self, bench, device):
         device.fire(arm(device, record_ms=20_000))

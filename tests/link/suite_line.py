@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import random
-
 import pytest
 
 from rig.errors import DeviceTimeoutError
@@ -18,23 +16,6 @@ from tests.link.talk import LossyPort, NoisyPort, Wire, arm, order
 
 
 class LineSuite(Suite):
-    def test_a_repeated_request_is_answered_and_not_executed_again(self, bench):
-        line = Wire(bench)
-        armed = line.ask(order(), 1)
-        assert line.ask(order(), 1) == armed
-        line.say(wire.Fire(armed.token), 2)
-        heard = line.hear(0.01)
-        line.say(wire.Fire(armed.token), 2)
-        heard += line.hear_drop()
-        fired = [m for ack, m in heard if ack == 2]
-        assert len(fired) == 2
-        assert isinstance(fired[0], wire.Fired)
-        assert fired[0] == fired[1]
-        assert bench.lab.drops == [LABEL]
-        (end,) = [m for _, m in heard if isinstance(m, wire.DropCertificate)]
-        assert line.ask(wire.Acknowledge(LABEL, end.crc32), 3) == wire.Done()
-        assert line.ask(wire.Acknowledge(LABEL, end.crc32), 3) == wire.Done()
-
     def test_a_repeated_refusal_is_the_same_refusal(self, bench):
         line = Wire(bench)
         bench.lab.hanging = 1
@@ -51,11 +32,6 @@ class LineSuite(Suite):
         armed = line.ask(order(), 1)
         assert line.ask(wire.Status(), 2).phase is Phase.ARMED
         assert line.ask(order(), 1) != armed
-
-    def test_frames_without_a_seq_are_passed_over(self, bench):
-        line = Wire(bench)
-        line.say(wire.Status(), 0)
-        assert line.hear() == []
 
     def test_a_lost_request_is_sent_again(self, bench, device, identity):
         port = LossyPort(bench)
@@ -93,13 +69,6 @@ class LineSuite(Suite):
         port.lose_tx = 1
         assert device.ping() is None
         assert device.ping() is not None
-
-    def test_junk_on_the_line(self, bench, device):
-        noise = random.Random(3)
-        for _ in range(20):
-            bench.port().write(noise.randbytes(noise.randrange(1, 600)))
-            bench.port().write(b"\0")
-            assert device.status().phase is Phase.IDLE
 
     @pytest.mark.parametrize("seed", range(3))
     def test_one_percent_of_damaged_bytes_changes_nothing(self, bench, seed):

@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-import pytest
-
 from rig.link import messages as wire
 from rig.link.messages import Phase, RefusalReason, pack_label
-from rig.selftest.requests import BAD_ORDERS, UNKNOWN_CODES, wrong_lengths
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
-from tests.link.talk import Wire, arm, order
+from tests.link.talk import Wire, arm
 
 BAD = {"gates": 0}
 
 
 class RefusalSuite(Suite):
-    def test_fire_needs_arm(self, device):
-        self.refused(RefusalReason.NOT_ARMED, device.fire, 1)
-
-    def test_fire_needs_the_right_token(self, bench, device):
-        token = arm(device)
-        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
-        assert bench.lab.drops == []
-        device.fire(token)
-
-    def test_arming_again_makes_the_older_token_worthless(self, device):
-        old, new = arm(device), arm(device)
-        self.refused(RefusalReason.WRONG_TOKEN, device.fire, old)
-        device.fire(new)
-
     def test_a_blocked_gate_forbids_arming(self, bench, device):
         bench.lab.hanging = 0x0201
         error = self.refused(RefusalReason.GATE_BLOCKED, arm, device)
@@ -50,11 +33,6 @@ class RefusalSuite(Suite):
         device.abort()
         device.fire(arm(device))
 
-    @pytest.mark.parametrize("bad", BAD_ORDERS)
-    def test_bad_parameters(self, device, bad):
-        self.refused(RefusalReason.BAD_PARAMETER, arm, device, **bad)
-        assert device.status().phase is Phase.IDLE
-
     def test_the_longest_pulse_is_the_one_it_names(self, device, identity):
         longest = identity.max_pulse_us
         self.refused(RefusalReason.BAD_PARAMETER, arm, device, pulse_us=longest + 1)
@@ -66,13 +44,6 @@ class RefusalSuite(Suite):
         if identity.releases < 8:
             self.refused(RefusalReason.BAD_PARAMETER, arm, device, release=1 << identity.releases)
         arm(device, gates=1 << identity.gates - 1, release=1 << identity.releases - 1)
-
-    def test_a_refused_request_changes_nothing(self, device):
-        token = arm(device)
-        self.refused(RefusalReason.BAD_PARAMETER, arm, device, **BAD)
-        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
-        device.fire(token)
-        assert device.collect(LABEL).faults == ()
 
     def test_arming_and_reading_while_recording(self, device):
         device.fire(arm(device))
@@ -87,22 +58,6 @@ class RefusalSuite(Suite):
         self.refused(RefusalReason.HOLDING_A_DROP, arm, device, **BAD)
 
     # -- what is no request
-
-    def test_unknown_messages(self, bench):
-        line = Wire(bench)
-        for seq, code in enumerate(UNKNOWN_CODES, start=1):
-            line.send(code, b"", seq)
-            assert line.hear() == [(seq, wire.Refused(RefusalReason.UNKNOWN_MESSAGE, code))]
-
-    def test_requests_of_another_length(self, bench):
-        line = Wire(bench)
-        for seq, (code, wrong) in enumerate(wrong_lengths(order()), start=1):
-            line.send(code, wrong, seq)
-            answers = line.hear(until=lambda ack, _, seq=seq: ack == seq)
-            assert answers == [(seq, wire.Refused(RefusalReason.BAD_PARAMETER, 0))], wire.TABLE[
-                code
-            ]
-        assert line.ask(wire.Status(), 99).phase is Phase.IDLE
 
     def test_requests_far_too_long(self, bench):
         """Such a frame need not fit a device's memory: no answer is as good as a refusal."""

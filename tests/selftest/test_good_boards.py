@@ -13,7 +13,6 @@ from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS
-from tests.firmware.core_board import CoreBoard
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import GATE, LoopedBoard, Wire, outcomes, port_of
 
@@ -82,11 +81,6 @@ def test_without_leave_no_release_is_driven():
     assert failed(found) == []
     assert board.driven == 0
     assert "--release" in found["COOLING"].what
-
-
-@pytest.mark.parametrize("streams", [False, True])
-def test_the_core_passes(streams):
-    assert failed(outcomes(port_of(CoreBoard(Wire(), streams=streams)))) == []
 
 
 def test_the_latency_is_measured():
