@@ -38,7 +38,7 @@ def summary(found: Precision) -> str:
     """The cheapest methods, how far the models are apart, and what was left out."""
     lines = []
     for name, title in found.scenes:
-        lines.append(f"{title}: cheapest method for a relative error of Δz, with its run time")
+        lines.append(f"{title}: cheapest method for a relative error of Δz")
         rows: dict[str, list[Cheapest]] = {}
         for one in found.cheapest:
             if one.scene == name:
@@ -55,7 +55,7 @@ def summary(found: Precision) -> str:
             if gap.scene == name
         ]
         gone = sum(out.scene == name for out in found.left_out)
-        lines += [f"  left out: {gone}, each with its reason in precision.json"] * (gone > 0)
+        lines += [f"  left out: {gone}, see precision.json"] * (gone > 0)
     return "\n".join(lines)
 
 
@@ -66,7 +66,8 @@ def _model(of: Cheapest | Gap) -> str:
 def _winner(one: Cheapest) -> str:
     if one.median_s is None:
         return "none gets there"
-    return f"{one.median_s * 1e6:.1f} µs, {one.method}, {one.setting}"
+    setting = f", {one.setting}" if one.contact_time_s is None else ""
+    return f"{one.median_s * 1e6:.1f} µs, {one.method}{setting}"
 
 
 def _write(folder: Path, found: Precision) -> None:
