@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from rig.bench.figures import precision_figure
-from rig.bench.precision import as_json, precision
+from rig.bench.precision import Point, as_json, precision
 from rig.commands.output import print_found, say, write_page
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
@@ -55,7 +55,7 @@ def summary(found: Precision) -> str:
             if gap.scene == name
         ]
         gone = sum(out.scene == name for out in found.left_out)
-        lines += [f"  left out: {gone}, see precision.json"] * (gone > 0)
+        lines.append(f"  left out: {gone}, see precision.json")
     return "\n".join(lines)
 
 
@@ -72,8 +72,6 @@ def _winner(one: Cheapest) -> str:
 
 def _write(folder: Path, found: Precision) -> None:
     """Write ``precision.csv``, ``precision.json`` and a picture for each scene so far."""
-    from rig.bench.precision import Point  # noqa: PLC0415 - see main
-
     columns = [field.name for field in fields(Point)]
     table = csv_text(columns, (asdict(point) for point in found.points))
     write_atomic(folder / "precision.csv", table)
