@@ -8,14 +8,18 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
-from rig.units import Dimension, UnitError, parse
+from rig.units import Dimension
 
+from .dial import dial, read_values, silenced
 from .resolved_dials import NAMES as RESOLVED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rig.protocol.protocol import Protocol
+
+_TIME, _LENGTH = Dimension.TIME, Dimension.LENGTH
+_SLOWEST = -0.5  # of a clock, relative; a real one is off by less than 0.5 %
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,48 +91,49 @@ class Dials:
         True coefficients; not-a-number takes the protocol's.
     """
 
-    skew_sd: float = 2e-3
-    delay: float = 20e-3
-    delay_sd: float = 1e-3
-    hang_sd: float = 0.1e-3
-    side_sd: float = 0.0
-    drop_error: float = 0.5
-    impact_error: float = 0.0
-    rod_sd: float = 0.3e-3
-    width_sd: float = 0.1e-3
-    gate_sd: float = 0.2e-3
-    datum_sd: float = 0.2e-3
-    beam_sd: float = 0.5e-3
-    contact_sd: float = 0.0
-    strike_sd: float = 0.0
-    impulse_sd: float = 0.02
-    jitter_sd: float = 2e-6
-    missed: float = 0.01
-    chatter: float = 0.005
-    string: float = 0.002
-    bounce: float = 0.05
-    clock: float = -1300e-6
-    drift: float = 0.0
-    wander: float = 0.0
-    reference: float = math.nan
-    latency: float = 0.3e-3
-    stalled: float = 0.0
-    stall: float = 50e-3
-    corrupt: float = 0.0
-    lose: float = 0.0
-    drag: float = 0.0
-    restitution: float = math.nan
-    friction: float = math.nan
+    skew_sd: float = dial(2e-3, _TIME)
+    delay: float = dial(20e-3, _TIME, kept=True)
+    delay_sd: float = dial(1e-3, _TIME)
+    hang_sd: float = dial(0.1e-3, _LENGTH, stated=True)
+    side_sd: float = dial(0.0, _LENGTH, stated=True)
+    drop_error: float = dial(0.5)
+    impact_error: float = dial(0.0)
+    rod_sd: float = dial(0.3e-3, _LENGTH, stated=True)
+    width_sd: float = dial(0.1e-3, _LENGTH, stated=True)
+    gate_sd: float = dial(0.2e-3, _LENGTH, stated=True)
+    datum_sd: float = dial(0.2e-3, _LENGTH, stated=True)
+    beam_sd: float = dial(0.5e-3, _LENGTH, stated=True)
+    contact_sd: float = dial(0.0, _LENGTH, stated=True)
+    strike_sd: float = dial(0.0, _LENGTH, stated=True)
+    impulse_sd: float = dial(0.02)
+    jitter_sd: float = dial(2e-6, _TIME, stated=True)
+    missed: float = dial(0.01, high=1.0)
+    chatter: float = dial(0.005, high=1.0)
+    string: float = dial(0.002, high=1.0)
+    bounce: float = dial(0.05, high=1.0)
+    clock: float = dial(-1300e-6, low=_SLOWEST)
+    drift: float = dial(0.0, low=-math.inf)
+    wander: float = dial(0.0)
+    reference: float = dial(math.nan, low=_SLOWEST, kept=True)
+    latency: float = dial(0.3e-3, _TIME)
+    stalled: float = dial(0.0, high=1.0)
+    stall: float = dial(50e-3, _TIME, kept=True)
+    corrupt: float = dial(0.0, high=1.0)
+    lose: float = dial(0.0, high=1.0)
+    drag: float = dial(0.0)
+    restitution: float = dial(math.nan, low=-1.0, high=1.0, kept=True)
+    friction: float = dial(math.nan, kept=True)
 
     @classmethod
     def quiet(cls) -> Dials:
         """All disturbances off: the model itself, on a perfect rig."""
-        return cls(**{name: 0.0 for name in _NAMES if name not in _KEPT})
+        return cls(**silenced(cls))
 
     @classmethod
     def stated(cls) -> Dials:
         """A rig that is off by as much as its protocol says, wherever it says it."""
-        return cls(**dict.fromkeys(_STATED, math.nan), drop_error=1.0, impact_error=1.0)
+        said = {one.name: math.nan for one in fields(cls) if one.metadata.get("stated")}
+        return cls(**said, drop_error=1.0, impact_error=1.0)
 
     def on(self, protocol: Protocol, share: Callable[[str], float] = lambda _: 1.0) -> Dials:
         """Take what is not-a-number from a protocol, but for what differs from chain to chain.
@@ -153,19 +158,6 @@ class Dials:
 
 
 _NAMES = tuple(field.name for field in fields(Dials))
-_KEPT = {"delay", "restitution", "friction", "reference", "stall"}
-_STATED = (
-    "hang_sd", "side_sd", "gate_sd", "datum_sd", "beam_sd", "contact_sd", "strike_sd", "jitter_sd",
-    "rod_sd", "width_sd",
-)  # fmt: skip
-_TIMES = {"skew_sd", "delay", "delay_sd", "jitter_sd", "latency", "stall"}
-_LENGTHS = {
-    "hang_sd", "side_sd", "rod_sd", "width_sd", "gate_sd", "datum_sd", "beam_sd", "contact_sd",
-    "strike_sd",
-}  # fmt: skip
-_SHARES = {"missed", "chatter", "string", "bounce", "corrupt", "lose", "stalled"}
-_SIGNED = {"clock", "drift", "reference", "restitution"}
-_RATES = {"clock", "reference"}
 _OF_THE_URL = ("dynamics", "pace", "seed", "truth")  # no disturbances, and read by the scene
 
 
@@ -183,7 +175,7 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
     Raises
     ------
     InputError
-        An unknown dial or a value that is not a quantity of its dimension.
+        An unknown dial, or a value that is not a quantity of its dimension or out of range.
     """
     rest = dict(settings)
     begins = {"quiet": Dials.quiet, "stated": Dials.stated}
@@ -196,8 +188,7 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
     if len(chosen) > 1:
         raise InputError(f"{scheme}://: quiet and stated are two rigs", "set one of them")
     dials = begins[chosen[0]]() if chosen else Dials()
-    changes: dict[str, float] = {}
-    for name, text in rest.items():
+    for name in rest:
         if name in RESOLVED:
             raise InputError(
                 f"{scheme}://: {name} is a dial of the resolved world", "add dynamics=resolved"
@@ -209,27 +200,4 @@ def read_dials(settings: Mapping[str, str], scheme: str = "sim") -> Dials:
                 f"{scheme}://: unknown dial {name!r}",
                 f"did you mean {close[0]!r}?" if close else f"dials are {', '.join(accepted)}",
             )
-        dimension = (
-            Dimension.TIME
-            if name in _TIMES
-            else Dimension.LENGTH
-            if name in _LENGTHS
-            else Dimension.NUMBER  # drag too: 0.03 is 0.03/m
-        )
-        try:
-            changes[name] = parse(text, dimension).value
-        except UnitError as error:
-            raise InputError(f"{scheme}://: {name}: {error}") from None
-        if changes[name] < 0.0 and name not in _SIGNED:
-            raise InputError(f"{scheme}://: {name}: {text} is negative; zero or more is accepted")
-        if changes[name] > 1.0 and name in _SHARES:
-            raise InputError(
-                f"{scheme}://: {name}: {text} is more than all", "a share is 0 to 100 %"
-            )
-        if abs(changes[name]) > 1.0 and name == "restitution":
-            raise InputError(f"{scheme}://: {name}: {text} is out of range", "-1 to 1 is accepted")
-        if changes[name] <= -1.0 and name in _RATES:
-            raise InputError(
-                f"{scheme}://: {name}: {text} would stop it", "a real one is off by < 0.5 %"
-            )
-    return replace(dials, **changes)
+    return replace(dials, **read_values(Dials, rest, scheme))

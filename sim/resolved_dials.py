@@ -6,27 +6,16 @@ that hard things of this size take.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
-from rig.errors import InputError
-from rig.units import Dimension, UnitError, parse
+from rig.units import Dimension
 
+from .dial import dial, read_values, silenced
 from .resolved.contact_law import DEADEST
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-
-def _dial(default: float, dimension: Dimension, low: float, high: float) -> Any:
-    return field(default=default, metadata={"dimension": dimension, "low": low, "high": high})
-
-
-def _switch() -> Any:
-    return field(
-        default=1.0,
-        metadata={"dimension": Dimension.NUMBER, "low": 0.0, "high": 1.0, "switch": True},
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,30 +54,24 @@ class ResolvedDials:
         Turning of the chain about the vertical, rad/s.
     """
 
-    string_restitution: float = _dial(0.3, Dimension.NUMBER, DEADEST, 1.0)
-    string_strain: float = _dial(0.05, Dimension.NUMBER, 1e-4, 1.0)
-    board_time: float = _dial(0.2e-3, Dimension.TIME, 1e-5, 2e-3)
-    rod_time: float = _dial(0.2e-3, Dimension.TIME, 1e-5, 2e-3)
-    rod_restitution: float = _dial(0.5, Dimension.NUMBER, DEADEST, 1.0)
-    rod_friction: float = _dial(0.3, Dimension.NUMBER, 0.0, 10.0)
-    rods_touch: float = _switch()
-    density: float = _dial(450.0, Dimension.DENSITY, 1.0, 25e3)
-    roll: float = _switch()
-    tilt_sd: float = _dial(1.0, Dimension.ANGLE, 0.0, 45.0)
-    yaw_sd: float = _dial(2.0, Dimension.ANGLE, 0.0, 45.0)
-    aside_sd: float = _dial(0.5e-3, Dimension.LENGTH, 0.0, 0.1)
-    off_centre_sd: float = _dial(1e-3, Dimension.LENGTH, 0.0, 1.0)
-    swing_sd: float = _dial(10e-3, Dimension.SPEED, 0.0, 10.0)
-    spin_sd: float = _dial(0.0, Dimension.TURNING, 0.0, 100.0)
+    string_restitution: float = dial(0.3, low=DEADEST, high=1.0, kept=True)
+    string_strain: float = dial(0.05, low=1e-4, high=1.0, kept=True)
+    board_time: float = dial(0.2e-3, Dimension.TIME, 1e-5, 2e-3, kept=True)
+    rod_time: float = dial(0.2e-3, Dimension.TIME, 1e-5, 2e-3, kept=True)
+    rod_restitution: float = dial(0.5, low=DEADEST, high=1.0, kept=True)
+    rod_friction: float = dial(0.3, high=10.0, kept=True)
+    rods_touch: float = dial(1.0, kept=True, switch=True)
+    density: float = dial(450.0, Dimension.DENSITY, 1.0, 25e3, kept=True)
+    roll: float = dial(1.0, kept=True, switch=True)
+    tilt_sd: float = dial(1.0, Dimension.ANGLE, high=45.0)
+    yaw_sd: float = dial(2.0, Dimension.ANGLE, high=45.0)
+    aside_sd: float = dial(0.5e-3, Dimension.LENGTH, high=0.1)
+    off_centre_sd: float = dial(1e-3, Dimension.LENGTH, high=1.0)
+    swing_sd: float = dial(10e-3, Dimension.SPEED, high=10.0)
+    spin_sd: float = dial(0.0, Dimension.TURNING, high=100.0)
 
 
 NAMES = tuple(one.name for one in fields(ResolvedDials))
-_UNITS = {
-    Dimension.TIME: " s", Dimension.LENGTH: " m", Dimension.ANGLE: " deg", Dimension.SPEED: " m/s",
-    Dimension.DENSITY: " kg/m^3", Dimension.TURNING: " rad/s",
-}  # fmt: skip
-"""Of what `parse` gives, as limits are told in."""
-_HANGING = ("tilt_sd", "yaw_sd", "aside_sd", "off_centre_sd", "swing_sd", "spin_sd")
 
 
 def read_resolved_dials(settings: Mapping[str, str], scheme: str = "sim") -> ResolvedDials:
@@ -104,23 +87,5 @@ def read_resolved_dials(settings: Mapping[str, str], scheme: str = "sim") -> Res
     InputError
         A value that is not a quantity of its dimension, or out of range.
     """
-    quiet = dict.fromkeys(_HANGING, 0.0) if settings.get("quiet") == "1" else {}
-    changes = dict(quiet)
-    for one in fields(ResolvedDials):
-        if one.name not in settings:
-            continue
-        text, kind = settings[one.name], one.metadata
-        try:
-            value = parse(text, kind["dimension"]).value
-        except UnitError as error:
-            raise InputError(f"{scheme}://: {one.name}: {error}") from None
-        if kind.get("switch") and value not in {0.0, 1.0}:
-            raise InputError(f"{scheme}://: {one.name}: {text} is neither 0 nor 1")
-        unit = _UNITS.get(kind["dimension"], "")
-        if not kind["low"] <= value <= kind["high"]:
-            raise InputError(
-                f"{scheme}://: {one.name}: {text} is outside of what is accepted",
-                f"{kind['low']:g} to {kind['high']:g}{unit}",
-            )
-        changes[one.name] = value
-    return replace(ResolvedDials(), **changes)
+    quiet = silenced(ResolvedDials) if settings.get("quiet") == "1" else {}
+    return ResolvedDials(**quiet | read_values(ResolvedDials, settings, scheme))

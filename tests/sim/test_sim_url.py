@@ -187,7 +187,7 @@ def test_without_a_protocol_there_is_nothing_to_simulate(where):
         ({"pace": "slow"}, "pace.*'slow'"),
         ({"skew": "2 ms"}, "unknown dial 'skew'"),
         ({"skew_sd": "2 mm"}, "skew_sd.*length"),
-        ({"missed": "-1 %"}, "negative"),
+        ({"missed": "-1 %"}, "outside of what is accepted"),
         ({"quiet": ""}, "quiet"),
         ({"truth": "no/such/folder/truth.jsonl"}, "truth: cannot write"),
     ],
