@@ -211,7 +211,7 @@ def mean_of_draws(fit: Fit, draws: int, seed: int, spread: float = 1.0) -> Timer
     for _ in range(draws):
         drop = Adjusted(model, estimate.x + root @ rng.standard_normal(estimate.x.size))
         found = [COMPUTED[name](drop) for name in _NAMES]
-        total += [one[0] for one in found if one is not None]
+        total += [one.value for one in found if one is not None]
     return TimerReading(*(total / draws).tolist())
 
 
@@ -229,7 +229,7 @@ def as_json(
 
 def _alone(case: _Case) -> TimerReading:
     found = measurands(case.fit.model, case.fit.estimate.x)
-    return TimerReading(*(found[name][0] for name in _NAMES))
+    return TimerReading(*(found[name].value for name in _NAMES))
 
 
 def _readjusted(case: _Case, trials: int) -> TimerReading:

@@ -83,6 +83,10 @@ class Estimate:
         """R⁻¹R⁻ᵀ, in units of the prior uncertainties."""
         return self.inverse @ self.inverse.T
 
+    def u(self, gradient: Array) -> float:
+        """Return the standard uncertainty of a function with these derivatives."""
+        return float(np.linalg.norm((gradient * self.sd) @ self.inverse))
+
     def beyond(self, x: Array) -> float:
         """How far this is from other unknowns, see `length`."""
         return length(scaled(self.x - x, self.sd), self.root)
@@ -357,32 +361,3 @@ def length(step: Array, root: Array) -> float:
         As in `Estimate`.
     """
     return float(np.linalg.norm(root @ step))
-
-
-def uncertainty(
-    estimate: Estimate, gradient: Array, groups: Mapping[str, Sequence[slice]]
-) -> tuple[float, dict[str, float]]:
-    """Standard uncertainty of a function of the unknowns, and what each source adds to it.
-
-    With A = JᵀJ + 1 = RᵀR in prior units, A⁻¹ = A⁻¹JᵀJA⁻¹ + Σ A⁻¹PA⁻¹, P picking one group: the
-    squares of the parts add up to the square of the whole.
-
-    Parameters
-    ----------
-    gradient
-        Derivatives by all unknowns, shape ``(unknowns,)``.
-    groups
-        Lines of the budget.
-    """
-    by_root = (gradient * estimate.sd) @ estimate.inverse
-    whole = math.sqrt(float(by_root @ by_root))
-    inverse = estimate.inverse @ by_root
-    squares = (inverse * inverse).tolist()  # of blocks so short, Python's own sums are quicker
-    parts = {
-        name: math.sqrt(sum(sum(squares[block]) for block in blocks))
-        for name, blocks in groups.items()
-    }
-    # What no prior explains comes from the edges; rounding may leave less than nothing.
-    edges = math.sqrt(max(0.0, float(by_root @ by_root) - sum(squares)))
-    parts["edges"] = math.hypot(edges, parts.get("edges", 0.0))
-    return whole, {name: part for name, part in parts.items() if part > 0.0}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
+from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import FEW_GATES, silent
@@ -15,10 +15,9 @@ from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
 from rig.analysis.fit import timed
-from rig.analysis.gate_passages import gate_passages
 from rig.analysis.identified import Identified, identified
+from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
-from rig.analysis.quantities import measured, quantities
 from rig.analysis.result import NO_EDGES, Audit, DropResult
 from rig.analysis.verdict import judge, judge_record, verdict_of
 from rig.protocol.contact import at_contact
@@ -107,7 +106,9 @@ def fit_drop(
     fit = timed(model, one.begun, scale.hz / rough.hz)
     unmatched = unmatched_edges(fit)
     audit = blank.count(fit.matched, count_unexplained(unmatched))
-    found = quantities(fit.model, fit.estimate)
+    joint = by_itself(fit)
+    budgets = Budgets(joint)
+    found = budgets.measured(joint.drops[0])
     if not all(math.isfinite(one.value) and math.isfinite(one.u) for one in found.values()):
         nothing = (make_reason("no_fall", protocol.vocabulary),)
         return DropResult(run, drop.attempt, "void", nothing, blank), None
@@ -132,6 +133,6 @@ def fit_drop(
         fit.estimate.scatter,
         unmatched=unmatched,
         last_passages=alone,
-        gates=gate_passages(fit, fit.x, partial(measured, fit.model, fit.estimate)),
+        gates=budgets.gates(joint.drops[0]),
     )
     return result, fit

@@ -101,13 +101,6 @@ def lasting(
     return np.asarray(curve / rate)
 
 
-def squared_after(
-    distance: Array, speed: Array, gravity: float | Array, kappa: float | Array
-) -> Array:
-    """Square of the speed at the end of a leg; before its beginning it may be negative."""
-    return _squared(reach_of(distance, kappa), speed, gravity, kappa)
-
-
 def _squared(reach: Array, speed: Array, gravity: float | Array, kappa: float | Array) -> Array:
     found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
     return found

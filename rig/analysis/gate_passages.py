@@ -4,24 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.free_flight import reach_slopes
-from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, START
+from rig.analysis.dual import Dual
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Matched
+    from rig.analysis.quantities import Adjusted
     from rig.analysis.result import Measured
     from rig.protocol.protocol import Gate
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +47,8 @@ class GatePassage:
         return found
 
 
-class _Moment(NamedTuple):
-    """Time and speed in a beam, each with its derivatives by all unknowns."""
-
-    gate: Gate
-    time: float
-    d_time: Array
-    speed: float
-    d_speed: Array
-
-
 def gate_passages(
-    fit: Matched, x: Array, measured: Callable[[float, Array], Measured]
+    fit: Matched, drop: Adjusted, measured: Callable[[Dual], Measured]
 ) -> tuple[GatePassage, ...]:
     """Say of every gate that saw the object how it passed, in the order of its way.
 
@@ -71,8 +56,8 @@ def gate_passages(
     ----------
     fit
         Of one drop.
-    x
-        Its unknowns.
+    drop
+        The same, with its unknowns.
     measured
         Makes a result of a value and its derivatives by the unknowns.
 
@@ -92,40 +77,28 @@ def gate_passages(
         if (match >= 0).any()
     }
     ordered = sorted(gates.gates, key=lambda gate: -gate.height)
-    moments = [_moment(model, gate, x) if gate in seen else None for gate in ordered]
+    moments = [(gate, *moment(drop, gate)) if gate in seen else None for gate in ordered]
     return tuple(
         GatePassage(
-            now.gate.channel,
-            now.gate.height,
-            measured(now.speed, now.d_speed),
-            measured(now.time - last.time, now.d_time - last.d_time) if last else None,
+            now[0].channel,
+            now[0].height,
+            measured(now[2]),
+            measured(now[1] - last[1]) if last else None,
         )
         for last, now in pairwise([None, *moments])
         if now is not None
     )
 
 
-def _moment(model: DropModel, gate: Gate, x: Array) -> _Moment:
-    """When the object's middle is in a beam, where that beam really is."""
-    at, gates = model.unknowns, model.protocol.gates
+def moment(drop: Adjusted, gate: Gate) -> tuple[Dual, Dual]:
+    """When the object's middle is in a beam, where that beam really is, and how fast it is."""
+    model, gates = drop.model, drop.model.protocol.gates
     assert gates is not None
-    d_level = np.zeros(x.size)
-    d_level[at["beams"].start + gates.gates.index(gate)] = 1.0
-    d_level[at["datum"].start + gates.posts.index(gate.side)] = 1.0
-    d_level[at["free rods"]] = -1.0
-    level = gate.height + float(d_level @ x)
-    path = model.trajectory("free", x)
-    when = path.times(np.array([level]))
-    _, (speed,), slopes = path.sights(when)
-    d_time = (model.spread("free", slopes)[0] - d_level) / speed
-    # v² = g (1 − e^(−2κd))/κ after a way d from rest.
-    way, share = np.array([path.height[0] - level]), float(path.air[0])
-    kappa = path.kappa * share
-    reach, by_kappa = reach_slopes(way, kappa)
-    steeper = (path.gravity - kappa * speed**2) / speed
-    by_path = np.zeros(COMMON)
-    by_path[START] = steeper
-    by_path[GRAVITY] = reach[0] / (2.0 * speed)
-    by_path[DRAG] = share * path.gravity * by_kappa[0] / (2.0 * speed)
-    d_speed = model.spread("free", by_path) - steeper * d_level
-    return _Moment(gate, float(when[0]), d_time, float(speed), d_speed)
+    beam, post = np.eye(len(gates.gates)), np.eye(len(gates.posts))
+    level = gate.height + drop.linear("beams", beam[[gates.gates.index(gate)]])
+    level += drop.linear("datum", post[[gates.posts.index(gate.side)]])
+    level -= drop.linear("free rods", np.ones((1, 1)))
+    speed = drop.squares("free", level).root()
+    times = model.trajectory("free", drop.x).times(level.value)
+    late = drop.levels("free", Dual(times, np.zeros_like(level.slopes))) - level
+    return (Dual(times, np.zeros_like(level.slopes)) + late / speed)[0], speed[0]

@@ -22,6 +22,7 @@ from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
 from rig.analysis.joint_step import DropState, joint_step, take
 from rig.analysis.unknowns import SharedUnknowns
+from rig.protocol.protocol import GUESSED
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -142,6 +143,34 @@ class JointFit:
                 if self.sd[block].any()
             ],
         }
+
+
+def by_itself(fit: Fit) -> JointFit:
+    """Take a drop that was adjusted by itself for a session that has nothing in common."""
+    estimate, none = fit.estimate, np.zeros(0, dtype=np.intp)
+    size = estimate.x.size
+    drop = JointDrop(
+        fit.model,
+        fit.matches,
+        estimate.x,
+        np.arange(size),
+        none,
+        none,
+        estimate.inverse,
+        np.zeros((size, 0)),
+    )
+    nothing = np.zeros(0)
+    degrees = {"jitter": estimate.degrees, "impulse": GUESSED}
+    return JointFit(
+        SharedUnknowns(()),
+        nothing,
+        nothing,
+        np.zeros((0, 0)),
+        fit.model.components,
+        degrees,
+        (drop,),
+        estimate.settled,
+    )
 
 
 @one_thread

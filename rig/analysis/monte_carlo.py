@@ -190,7 +190,7 @@ def _drawn(fit: Fit, seed: int) -> Iterator[dict[str, float]]:
         centre = _stated(sd) * rng.normal(size=sd.size)
         shaken = model.shaken(moved)
         estimate = adjust(shaken, fit.matches, at, centre)
-        yield {name: value for name, (value, _) in measurands(shaken, estimate.x).items()}
+        yield {name: one.value for name, one in measurands(shaken, estimate.x).items()}
 
 
 @one_thread
@@ -222,8 +222,8 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
             step = joint_step(states, x, joint.sd, centre).step()
             x = take(states, x, joint.sd, step)
         for one, values in zip(states, found, strict=True):
-            for name, (value, _gradient) in measurands(one.model, one.x).items():
-                values.setdefault(name, []).append(value)
+            for name, result in measurands(one.model, one.x).items():
+                values.setdefault(name, []).append(result.value)
     return [
         {name: Propagated.of(np.array(values)) for name, values in drop.items()} for drop in found
     ]

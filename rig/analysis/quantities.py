@@ -1,4 +1,4 @@
-"""The measurands, as functions of the adjusted unknowns, with their uncertainty."""
+"""The measurands, as functions of the adjusted unknowns, and the lines of their budget."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.adjust import uncertainty
-from rig.analysis.deviation import deviation_alone
 from rig.analysis.discrepancy import STRETCHES
-from rig.analysis.result import Measured
+from rig.analysis.dual import Dual
 from rig.analysis.swing import lever
 from rig.protocol.protocol import GUESSED
 
@@ -21,11 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.adjust import Estimate
     from rig.analysis.drop_model import DropModel
+    from rig.analysis.trajectory import Trajectory
 
     Array = NDArray[np.float64]
-    Value = tuple[float, Array]
 
 
 class BudgetLine(NamedTuple):
@@ -78,29 +75,11 @@ BUDGET = {
 COMMON = frozenset(name for name, line in BUDGET.items() if line.common)
 
 
-def quantities(model: DropModel, estimate: Estimate) -> dict[str, Measured]:
-    """Return everything the scene lets one measure, by its JSON name."""
-    return {
-        name: measured(model, estimate, value, gradient)
-        for name, (value, gradient) in measurands(model, estimate.x).items()
-    }
-
-
-def measurands(model: DropModel, x: Array) -> dict[str, Value]:
-    """Return the value of each measurand of the scene and its derivatives by all unknowns."""
+def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
+    """Return each measurand of the scene."""
     drop = Adjusted(model, x)
     found = ((name, compute(drop)) for name, compute in COMPUTED.items())
     return {name: value for name, value in found if value is not None}
-
-
-def measured(model: DropModel, estimate: Estimate, value: float, gradient: Array) -> Measured:
-    """Put a value and its uncertainty together, from its derivatives by all unknowns."""
-    u, budget = uncertainty(estimate, gradient, model.unknowns.groups)
-    degrees = effective_degrees(u, budget, {"edges": estimate.degrees})
-    groups = model.unknowns.groups
-    common = [block for name in COMMON & groups.keys() for block in groups[name]]
-    deviation = deviation_alone(model, estimate, gradient * estimate.sd, common, degrees)
-    return Measured(value, u, degrees, budget, deviation=deviation)
 
 
 def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str, float]) -> float:
@@ -124,14 +103,14 @@ def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str,
 class _Strike(NamedTuple):
     """How far above the contact level the top rod strikes, when, and how fast it is."""
 
-    above: Value
-    when: Value
-    speed: Value
+    above: Dual
+    when: Dual
+    speed: Dual
 
 
 @dataclass(frozen=True)
 class Adjusted:
-    """A drop with its unknowns, and what several measurands are made of.
+    """A drop with its unknowns, and what measurands and curves are made of.
 
     Attributes
     ----------
@@ -147,59 +126,101 @@ class Adjusted:
         """Whether a free chain falls beside one that strikes."""
         return {"impact", "free"} <= set(self.model.records)
 
+    def linear(self, name: str, share: Array | float = 1.0) -> Dual:
+        """Return a sum of a block's members, nothing where the scene has none.
+
+        Parameters
+        ----------
+        share
+            Of each, shape ``(members,)`` or ``(n, members)``.
+        """
+        block, share = self.model.unknowns.blocks.get(name, slice(0)), np.atleast_1d(share)
+        slopes = np.zeros((*share.shape[:-1], self.x.size))
+        slopes[..., block] = share if block.stop else 0.0
+        return Dual(slopes @ self.x, slopes)
+
+    def _by_path(self, role: str, value: Array | float, slopes: Array) -> Dual:
+        return Dual(value, self.model.spread(role, slopes))
+
+    def _path(self, role: str) -> Trajectory:
+        return self.model.trajectory(role, self.x)
+
+    @cached_property
+    def gravity(self) -> Dual:
+        """The acceleration of a fall, or down a track."""
+        return self.model.protocol.gravity.value + self.linear("gravity")
+
+    def release(self, role: str) -> Dual:
+        """When a chain was let go."""
+        return self.linear(f"{role} release") + self.model.guesses[role].release
+
+    def levels(self, role: str, times: Dual) -> Dual:
+        """Where a chain's reference point is at some moments, shape ``(n,)``."""
+        height, speed, slopes = self._path(role).sights(times.value)
+        return self._by_path(role, height, slopes) - Dual(0.0 * speed, times.slopes) * speed
+
+    def squares(self, role: str, levels: Dual) -> Dual:
+        """Square of a chain's speed by the equations at some levels, shape ``(n,)``."""
+        found, slopes, steeper = self._path(role).squares(levels.value)
+        return self._by_path(role, found, slopes) - Dual(0.0 * found, levels.slopes) * steeper
+
+    def top(self, role: str, levels: Dual) -> Dual:
+        """Where its top rod is, its reference point being at some levels, shape ``(n,)``."""
+        chain, protocol = self.model.records[role].chain.chain, self.model.protocol
+        found = levels + chain.length + self.linear(f"{role} rods", np.eye(chain.rods)[-1])
+        # A chain that turned is lower at its top, the more the further it fell.
+        slope = float(lever(chain)[-1]) / protocol.gravity.value
+        found -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
+        if role == "free":
+            return found
+        last: Array = levels.value < self._path(role).height[chain.rods - 1]  # of all that fall
+        return found + self.linear("top") * last - self.stretched(levels.value)[0]
+
+    def stretched(self, levels: Array) -> tuple[Dual, Dual]:
+        """How far ahead strings have pulled the top rod, and how much faster it is for that."""
+        modes = self.model.discrepancy.top(levels)
+        ahead, faster = (
+            self.linear(STRETCHES[0], part) + self.linear(STRETCHES[1], part) for part in modes
+        )
+        return ahead, faster
+
     @property
-    def speed(self) -> Value:
+    def late(self) -> Dual:
+        """How much faster a late last pull makes the top rod by the contact level."""
+        return self.linear("late", self.model.discrepancy.late_pull)
+
+    @property
+    def speed(self) -> Dual:
         """V as the top rod passes the contact level."""
         return self._arrival[0]
 
     @property
-    def hit(self) -> Value:
+    def hit(self) -> Dual:
         """When that is."""
         return self._arrival[1]
 
     @cached_property
-    def _arrival(self) -> tuple[Value, Value]:
+    def _arrival(self) -> tuple[Dual, Dual]:
         """V and its moment, by the equations' path, and by what strings did besides.
 
         The stretch has brought the top rod w ahead, at its rate w′: it arrives e = w/(V + w′)
         earlier, and slower by what it gains in that time. A late pull acts over the way below the
         lowest beam. Both are small, and what is of second order in them is left out.
         """
-        model, x, at = self.model, self.x, self.model.unknowns
-        path = model.trajectory("impact", x)
-        speed, d_speed = path.arrival, model.spread("impact", path.slopes.arrival)
-        hit, d_hit = float(path.time[-1]), model.spread("impact", path.slopes.time[-1])
-        if "stretch" in at:
-            modes = model.discrepancy.top(-model.records["impact"].strikes[-1:])
-            way, rate, sizes = modes.way[0], modes.rate[0], model.stretch(x)
-            fast, d_fast = speed + float(rate @ sizes), d_speed.copy()
-            early = float(way @ sizes) / fast
-            d_early = np.zeros(x.size)
-            for name in STRETCHES:
-                d_fast[at[name]] += rate
-                d_early[at[name]] = way / fast
-            d_early -= early / fast * d_fast
-            speed, d_speed = fast - path.gravity * early, d_fast - path.gravity * d_early
-            d_speed[at["gravity"]] -= early
-            hit, d_hit = hit - early, d_hit - d_early
-        if "late" in at:
-            pull, left = model.discrepancy.late_pull, model.discrepancy.late_way
-            late = pull * float(x[at["late"]][0])
-            d_late = np.zeros(x.size)
-            d_late[at["late"]] = pull
-            hit -= 0.5 * left * late / speed**2
-            d_hit = d_hit - 0.5 * left * (d_late - 2.0 * late / speed * d_speed) / speed**2
-            speed, d_speed = speed + late, d_speed + d_late
-        return (speed, d_speed), (hit, d_hit)
+        path = self._path("impact")
+        speed = self._by_path("impact", path.arrival, path.slopes.arrival)
+        hit = self._by_path("impact", float(path.time[-1]), path.slopes.time[-1])
+        ahead, faster = self.stretched(-self.model.records["impact"].strikes[-1:])
+        fast = speed + faster[0]
+        early = ahead[0] / fast
+        speed = fast - self.gravity * early
+        later = 0.5 * self.model.discrepancy.late_way * self.late / (speed * speed)
+        return speed + self.late, hit - early - later
 
     @cached_property
-    def skew(self) -> Value:
+    def skew(self) -> Dual:
         """The free chain's release less the impact chain's."""
-        gradient = np.zeros(self.x.size)
-        gradient[self.model.unknowns["free release"]] = 1.0
-        gradient[self.model.unknowns["impact release"]] = -1.0
-        begins = [float(self.model.trajectory(role, self.x).time[0]) for role in ("free", "impact")]
-        return begins[0] - begins[1], gradient
+        return self.release("free") - self.release("impact")
 
     @cached_property
     def strike(self) -> _Strike | None:
@@ -208,120 +229,79 @@ class Adjusted:
         `None` where nothing is struck, or so high that the chain never falls from there to the
         level.
         """
-        model, x, at = self.model, self.x, self.model.unknowns
-        if "impact" not in model.records:
+        if "impact" not in self.model.records:
             return None
-        path = model.trajectory("impact", x)
-        contact = model.protocol.contact
-        above = contact.strike.value + float(x[at["contact"]][0] + x[at["strike"]][0])
-        d_above = np.zeros(x.size)
-        d_above[at["contact"]] = d_above[at["strike"]] = 1.0
-        (speed, d_speed), (hit, d_hit) = self.speed, self.hit
-        pull = path.gravity - path.kappa * speed**2
-        d_pull = -2.0 * path.kappa * speed * d_speed
-        d_pull[at["gravity"]] += 1.0
-        d_pull[at["drag"]] -= speed**2
-        squared = speed**2 - 2.0 * pull * above
-        if squared <= 0.0:
+        speed, contact = self.speed, self.model.protocol.contact
+        above = contact.strike.value + self.linear("contact") + self.linear("strike")
+        kappa = Dual(self._path("impact").kappa, self.linear("drag").slopes)
+        squared = speed * speed - 2.0 * above * (self.gravity - kappa * speed * speed)
+        if squared.value <= 0.0:
             return None
-        end = math.sqrt(squared)
-        d_end = (speed * d_speed - pull * d_above - above * d_pull) / end
-        both, d_both = speed + end, d_speed + d_end
-        when = hit - 2.0 * above / both
-        d_when = d_hit - 2.0 * (d_above - above / both * d_both) / both
-        return _Strike((above, d_above), (when, d_when), (end, d_end))
+        end = squared.root()
+        return _Strike(above, self.hit - 2.0 * above / (speed + end), end)
 
-    def apart(self, when: float, d_when: Array) -> Value:
+    def apart(self, when: Dual) -> Dual:
         """Height of the free chain's top rod above the contact point at a moment."""
-        model, x, at = self.model, self.x, self.model.unknowns
-        free = model.trajectory("free", x)
-        top = model.records["free"].chain.chain.length + float(x[at["free rods"]][-1])
-        height, speed = free.heights(np.array([when]))
-        gradient = model.spread("free", free.derivatives(np.array([when])))[0]
-        gradient -= float(speed[0]) * d_when
-        turned = 0.0
-        if "free swing" in at:
-            # A chain that turned is lower at its top, the more the further it fell.
-            chain, protocol = model.records["free"].chain.chain, model.protocol
-            rate = float(x[at["free swing"]][0])
-            slope = float(lever(chain)[-1]) / protocol.gravity.value
-            fallen = protocol.drop.value - float(height[0])
-            turned = rate * slope * fallen
-            gradient *= 1.0 + rate * slope
-            gradient[at["free swing"]] = -slope * fallen
-        # The top rod is measured, not the reference point.
-        gradient[at["free rods"].stop - 1] += 1.0
-        return float(height[0]) + top - turned, gradient
+        moment = Dual(np.array([when.value]), when.slopes[None])
+        return self.top("free", self.levels("free", moment))[0]
 
 
-def _gravity(drop: Adjusted) -> Value | None:
+def _gravity(drop: Adjusted) -> Dual | None:
     """The acceleration of what falls and strikes nothing."""
     return None if drop.model.protocol.track is not None else _acceleration(drop)
 
 
-def _track_acceleration(drop: Adjusted) -> Value | None:
+def _track_acceleration(drop: Adjusted) -> Dual | None:
     """The acceleration of what goes down a track."""
     return None if drop.model.protocol.track is None else _acceleration(drop)
 
 
-def _acceleration(drop: Adjusted) -> Value | None:
-    model, x = drop.model, drop.x
-    if "impact" in model.records:
-        return None
-    gradient = np.zeros(x.size)
-    gradient[model.unknowns["gravity"]] = 1.0
-    return model.protocol.gravity.value + float(x[model.unknowns["gravity"]][0]), gradient
+def _acceleration(drop: Adjusted) -> Dual | None:
+    return None if "impact" in drop.model.records else drop.gravity
 
 
-def _speed(drop: Adjusted) -> Value | None:
+def _speed(drop: Adjusted) -> Dual | None:
     """V just before the top rod strikes."""
     return drop.speed if "impact" in drop.model.records else None
 
 
-def _fall_time(drop: Adjusted) -> Value | None:
+def _fall_time(drop: Adjusted) -> Dual | None:
     """How long it takes until the top rod strikes."""
-    if "impact" not in drop.model.records:
-        return None
-    begin = float(drop.model.trajectory("impact", drop.x).time[0])
-    duration = drop.hit[1].copy()
-    duration[drop.model.unknowns["impact release"]] -= 1.0
-    return drop.hit[0] - begin, duration
+    return drop.hit - drop.release("impact") if "impact" in drop.model.records else None
 
 
-def _release_skew(drop: Adjusted) -> Value | None:
+def _release_skew(drop: Adjusted) -> Dual | None:
     """The free chain's release less the impact chain's."""
     return drop.skew if drop.both else None
 
 
-def _separation_raw(drop: Adjusted) -> Value | None:
+def _separation_raw(drop: Adjusted) -> Dual | None:
     """Δz at the instant of the top rod's strike."""
-    return drop.apart(*drop.hit) if drop.both else None
+    return drop.apart(drop.hit) if drop.both else None
 
 
-def _separation(drop: Adjusted) -> Value | None:
-    """Δz had both chains been let go together: the free one that much later, or earlier."""
-    if not drop.both:
-        return None
-    # The free chain is read off where it was as long after its own release: no model of what it
-    # would have done comes in.
-    return drop.apart(drop.hit[0] + drop.skew[0], drop.hit[1] + drop.skew[1])
+def _separation(drop: Adjusted) -> Dual | None:
+    """Δz had both chains been let go together: the free one that much later, or earlier.
+
+    The free chain is read off where it was as long after its own release: no model of what it would
+    have done comes in.
+    """
+    return drop.apart(drop.hit + drop.skew) if drop.both else None
 
 
-def _speed_strike(drop: Adjusted) -> Value | None:
+def _speed_strike(drop: Adjusted) -> Dual | None:
     """V as the top rod really strikes, on the board or on the rods that lie there."""
     return None if drop.strike is None else drop.strike.speed
 
 
-def _separation_strike(drop: Adjusted) -> Value | None:
+def _separation_strike(drop: Adjusted) -> Dual | None:
     """Δz as the top rod really strikes, had both chains been let go together."""
     if not drop.both or drop.strike is None:
         return None
-    above, when, _ = drop.strike
-    value, gradient = drop.apart(when[0] + drop.skew[0], when[1] + drop.skew[1])
-    return value - above[0], gradient - above[1]
+    return drop.apart(drop.strike.when + drop.skew) - drop.strike.above
 
 
-COMPUTED: dict[str, Callable[[Adjusted], Value | None]] = {
+COMPUTED: dict[str, Callable[[Adjusted], Dual | None]] = {
     "separation_m": _separation,
     "separation_raw_m": _separation_raw,
     "separation_strike_m": _separation_strike,

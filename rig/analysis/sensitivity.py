@@ -11,9 +11,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.adjust import adjust
-from rig.analysis.joint_fit import joint_fit
-from rig.analysis.quantities import quantities
-from rig.analysis.refine import Budgets
+from rig.analysis.budgets import Budgets
+from rig.analysis.fit import Fit
+from rig.analysis.joint_fit import by_itself, joint_fit
 from rig.analysis.summary import summarize
 from rig.protocol.protocol import Priors
 from rig.threads import one_thread
@@ -64,16 +64,16 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
         for key, drop in analysis.adjusted.items()
     }
     if analysis.joint is None:
-        found = {
-            key: quantities(drop.model, adjust(drop.model, drop.matches, drop.x.copy()))
-            for key, drop in drops.items()
-        }
+        joints = [
+            by_itself(Fit(one.model, one.matches, adjust(one.model, one.matches, one.x.copy())))
+            for one in drops.values()
+        ]
     else:
-        joint = joint_fit(list(drops.values()))
-        if not joint.settled:
+        joints = [joint_fit(list(drops.values()))]
+        if not joints[0].settled:
             return None
-        budgets = Budgets(joint)
-        found = {key: budgets.measured(drop) for key, drop in zip(drops, joint.drops, strict=True)}
+    results = (one.measured(drop) for one in map(Budgets, joints) for drop in one.joint.drops)
+    found = dict(zip(drops, results, strict=True))
     return summarize(
         protocol,
         (

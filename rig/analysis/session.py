@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.budgets import Budgets
 from rig.analysis.drop import fit_drop
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.joint_fit import FEWEST, joint_fit
 from rig.analysis.likeness import likeness
 from rig.analysis.pairs import Effects, effects
-from rig.analysis.refine import Budgets
 from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of

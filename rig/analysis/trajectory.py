@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 ONE = np.ones(1)
-RELEASE, START, GRAVITY, DRAG = 0, 1, 2, 3
-"""Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 COMMON = 4
+RELEASE, START, GRAVITY, DRAG = range(COMMON)
+"""Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 
 
 class Hits(NamedTuple):
@@ -151,6 +151,28 @@ class Trajectory:
         _, lasted = fall_through(distance, self.speed[leg], self.gravity, self.kappas(leg))
         found: Array = self.time[leg] + lasted
         return found
+
+    def squares(self, levels: Array) -> tuple[Array, Array, Array]:
+        """Squares of the speeds with which the reference point comes down to some levels.
+
+        Returns
+        -------
+        squares, slopes, steeper
+            m²/s²; derivatives by the parameters, shape ``(levels, parameters)``; and by the way,
+            m/s².
+        """
+        begins = -self.height[: max(1, self.height.size - 1)]
+        leg = np.maximum(np.searchsorted(begins, -levels, side="left") - 1, 0)
+        kappa, share, distance = self.kappas(leg), self.shares(leg), self.height[leg] - levels
+        reach, by_kappa = reach_slopes(distance, kappa)
+        begin, left = self.speed[leg], 1.0 - kappa * reach
+        squares = np.maximum(left * begin**2 + self.gravity * reach, np.finfo(float).tiny)
+        steeper = 2.0 * (self.gravity - kappa * squares)
+        slopes = (2.0 * left * begin)[:, None] * self.slopes.speed[leg]
+        slopes += steeper[:, None] * self.slopes.height[leg]
+        slopes[:, GRAVITY] += reach
+        slopes[:, DRAG] += share * (self.gravity * by_kappa - 2.0 * distance * left * begin**2)
+        return squares, slopes, steeper
 
     def kappas(self, leg: Index) -> float | Array:
         """κ on each of some legs; one number where it is the same on all."""

@@ -286,7 +286,7 @@ def _case(
         alpha.size,
         number[here[kept[here]]],
         np.concatenate(chance),
-        {name: (gradient * sd)[order] for name, (_, gradient) in measurands(model, x).items()},
+        {name: (one.slopes * sd)[order] for name, one in measurands(model, x).items()},
         tuple(blocks.get(n, _BLIND) for n in range(at[_BEAMS[0]].stop - at[_BEAMS[0]].start)),
     )
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.budgets import Budgets
 from rig.analysis.distributions import coverage_factor
+from rig.analysis.dual import Dual
 from rig.analysis.fit import Fit
-from rig.analysis.free_flight import squared_after
+from rig.analysis.joint_fit import by_itself
 from rig.analysis.quantities import Adjusted
-from rig.analysis.swing import drawn, lever
 from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
 from rig.model.motion import Motion
@@ -19,11 +20,8 @@ from rig.model.rods import rod_impacts
 from rig.protocol.contact import as_struck, at_contact
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
-    from rig.analysis.drop_model import DropModel
     from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol, Run
@@ -31,7 +29,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 POINTS = 120
-_STEP = 1e-3  # of an unknown's prior uncertainty
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,112 +96,51 @@ def drop_curves(
     protocol: Protocol, run: Run, drop: Fit | JointDrop, joint: JointFit | None
 ) -> DropCurves:
     """Follow one drop from release to the top rod's hit, with bands."""
-    model, x = drop.model, drop.x
-    begin = model.trajectory("impact", x).time[0]
-    heights = np.linspace(_top(model, x) - 1e-6, 0.0, POINTS)
-    times = np.linspace(0.0, float(Adjusted(model, x).hit[0] - begin), POINTS)
+    if isinstance(drop, Fit):
+        joint = by_itself(drop)
+        (drop,) = joint.drops
+    assert joint is not None
+    adjusted, budgets = Adjusted(drop.model, drop.x), Budgets(joint)
+
+    def banded(measured: Dual, model: Array) -> Curve:
+        _, own, shared = budgets.roots(drop, measured.slopes)
+        variance = np.sum(own**2, axis=1) + np.sum(shared**2, axis=1)
+        return Curve(measured.value, coverage_factor(np.inf) * np.sqrt(variance), model)
+
+    begin = drop.model.trajectory("impact", drop.x).height[:1]
+    hanging = adjusted.top("impact", Dual(begin, np.zeros((1, drop.x.size)))).value.item()
+    heights = np.linspace(hanging - 1e-6, 0.0, POINTS)
+    lasted = adjusted.hit - adjusted.release("impact")
+    times = np.linspace(0.0, float(lasted.value), POINTS)
     separation = None
-    if "free" in model.records:
-        separation = Curve(
-            *_with_band(lambda at: _separations(model, at, times), drop, joint),
-            _separations_by_model(protocol, run, times),
-        )
-    squares = Curve(
-        *_with_band(lambda at: _squares(model, at, heights), drop, joint),
-        _squares_by_model(protocol, run, heights, model.records["impact"].chain.chain.length),
+    if "free" in drop.model.records:
+        by_model = _separations_by_model(protocol, run, times)
+        separation = banded(_separations(adjusted, times), by_model)
+    length = drop.model.records["impact"].chain.chain.length
+    by_model = _squares_by_model(protocol, run, heights, length)
+    return DropCurves(
+        run, heights, banded(_squares(adjusted, heights), by_model), times, separation
     )
-    return DropCurves(run, heights, squares, times, separation)
 
 
-def _top(model: DropModel, x: Array) -> float:
-    """Height of the top rod before the release."""
-    start = model.trajectory("impact", x).height[0]
-    return float(start + _places(model, x, "impact")[-1])
+def _squares(drop: Adjusted, heights: Array) -> Dual:
+    """V² of the impact chain when its top rod is at some heights."""
+    levels = Dual(heights, np.zeros((heights.size, drop.x.size)))
+    levels -= drop.model.records["impact"].chain.chain.length
+    for _ in range(2):  # what the top rod is off its chain hardly depends on the level
+        levels = levels + heights - drop.top("impact", levels)
+    speed = drop.squares("impact", levels).root() + drop.stretched(levels.value)[1]
+    if (way := drop.model.discrepancy.late_way) > 0.0:  # it comes by and by, below the lowest beam
+        speed += drop.late * np.clip(1.0 - heights / way, 0.0, 1.0)
+    return speed * speed
 
 
-def _places(model: DropModel, x: Array, role: str) -> Array:
-    chain = model.records[role].chain.chain
-    found: Array = np.array(chain.heights) + x[model.unknowns[f"{role} rods"]]
-    return found
-
-
-def _squares(model: DropModel, x: Array, heights: Array) -> Array:
-    """V² of the impact chain when its top rod is at a height."""
-    path = model.trajectory("impact", x)
-    level = heights - _places(model, x, "impact")[-1]
-    level -= _alone(model, x, level) - _turned(model, x, "impact", level)
-    ahead, faster = _stretched(model, x, level)
-    way = model.discrepancy.late_way
-    if way > 0.0:  # it comes by and by, below the lowest beam
-        late = model.discrepancy.late_pull * float(x[model.unknowns["late"]][0])
-        faster = faster + late * np.clip(1.0 - heights / way, 0.0, 1.0)
-    level += ahead
-    leg = np.maximum(np.searchsorted(-path.height[:-1], -level, side="left") - 1, 0)
-    distance = path.height[leg] - level
-    squares = squared_after(distance, path.speed[leg], path.gravity, path.kappas(leg))
-    return squares + (2.0 * np.sqrt(np.maximum(squares, 0.0)) + faster) * faster
-
-
-def _separations(model: DropModel, x: Array, times: Array) -> Array:
+def _separations(drop: Adjusted, times: Array) -> Dual:
     """How far the free chain's top rod is above the other's, each so long after its release."""
-    struck, free = model.trajectory("impact", x), model.trajectory("free", x)
-    level = struck.heights(struck.time[0] + times)[0]
-    apart = _places(model, x, "free")[-1] - _places(model, x, "impact")[-1]
-    apart = apart - _alone(model, x, level) + _stretched(model, x, level)[0]
-    beside = free.heights(free.time[0] + times)[0]
-    apart = apart + _turned(model, x, "impact", level) - _turned(model, x, "free", beside)
-    found: Array = beside - level + apart
-    return found
-
-
-def _stretched(model: DropModel, x: Array, level: Array) -> tuple[Array, Array]:
-    """How far ahead strings have pulled the top rod, and how much faster it is for that."""
-    modes, sizes = model.discrepancy.top(level), model.stretch(x)
-    return modes.way @ sizes, modes.rate @ sizes
-
-
-def _turned(model: DropModel, x: Array, role: str, level: Array) -> Array:
-    """How much lower the top rod of a chain that turns is than on a straight one."""
-    swing = f"{role} swing"
-    if swing not in model.unknowns:
-        return np.zeros_like(level)
-    chain = model.records[role].chain.chain
-    found: Array = x[model.unknowns[swing]] * drawn(lever(chain)[-1:], model.protocol, level)
-    return found
-
-
-def _alone(model: DropModel, x: Array, level: Array) -> Array:
-    """How far the top rod is off its chain once it is all that falls, by the reference's height."""
-    rods = model.records["impact"].chain.chain.rods
-    last = level < model.trajectory("impact", x).height[rods - 1]
-    found: Array = np.where(last, x[model.unknowns["top"]], 0.0)
-    return found
-
-
-def _with_band(
-    curve: Callable[[Array], Array], drop: Fit | JointDrop, joint: JointFit | None
-) -> tuple[Array, Array]:
-    """Values, and 1.96 standard uncertainties from the covariance of the adjustment."""
-    x, sd = drop.x, drop.model.unknowns.sd
-    slopes = np.stack(
-        [
-            (curve(x + step) - curve(x - step)) / (2.0 * _STEP)
-            for step in _STEP * np.diag(np.where(sd < 1.0, sd, 1e-3))
-        ],
-        axis=1,
+    free, struck = (
+        drop.top(role, drop.levels(role, drop.release(role) + times)) for role in ("free", "impact")
     )
-    # A prior of "anything" is too far to step: a thousandth was stepped, and is scaled back here.
-    slopes[:, sd >= 1.0] *= 1e3 * sd[sd >= 1.0]
-    if isinstance(drop, Fit) or joint is None:
-        assert isinstance(drop, Fit)
-        variance = np.sum((slopes @ drop.estimate.inverse) ** 2, axis=1)
-    else:
-        own, common = slopes[:, drop.own], slopes[:, drop.common]
-        left = common - own @ drop.gain
-        variance = np.sum((own @ drop.inverse) ** 2, axis=1)
-        variance += np.sum((left @ joint.inverse[drop.here]) ** 2, axis=1)
-    band = coverage_factor(np.inf) * np.sqrt(variance)
-    return curve(x), band
+    return free - struck
 
 
 def _by_model(protocol: Protocol, run: Run) -> tuple[Chain, float, list[float]]:

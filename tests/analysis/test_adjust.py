@@ -7,17 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from mpmath import mp
 
-from rig.analysis.adjust import DONE, adjust, uncertainty
+from rig.analysis.adjust import DONE, adjust
 from rig.analysis.equations import Equations, Residuals
 from tests.analysis.drops import SCENES, case
-from tests.examples import examples
 
 HUBER = 4.0
-GROUPS = {"place": [slice(0, 2)], "edges": [slice(2, 3)], "rest": [slice(3, 5)]}
 PRIOR = np.array([0.3, 2.0, 50.0, 0.0, 0.7])  # one is known exactly
 
 
@@ -81,8 +77,9 @@ def test_a_linear_problem_has_the_posterior_of_bayes(seed):
     assert found.scatter == 1.0
     np.testing.assert_allclose(found.x, mean, rtol=1e-9, atol=1e-12)
     for gradient in np.eye(5):
-        u, _ = uncertainty(found, gradient, GROUPS)
-        assert u == pytest.approx(math.sqrt(gradient @ covariance @ gradient), rel=1e-10)
+        assert found.u(gradient) == pytest.approx(
+            math.sqrt(gradient @ covariance @ gradient), rel=1e-10
+        )
 
 
 def test_fewer_matches_are_fewer_equations():
@@ -94,8 +91,7 @@ def test_fewer_matches_are_fewer_equations():
     np.testing.assert_allclose(found.root.T @ found.root, information, rtol=1e-12)
     nothing = adjust(model, {"impact": np.array([], dtype=int)}, PRIOR)
     assert not nothing.x.any()
-    u, budget = uncertainty(nothing, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), GROUPS)
-    assert (u, budget) == (PRIOR[1], {"place": PRIOR[1]})
+    assert nothing.u(np.eye(5)[1]) == PRIOR[1]
 
 
 def test_degrees_of_freedom_are_edges_less_what_they_determine():
@@ -140,35 +136,7 @@ def test_edges_that_scatter_more_count_less(factor):
     # The uncertainty is that of Bayes with all σ so enlarged.
     rows = jacobian[:, PRIOR > 0.0] / found.scatter
     covariance = np.linalg.inv(rows.T @ rows + np.diag(PRIOR[PRIOR > 0.0] ** -2.0))
-    u, _ = uncertainty(found, np.eye(5)[1], GROUPS)
-    assert u == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-9)
-
-
-@examples(60)
-@given(st.integers(0, 10**6), st.tuples(*[st.floats(-3, 3)] * 5))
-def test_squares_of_the_parts_add_up(seed, gradient):
-    found = adjust(Linear(seed), ALL, np.zeros(5))
-    u, budget = uncertainty(found, np.array(gradient), GROUPS)
-    assert sum(part**2 for part in budget.values()) == pytest.approx(u**2, rel=1e-9)
-
-
-def test_each_part_is_what_its_source_adds():
-    """Wiggle each input by its own standard uncertainty and look at the estimate itself."""
-    model = Linear(5)
-    found = adjust(model, ALL, np.zeros(5))
-    gradient = np.array([0.3, -1.0, 2.0, 0.5, 1.5])
-    _, budget = uncertainty(found, gradient, GROUPS)
-    _, covariance = posterior(model)
-    jacobian, _ = model.stacked()
-    # The estimate is −C(Jᵀr − P⁻¹x₀): linear in the edges r and in the prior means x₀.
-    by_edges = gradient @ covariance @ jacobian.T
-    by_prior = np.divide(gradient @ covariance, PRIOR, out=np.zeros(5), where=PRIOR > 0.0)
-    expected = {
-        "place": math.hypot(*by_prior[:2]),
-        "edges": math.hypot(*by_edges, by_prior[2]),
-        "rest": math.hypot(*by_prior[3:]),
-    }
-    assert budget == pytest.approx(expected, rel=1e-9)
+    assert found.u(np.eye(5)[1]) == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-9)
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -9,7 +9,7 @@ import pytest
 
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel
-from rig.analysis.quantities import measurands, quantities
+from rig.analysis.quantities import measurands
 from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, STATED, UNIFORM, case, with_dials
 
 SEPARATIONS = "separation_m separation_raw_m separation_strike_m"
@@ -143,10 +143,10 @@ def test_measurands_have_the_gradients_that_their_uncertainty_is_made_of(scene):
     x = somewhere(model, 3)
 
     expected, kinks = differences(
-        lambda at: np.array([value for value, _ in measurands(model, at).values()]), x, steps(model)
+        lambda at: np.array([one.value for one in measurands(model, at).values()]), x, steps(model)
     )
     assert not kinks.any()
-    gradients = np.stack([gradient for _, gradient in measurands(model, x).values()])
+    gradients = np.stack([one.slopes for one in measurands(model, x).values()])
     np.testing.assert_allclose(gradients, expected, rtol=1e-7, atol=2e-9)
 
 
@@ -161,7 +161,7 @@ def test_measurands_have_the_gradients_that_their_uncertainty_is_made_of(scene):
 )
 def test_a_scene_yields_what_it_has(protocol, names):
     model, matches = case(protocol).model()
-    found = quantities(model, adjust(model, matches, model.first()))
+    found = measurands(model, adjust(model, matches, model.first()).x)
     assert sorted(found) == sorted(names.split())
 
 

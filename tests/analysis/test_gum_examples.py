@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rig.analysis.adjust import least_squares, uncertainty
+from rig.analysis.adjust import least_squares
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.equations import plain_equations
 from rig.analysis.quantities import effective_degrees
@@ -50,7 +50,7 @@ def test_impedance():
     }
     for value, u, stated, gradient in gradients.values():
         assert value == pytest.approx(stated, abs=6e-4)
-        assert uncertainty(found, gradient, {})[0] == pytest.approx(u, abs=6e-4)
+        assert found.u(gradient) == pytest.approx(u, abs=6e-4)
     rows = np.array([gradient for *_, gradient in gradients.values()]) * sd
     whole = rows @ found.covariance @ rows.T
     scale = np.sqrt(np.diag(whole))
@@ -75,7 +75,7 @@ def test_thermometer():
         scatter = float(np.linalg.norm(slopes @ found.x - b)) / math.sqrt(11 - 2)
     assert scatter == pytest.approx(0.0035, abs=5e-5)
     assert found.x == pytest.approx([-0.1712, 0.00218], abs=5e-5)
-    u = [uncertainty(found, row, {})[0] for row in np.eye(2)]
+    u = [found.u(row) for row in np.eye(2)]
     assert u == pytest.approx([0.0029, 0.00067], rel=0.02)
     correlation = found.covariance[0, 1] / math.sqrt(
         found.covariance[0, 0] * found.covariance[1, 1]
@@ -83,4 +83,4 @@ def test_thermometer():
     assert correlation == pytest.approx(-0.930, abs=6e-4)
     at = np.array([1.0, 10.0])
     assert float(at @ found.x) == pytest.approx(-0.1494, abs=6e-5)
-    assert uncertainty(found, at, {})[0] == pytest.approx(0.0041, abs=6e-5)
+    assert found.u(at) == pytest.approx(0.0041, abs=6e-5)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from bench.studies.layout_catalogue import LAYOUTS, STANDARD, GateLayout
+from rig.analysis.budgets import Budgets
 from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.drop import fit_drop
 from rig.analysis.equations import STRAY, linearize
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.quantities import measurands
-from rig.analysis.refine import Budgets
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
 from rig.model.chain import Chain
@@ -74,11 +74,11 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once():
     budgets = Budgets(joint)
     for drop, place in zip(joint.drops, whole.columns, strict=True):
         found = budgets.measured(drop)
-        for name, (value, gradient) in measurands(drop.model, drop.x).items():
+        for name, result in measurands(drop.model, drop.x).items():
             full = np.zeros(whole.x.size)
-            full[place] = gradient * drop.model.unknowns.sd
+            full[place] = result.slopes * drop.model.unknowns.sd
             influence = whole.inverse @ full
-            assert found[name].value == value
+            assert found[name].value == result.value
             assert found[name].u == pytest.approx(math.sqrt(full @ influence), rel=2e-2)
             for group in set(whole.group) - {"edges"}:
                 part = np.linalg.norm(influence[whole.group == group])

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from rig.analysis.budgets import Budgets
 from rig.analysis.monte_carlo import (
     BLOCK,
     Propagated,
@@ -18,7 +19,6 @@ from rig.analysis.monte_carlo import (
     tolerance,
     until_stable,
 )
-from rig.analysis.refine import Budgets
 from rig.commands.budget import session_trials, trials_lines
 from rig.errors import InputError
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits

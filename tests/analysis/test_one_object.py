@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.drop import fit_drop
-from rig.analysis.gate_passages import _moment
+from rig.analysis.gate_passages import moment
+from rig.analysis.quantities import Adjusted
 from rig.analysis.session import analyze
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -83,14 +84,13 @@ def test_derivatives_at_a_gate_are_those_of_the_values(protocol):
     one = case(protocol, Dials(), run=1, seed=2)
     fit = fit_drop(protocol, one.run, one.drop, one.scale)[1]
     gate = protocol.gates.gates[2]
-    here = _moment(fit.model, gate, fit.x)
+    here = moment(Adjusted(fit.model, fit.x), gate)
     for at in np.flatnonzero(fit.model.unknowns.sd):
         step = 1e-4 * fit.model.unknowns.sd[at] * np.eye(fit.x.size)[at]
-        low, high = (_moment(fit.model, gate, fit.x + way * step) for way in (-1.0, 1.0))
-        width = 2.0 * step[at]
-        assert (high.time - low.time) / width == pytest.approx(here.d_time[at], rel=1e-4, abs=1e-7)
-        moved = (high.speed - low.speed) / width
-        assert moved == pytest.approx(here.d_speed[at], rel=1e-4, abs=1e-6)
+        ends = [moment(Adjusted(fit.model, fit.x + way * step), gate) for way in (-1.0, 1.0)]
+        for value, low, high, least in zip(here, *ends, (1e-7, 1e-6), strict=True):
+            moved = (high.value - low.value) / (2.0 * step[at])
+            assert moved == pytest.approx(value.slopes[at], rel=1e-4, abs=least)
 
 
 @BOTH

@@ -12,7 +12,6 @@ from bench.__main__ import main
 from bench.studies.baselines import TimerReading, line_fit
 from bench.studies.estimators import mean_of_draws
 from rig.analysis.drop import fit_drop
-from rig.analysis.quantities import quantities
 from rig.protocol.protocol import Priors
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
@@ -31,7 +30,7 @@ def test_draws_of_no_spread_are_the_adjustment_itself():
     """The curve is of the same function as the results beside it, on a rig with everything off."""
     one = case(UNIFORM, Dials(skew_sd=1e-3), incline=40.0)
     fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
-    known = quantities(fit.model, fit.estimate)
+    known = one.analyze().quantities
     reading = mean_of_draws(fit, 1, 3, spread=0.0)
     assert reading == TimerReading(known["separation_m"].value, known["speed_m_s"].value)
 
@@ -45,7 +44,7 @@ def test_draws_have_the_mean_of_the_adjustment():
     like = Priors(departure=0.1e-3, impulses=0.05, last_impulse=0.01, strings=0.0, swing=0.01)
     one = case(replace(UNIFORM, priors=like), Dials(skew_sd=1e-3), incline=40.0)
     fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
-    known = quantities(fit.model, fit.estimate)
+    known = one.analyze().quantities
     draws = 1_000
     reading = mean_of_draws(fit, draws, 3)
     for name in ("separation_m", "speed_m_s"):
