@@ -347,11 +347,13 @@ def _parser() -> Parser:
         action="store_true",
         help="show how each prior changes the results; takes longer",
     )
+    _fresh(analyze)
     _json(analyze)
 
     estimated = command("estimate", "estimate restitution, friction and impulses from a session")
     _session(estimated)
     estimated.add_argument("-o", "--output", metavar="DIR", help="folder for pictures as SVG files")
+    _fresh(estimated)
     _json(estimated)
 
     report = command("report", "write the results of a session as one HTML page")
@@ -364,10 +366,12 @@ def _parser() -> Parser:
         "--bars", choices=["U95", "u", "SE", "SD", "half-SD"], default="U95",
         help="meaning of the error bars; half-SD is that of the paper",
     )  # fmt: skip
+    _fresh(report)
 
     export = command("export", "write a session's results and edges as CSV files")
     _session(export)
     export.add_argument("--csv", required=True, metavar="DIR", help="folder for the files")
+    _fresh(export)
 
     recover = command("recover", "list what can be read of a damaged session file, and save it")
     _session(recover)
@@ -423,6 +427,7 @@ def _parser() -> Parser:
     doctor = command("doctor", "look for what is wrong with this computer, a board or a session")
     doctor.add_argument("--port", type=_port, help="also this board: device path or URL")
     doctor.add_argument("--session", metavar="FILE", help="also this session, and its disk")
+    doctor.add_argument("--clear-cache", action="store_true", help="forget all kept results")
     _json(doctor)
 
     selftest = command("selftest", "have a board prove that it does what it must")
@@ -601,6 +606,12 @@ def _protocol(parser: argparse.ArgumentParser, nargs: str | None = None) -> None
 
 def _session(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", metavar="SESSION", help="the session file")
+
+
+def _fresh(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--fresh", action="store_true", help="compute everything again, use no kept results"
+    )
 
 
 def _json(parser: argparse.ArgumentParser) -> None:

@@ -10,6 +10,7 @@ import math
 from bisect import bisect_left
 from contextlib import suppress
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from rig.ports import truth_file
@@ -81,6 +82,13 @@ class Film:
             )
         )
         return left, right
+
+
+def film_digest(session: Path) -> str:
+    """SHA-256 of the file that has a session's films; empty where there is none."""
+    with suppress(OSError):
+        return sha256(truth_file(session).read_bytes()).hexdigest()
+    return ""
 
 
 def read_films(session: Path) -> dict[tuple[int, int], Film]:

@@ -42,6 +42,9 @@ class _ByBytes(Reader):
         told = sorted(_once([*acknowledged, *late]), key=_key)
         self._drops = [as_old_as(stored.get(_key(drop), drop), drop) for drop in told]
 
+    def digest(self) -> None:
+        return None
+
     def drops(self, *_: object, **__: object) -> Iterator[Drop]:
         yield from self._drops
 

@@ -84,3 +84,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [
         one for number in range(workers) for of in (waiting, computing) for one in share(of, number)
     ]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_users_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Have no test see what a user has kept, but for the fonts that matplotlib has listed."""
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MPLCONFIGDIR", os.environ.get("MPLCONFIGDIR") or str(caches / "matplotlib"))
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("caches")))
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no test see what another has kept; `analysed_once` has those of a module share it."""
+    if "analysed_once" not in request.fixturenames:
+        folder = Path(os.environ["XDG_CACHE_HOME"]) / f"{hash(request.node.nodeid):x}"
+        monkeypatch.setenv("XDG_CACHE_HOME", str(folder))

@@ -22,7 +22,6 @@ from rig.analysis.result import NO_EDGES, Audit, DropResult
 from rig.analysis.verdict import judge, judge_record, verdict_of
 from rig.protocol.contact import at_contact
 from rig.reasons import make_reason
-from rig.records import Job
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ def fit_drop(
     components: Components | None = None,
     *,
     explain: bool = True,
-    known: MutableMapping[Job, Identified] | None = None,
+    known: MutableMapping[Drop, Identified] | None = None,
 ) -> tuple[DropResult, Fit | None]:
     """Find out what a drop says by itself; keep what a joint fit begins with, too.
 
@@ -63,7 +62,7 @@ def fit_drop(
         Whether to seek what else than the protocol would explain a drop that is void as it is: it
         takes many times as long as all the rest. Of others it is sought where they ask for it.
     known
-        What was found out before about drops of this session, and is found out here. Results are
+        What was found out before about drops of this protocol, and is found out here. Results are
         the same with it and without.
     """
     if drop.damage:  # the file's, and no finding about chains or gates
@@ -77,10 +76,10 @@ def fit_drop(
     expected = sum(record.expected for record in records)
     lost = 0 if drop.certificate is None else drop.certificate.overflows
     blank = Audit(received, 0, expected, received, lost, received)
-    job, rough = Job(drop.run, drop.attempt), scale.rounded()
-    one = known.get(job)
+    rough = scale.rounded()
+    one = known.get(drop)
     if one is None or one.scale != rough:
-        one = known[job] = identified(protocol, run, drop, rough, components)
+        one = known[drop] = identified(protocol, run, drop, rough, components)
     unlike = {reason.text: reason for reason in one.unlike.values()}.values()
     early = judge_record(drop, blank, [*unlike, *(silent(protocol, records) if one.unlike else ())])
     if early.verdict == "void" or one.begun is None:
@@ -96,12 +95,12 @@ def fit_drop(
                 weigh = Explainer(premise, drop, rough.u, components, strange)
                 why = explained(weigh.explain(None), protocol.vocabulary)
                 one = replace(one, explained=tuple(why))
-                known[job] = one
+                known[drop] = one
             reasons = (*reasons, *(one.explained or ()))
         return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
     model = DropModel(protocol, records, one.begun.guesses, scale.u, components)
     if one.begun.x.size != len(model.unknowns):  # it was found out where other things were unknown
-        del known[job]
+        known[drop] = identified(protocol, run, drop, rough, components)
         return fit_drop(protocol, run, drop, scale, components, explain=explain, known=known)
     fit = timed(model, one.begun, scale.hz / rough.hz)
     unmatched = unmatched_edges(fit)

@@ -21,6 +21,8 @@ from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
 from rig.analysis.joint_step import DropState, joint_step, take
+from rig.analysis.likeness import likeness
+from rig.analysis.result import Measured
 from rig.analysis.unknowns import SharedUnknowns
 from rig.protocol.protocol import GUESSED
 from rig.threads import one_thread
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from rig.analysis.components import Components
     from rig.analysis.equations import Residuals
     from rig.analysis.fit import Fit
+    from rig.analysis.likeness import Likeness
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -73,6 +76,25 @@ class JointDrop(Matched):
     gain: Array
 
 
+@dataclass(frozen=True, slots=True)
+class RigEstimate:
+    """What the drops of a session say together of their rig, without the drops.
+
+    Attributes
+    ----------
+    learned
+        As `JointFit.json` gives it.
+    likeness
+        How far the falls are from the model; `None` where too few edges tell it.
+    drag
+        κ in g − κv², 1/m, where it is an unknown and not stated.
+    """
+
+    learned: Mapping[str, Any]
+    likeness: Likeness | None
+    drag: Measured | None
+
+
 @dataclass(frozen=True)
 class JointFit:
     """What the drops of a session say together.
@@ -105,6 +127,16 @@ class JointFit:
     def covariance(self) -> Array:
         """R⁻¹R⁻ᵀ: covariance of the common unknowns in units of `sd`."""
         return self.inverse @ self.inverse.T
+
+    @property
+    def rig(self) -> RigEstimate:
+        """What is said of the rig and its falls."""
+        block, drag = self.shared.blocks.get("drag"), None
+        # Where air is stated, predictions are made in it.
+        if block is not None and self.drops[0].model.protocol.drag is None:
+            u = math.sqrt(self.covariance.diagonal()[block][0]) * float(self.sd[block][0])
+            drag = Measured(float(self.x[block][0]), u)
+        return RigEstimate(self.json(), likeness(self), drag)
 
     def json(self) -> dict[str, Any]:
         """``learned`` of `rig analyze --json`.

@@ -9,7 +9,6 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.drop import fit_drop
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.joint_fit import FEWEST, joint_fit
-from rig.analysis.likeness import likeness
 from rig.analysis.pairs import Effects, effects
 from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
@@ -25,12 +24,12 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.identified import Identified
-    from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.analysis.joint_fit import JointDrop, JointFit, RigEstimate
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.reasons import Reason
-    from rig.records import Drop, Job
+    from rig.records import Drop
 
     Progress = Callable[[int, int], None]
 
@@ -51,12 +50,13 @@ class Analysis:
         Earlier attempts, by run and attempt.
     summary
         One line an incline.
+    rig
+        What the joint fit of all good drops says of the rig; `None` where there are too few.
     joint
-        The joint fit of all good drops; `None` where there are too few of them.
+        The joint fit itself, and
     adjusted
-        Good drops with their unknowns, in the light of all where there is a joint fit, by run
-        and
-        attempt.
+        good drops with their unknowns, in the light of all where there is a joint fit, by run and
+        attempt: both only of an analysis that was not kept.
     effects
         Of chains and sides, by incline; none where the plan has no blocks of A, B, B, A.
     unsettled
@@ -69,8 +69,9 @@ class Analysis:
     runs: tuple[DropResult, ...]
     superseded: tuple[DropResult, ...]
     summary: tuple[Incline, ...]
-    joint: JointFit | None = None
-    adjusted: Mapping[tuple[int, int], Fit | JointDrop] = field(default_factory=dict)
+    rig: RigEstimate | None = None
+    joint: JointFit | None = field(default=None, compare=False)
+    adjusted: Mapping[tuple[int, int], Fit | JointDrop] = field(default_factory=dict, compare=False)
     effects: tuple[Effects, ...] = ()
     with_rejected: tuple[Incline, ...] = ()
     unsettled: bool = False
@@ -102,11 +103,10 @@ class Analysis:
             found["joint_fit_converged"] = False
         if self.effects:
             found["effects"] = [one.json() for one in self.effects]
-        if self.joint is not None:
-            found["learned"] = self.joint.json()
-            like = likeness(self.joint)
-            if like is not None:
-                found["likeness"] = like.json()
+        if self.rig is not None:
+            found["learned"] = self.rig.learned
+            if self.rig.likeness is not None:
+                found["likeness"] = self.rig.likeness.json()
         return found
 
 
@@ -117,7 +117,7 @@ def analyze(
     scale: Callable[[Drop], TimeScale],
     rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
     progress: Progress | None = None,
-    known: MutableMapping[Job, Identified] | None = None,
+    known: MutableMapping[Drop, Identified] | None = None,
 ) -> Analysis:
     """Analyse every drop and sum up.
 
@@ -227,7 +227,8 @@ def sum_up(
     spared = any(result.limits in GOOD for result in latest)
     whole = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
     paired = effects(protocol, latest)
-    return Analysis(latest, earlier, summary, joint, adjusted or {}, paired, whole)
+    rig = None if joint is None else joint.rig
+    return Analysis(latest, earlier, summary, rig, joint, adjusted or {}, paired, whole)
 
 
 def _fit_jointly(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.video import VideoFall, video_fall
+from rig.cache.entry import recall
 from rig.commands.output import print_results, progress, show
 from rig.measurands import acceleration_in
 from rig.report.columns import aligned
 from rig.report.numbers import plus_minus
 from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
-from rig.results import results
+from rig.results import complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
 
@@ -30,16 +32,10 @@ def main(arguments: Namespace) -> int:
         return budget.main(arguments)
     track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
-        found = results(session, progress("analysing run"))
-    more: dict[str, Any] = {}
-    if arguments.session_trials is not None:
-        from rig.commands.budget import session_trials  # noqa: PLC0415 - likewise
-
-        more["monte_carlo"] = session_trials(found.analysis, arguments.session_trials)
-    if arguments.priors:
-        from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - likewise
-
-        more["prior_sensitivity"] = prior_sensitivity(found.analysis)
+        deep = arguments.priors or arguments.session_trials is not None
+        fresh, show_run = arguments.fresh, progress("analysing run")
+        found = results(session, show_run, fresh=fresh, with_joint_fit=deep)
+        more = _by_joint_fit(arguments, session, found) if deep else {}
     video = None if track is None else video_fall(*track)
     if video is not None and not found.blind:
         more["video"] = video.json(_by_gates(found))
@@ -57,6 +53,27 @@ def main(arguments: Namespace) -> int:
 
             show(["", *trials_lines(more["monte_carlo"])])
     return code
+
+
+def _by_joint_fit(arguments: Namespace, session: Session, found: SessionResults) -> dict[str, Any]:
+    """What takes the joint fit, and its time."""
+    trials, more = arguments.session_trials, {}
+    analysis = cache(lambda: complete_analysis(session, found, progress("analysing run")))
+    if trials is not None:
+        from rig.commands.budget import session_trials  # noqa: PLC0415 - only when it is asked for
+
+        more["monte_carlo"] = recall(
+            lambda: session_trials(analysis(), trials),
+            *("session trials", found.digest, trials),
+            fresh=arguments.fresh,
+        )
+    if arguments.priors:
+        from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - likewise
+
+        more["prior_sensitivity"] = recall(
+            lambda: prior_sensitivity(analysis()), "priors", found.digest, fresh=arguments.fresh
+        )
+    return more
 
 
 def _by_gates(found: SessionResults) -> Measured | None:

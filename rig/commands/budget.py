@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from rig.analysis.monte_carlo import (
 )
 from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
+from rig.cache.entry import recall
 from rig.commands.output import print_found, tell_damage
 from rig.errors import InputError
 from rig.measurands import MEASURANDS
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.measurands import Measurand
+    from rig.results import SessionResults
     from rig.session.reading import Reader
 
 SEED = 1
@@ -46,18 +49,23 @@ _LEAST = 0.001  # in the finer unit: less is none
 def main(arguments: Namespace) -> int:
     """Print a run's budget in the session's light, and by itself beside Monte Carlo trials."""
     with Session.open(arguments.session, readonly=True) as session:
-        found, analysis = budget(session, arguments.budget, arguments.trials, SEED)
+        asked, fresh = (arguments.budget, arguments.trials, SEED), arguments.fresh
+        whole = results(session, fresh=fresh)
+        make = partial(budget, session, whole, *asked)
+        found = recall(make, "budget", whole.digest, asked, fresh=fresh)
     print_found(found, lambda: "\n".join(_table(found)), as_json=arguments.json)
-    return tell_damage(analysis)
+    return tell_damage(whole.analysis)
 
 
 def budget(
-    session: Reader, number: int, trials: int | str | None, seed: int
-) -> tuple[dict[str, Any], Analysis]:
+    session: Reader, whole: SessionResults, number: int, trials: int | str | None, seed: int
+) -> dict[str, Any]:
     """Account for the uncertainty of a run's results, beside the analysis of all.
 
     Parameters
     ----------
+    whole
+        Results of the session.
     number
         Of the run.
     trials, seed
@@ -78,7 +86,6 @@ def budget(
     alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
         raise InputError(f"run {number} is void: {sentences(alone.reasons)}")
-    whole = results(session)
     records = whole.records()
     record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
     if trials is None:
@@ -103,7 +110,7 @@ def budget(
                 for name, one in trial.items()
             },
         },
-    }, whole.analysis
+    }
 
 
 def _measured(record: Mapping[str, Any], name: str) -> Measured:

@@ -6,6 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.cache.store import CacheFile
 from rig.command_help import runnable
 from rig.commands.output import print_json, say
 from rig.doctor import checks
@@ -39,6 +40,8 @@ _BOARD = (
 
 def main(arguments: Namespace) -> int:
     """Say what is well, and of what is not, what to do."""
+    if arguments.clear_cache:
+        CacheFile().clear()
     findings = []
     for finding in _findings(arguments.port, arguments.session):
         findings.append(finding)
@@ -67,6 +70,8 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
     yield checks.other_packages(look_at_packages())
+    cache = CacheFile()
+    yield checks.kept_results(str(cache.folder), cache.size())
     yield checks.disk_room(look_at_disk(Path(session).parent if session else Path()))
     if session and not Path(session).exists():
         yield checks.problem(f"session {session}", "session_missing")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.likeness import likeness
+from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
-from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
 from rig.report.estimate import estimate_text
-from rig.results import detailed, protocol_of
+from rig.results import check_open, protocol_of, results
+from rig.results.estimated import session_estimate
 from rig.sections import Sections
 from rig.session.store import Session
 
@@ -21,10 +21,12 @@ def main(arguments: Namespace) -> int:
     """Estimate the parameters of the impacts from a session."""
     with Session.open(arguments.session, readonly=True) as session:
         folder = None if arguments.output is None else make_folder(arguments.output)
-        analysis, _ = detailed(session, progress("analysing run"))
-        found = estimate(protocol_of(session), analysis)
-        simulated = session.simulated
-    like = None if analysis.joint is None else likeness(analysis.joint)
+        check_open(session, protocol_of(session))
+        show, fresh = progress("analysing run"), arguments.fresh
+        whole = results(session, show, fresh=fresh, with_joint_fit=True)
+        found = session_estimate(session, whole, show, fresh=fresh)
+    analysis, simulated = whole.analysis, whole.simulated
+    like = None if analysis.rig is None else analysis.rig.likeness
     sections = Sections()
     if arguments.json:
         said: dict[str, Any] = {"simulated": simulated, **found.json()}
@@ -36,7 +38,11 @@ def main(arguments: Namespace) -> int:
     if folder is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
-        drawn = estimate_pictures(found, sections, simulated=simulated)
+        kept = CacheEntry("estimate pictures", whole.digest, fresh=fresh)
+        drawn = kept.find()
+        if drawn is None:
+            drawn = estimate_pictures(found, sections, simulated=simulated)
+            drawn = drawn if sections.failed or found.failed else kept.keep(drawn)
         for name, picture in drawn.items():
             write_atomic(folder / f"{name}.svg", picture.svg)
             say(f"{folder / name}.svg")

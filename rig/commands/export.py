@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
+from rig.cache.entry import recall
 from rig.commands.output import progress, say, tell_damage
-from rig.files import make_folder
+from rig.files import make_folder, write_atomic
 from rig.results import results, tick_rates
-from rig.session.export import export_csv
+from rig.session.export import csv_files
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
+    from rig.results import SessionResults
+
 
 def main(arguments: Namespace) -> int:
     """Write a session as CSV files."""
     with Session.open(arguments.session, readonly=True) as session:
-        make_folder(arguments.csv)
-        found = results(session, progress("analysing run"))
-        export_csv(arguments.csv, session, found.json(), tick_rates(session))
+        folder = make_folder(arguments.csv)
+        found = results(session, progress("analysing run"), fresh=arguments.fresh)
+        make = partial(_tables, session, found)
+        tables = recall(make, "tables", found.digest, fresh=arguments.fresh)
+        for name, text in tables.items():
+            write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")
     return tell_damage(found.analysis)
+
+
+def _tables(session: Session, found: SessionResults) -> dict[str, str]:
+    return csv_files(session, found.json(), tick_rates(session))

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig import __version__
 from rig.analysis.curves import model_curves
+from rig.analysis.result import GOOD
+from rig.cache.entry import CacheEntry
 from rig.commands.output import progress, say, stage, tell_damage
-from rig.estimate.session import estimate
 from rig.files import check_place, make_folder, write_atomic
-from rig.films import read_films
+from rig.films import film_digest, read_films
 from rig.report.chapters import in_order
 from rig.report.contents import timelines_and_data
 from rig.report.deviations import deviations
 from rig.report.estimate import page_parts
 from rig.report.estimate_pictures import estimate_pictures
-from rig.report.html import ReportContext, write_report
+from rig.report.html import ReportContext, report_html
 from rig.report.parts import effects_parts, gate_parts
 from rig.report.pictures import pictures
 from rig.report.remarks import remarks
 from rig.results import protocol_of, results
+from rig.results.estimated import session_estimate
 from rig.results.whole import notes
 from rig.sections import Sections
 from rig.session.store import Session
@@ -30,93 +32,114 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Sequence
 
-    from rig.analysis.session import Analysis
     from rig.estimate.session import SessionEstimate
-    from rig.protocol.protocol import Protocol
-    from rig.report.embed import PageFigure
+    from rig.report.bars import Bars
     from rig.report.parts import Part
+    from rig.results import SessionResults
 
 _NUMERICS = ("numpy", "scipy")
+
+
+class _Page(NamedTuple):
+    """A report as it is kept: its HTML and its figures, each as text, and what failed."""
+
+    html: str
+    figures: tuple[str, ...]
+    failed: tuple[str, ...]
 
 
 def main(arguments: Namespace) -> int:
     """Write a session's report."""
     check_place(arguments.output)
     with Session.open(arguments.session, readonly=True) as session:
-        protocol = protocol_of(session)
-        found = results(session, progress("analysing run"))
-        sections = Sections()
-        stage("drawing figures")
-        curves = sections.make("The model's curve", lambda: model_curves(protocol))
-        figures = pictures(
-            found.analysis,
-            curves,
-            session.simulated,
-            skew_limit_s=protocol.accept.release_skew,
-            site_m_s2=protocol.gravity.value,
-            bars=arguments.bars,
-            films=read_films(session.path) if session.simulated else None,
-            sections=sections,
-        )
-        effects = found.analysis.effects
-        compared = sections.make("The paired differences", lambda: list(effects_parts(effects)))
-        stage("estimating the impacts")
-        summary = found.analysis.summary
-        gates = sections.make("The table of gates", lambda: list(gate_parts(summary)))
-        estimated = sections.make(
-            "The estimate of the impacts", lambda: _estimated(protocol, found.analysis)
-        )
-        parts: list[Part] = []
-        if estimated is not None:
-            stage("drawing the impacts")
-            drawn = estimate_pictures(estimated, sections, simulated=session.simulated)
-            figures += drawn.values()
-            parts = list(page_parts(estimated, sections))
-        stage("writing the page")
-        timelines, data = timelines_and_data(session, protocol, found)
-        figures = in_order(figures)
-        name = session.path.name
-        write_report(
-            arguments.output,
-            ReportContext(
-                title=protocol.title,
-                analysis=found.analysis,
-                simulated=session.simulated,
-                figures=figures,
-                protocol_text=session.protocol_text,
-                protocol_source=session.protocol_source,
-                protocol_sha256=session.meta["protocol_sha256"],
-                provenance={
-                    "session": name,
-                    "created": session.meta["created"],
-                    "origin": session.meta["origin"].partition("?")[0],
-                    "recorded with": f"rig {session.meta['rig_version']}",
-                    "analysed with": f"rig {__version__}, {', '.join(map(_version, _NUMERICS))}",
-                },
-                identities=[identity for _, identity in session.identities()],
-                clock=found.clock.details,
-                notes=[*found.analysis.damage, *remarks(found)],
-                operator_notes=_noted(session),
-                deviations=deviations(protocol, found.analysis, session.states()),
-                parts=parts,
-                effects=[*(gates or ()), *(compared or ())],
-                timelines=timelines,
-                again=[
-                    f"rig analyze {name} --json",
-                    f"rig report {name} -o report.html",
-                    f"rig replay {name}    # analyses the recorded bytes again",
-                ],
-                attachments=data,
-                sections=sections,
-            ),
-        )
-        stage("")
+        fresh = arguments.fresh
+        found = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=True)
+        # The page has the file's name; how simulated chains moved lies beside the file.
+        content = session.path.name, arguments.bars, film_digest(session.path)
+        kept = CacheEntry("report", found.digest, content, fresh=fresh)
+        page = kept.find()
+        if page is None:
+            page = _page(session, found, arguments.bars, fresh=fresh)
+            page = page if page.failed else kept.keep(page)
+    write_atomic(arguments.output, page.html)
     if arguments.figures is not None:
-        _write_figures(Path(arguments.figures), figures)
-    for sentence in (*(estimated.failed if estimated else ()), *sections.failed.values()):
+        _write_figures(Path(arguments.figures), page.figures)
+    for sentence in page.failed:
         say(sentence)
     say(f"report: {arguments.output}")
     return tell_damage(found.analysis)
+
+
+def _page(session: Session, found: SessionResults, bars: Bars, *, fresh: bool) -> _Page:
+    """Draw the figures and write the page around them."""
+    protocol = protocol_of(session)
+    sections = Sections()
+    stage("drawing figures")
+    curves = sections.make("The model's curve", lambda: model_curves(protocol))
+    figures = pictures(
+        found.analysis,
+        curves,
+        session.simulated,
+        skew_limit_s=protocol.accept.release_skew,
+        site_m_s2=protocol.gravity.value,
+        bars=bars,
+        films=read_films(session.path) if session.simulated else None,
+        sections=sections,
+    )
+    effects = found.analysis.effects
+    compared = sections.make("The paired differences", lambda: list(effects_parts(effects)))
+    stage("estimating the impacts")
+    summary = found.analysis.summary
+    gates = sections.make("The table of gates", lambda: list(gate_parts(summary)))
+    estimated = sections.make(
+        "The estimate of the impacts", lambda: _estimated(session, found, fresh=fresh)
+    )
+    parts: list[Part] = []
+    if estimated is not None:
+        stage("drawing the impacts")
+        drawn = estimate_pictures(estimated, sections, simulated=session.simulated)
+        figures += drawn.values()
+        parts = list(page_parts(estimated, sections))
+    stage("writing the page")
+    timelines, data = timelines_and_data(session, protocol, found)
+    figures = in_order(figures)
+    name = session.path.name
+    html = report_html(
+        ReportContext(
+            title=protocol.title,
+            analysis=found.analysis,
+            simulated=session.simulated,
+            figures=figures,
+            protocol_text=session.protocol_text,
+            protocol_source=session.protocol_source,
+            protocol_sha256=session.meta["protocol_sha256"],
+            provenance={
+                "session": name,
+                "created": session.meta["created"],
+                "origin": session.meta["origin"].partition("?")[0],
+                "recorded with": f"rig {session.meta['rig_version']}",
+                "analysed with": f"rig {__version__}, {', '.join(map(_version, _NUMERICS))}",
+            },
+            identities=[identity for _, identity in session.identities()],
+            clock=found.clock.details,
+            notes=[*found.analysis.damage, *remarks(found)],
+            operator_notes=_noted(session),
+            deviations=deviations(protocol, found.analysis, session.states()),
+            parts=parts,
+            effects=[*(gates or ()), *(compared or ())],
+            timelines=timelines,
+            again=[
+                f"rig analyze {name} --json",
+                f"rig report {name} -o report.html",
+                f"rig replay {name}    # analyses the recorded bytes again",
+            ],
+            attachments=data,
+            sections=sections,
+        ),
+    )
+    stage("")
+    failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
+    return _Page(html, tuple(picture.svg for picture in figures), failed)
 
 
 def _version(package: str) -> str:
@@ -128,15 +151,16 @@ def _noted(session: Session) -> list[str]:
     return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
 
 
-def _estimated(protocol: Protocol, analysis: Analysis) -> SessionEstimate | None:
+def _estimated(session: Session, found: SessionResults, *, fresh: bool) -> SessionEstimate | None:
     """What the impacts have in common; `None` where there are none, or none is good."""
-    if protocol.surface is None or not analysis.adjusted:
+    good = any(run.verdict in GOOD for run in found.analysis.runs)
+    if protocol_of(session).surface is None or found.blind or not good:
         return None
-    return estimate(protocol, analysis)
+    return session_estimate(session, found, fresh=fresh)
 
 
-def _write_figures(folder: Path, figures: Sequence[PageFigure]) -> None:
+def _write_figures(folder: Path, figures: Sequence[str]) -> None:
     """Write ``figure-1.svg`` and on, numbered as in the report."""
     make_folder(folder)
-    for number, picture in enumerate(figures, 1):
-        write_atomic(folder / f"figure-{number}.svg", picture.svg)
+    for number, svg in enumerate(figures, 1):
+        write_atomic(folder / f"figure-{number}.svg", svg)

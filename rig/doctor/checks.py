@@ -18,6 +18,7 @@ from rig.selftest.findings import Finding, explain
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rig.cache.store import CacheSize
     from rig.doctor.facts import BoardFacts, DiskFacts, PortFacts, SessionFacts
 
 ROOM = 200 * 10**6
@@ -177,6 +178,15 @@ def mains_ripple(times_s: Sequence[float]) -> int | None:
         if abs(mean) > _IN_STEP:
             return hz
     return None
+
+
+def kept_results(folder: str, size: CacheSize | None) -> Finding:
+    """Say how much room kept results take."""
+    if size is None:
+        why = "not a folder in which this user, and nobody else, can write"
+        return Finding("kept results", f"none: {folder} is {why}")
+    what = f"{size.entries} of {size.used_bytes / 1e6:.1f} MB in {folder}"
+    return Finding("kept results", f"{what}; --clear-cache forgets them")
 
 
 def disk_room(facts: DiskFacts) -> Finding:

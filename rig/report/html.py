@@ -7,13 +7,11 @@ from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from rig.files import write_atomic
 from rig.report.chapters import chapters
 from rig.report.embed import dark_figure_css
 from rig.sections import Sections
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping, Sequence
 
     from rig.analysis.session import Analysis
@@ -78,17 +76,6 @@ class ReportContext:
     again: Sequence[str] = ()
     attachments: Sequence[Attachment] = ()
     sections: Sections = field(default_factory=Sections)
-
-
-def write_report(path: str | os.PathLike[str], context: ReportContext) -> None:
-    """Write `report_html` to a file, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    write_atomic(path, report_html(context))
 
 
 def report_html(context: ReportContext) -> str:

@@ -50,7 +50,7 @@ def method_words(analysis: Analysis) -> tuple[str, str]:
     together = (
         "All good drops were fitted together. They share the clock, the beam heights and the "
         "dimensions as unknowns; the protocol's ± values are their priors. "
-        if analysis.joint is not None
+        if analysis.rig is not None
         else "Each drop was fitted alone: there are too few good drops for a joint fit. "
     )
     session = (

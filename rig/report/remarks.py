@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.likeness import likeness
-from rig.analysis.result import Measured
 from rig.measurands import averaged, told
 from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import decimals_for, fixed, plus_minus, ranges, signed
@@ -15,8 +12,7 @@ from rig.results.improvements import improvements
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.analysis.joint_fit import JointFit
-    from rig.analysis.result import DropResult
+    from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.reasons import Reason
@@ -29,16 +25,15 @@ _SIGNIFICANT = 4.0  # standard uncertainties beyond which κ is worth a remark
 
 def remarks(results: SessionResults) -> list[str]:
     """Return the remarks on a session's falls, clock and air."""
-    joint = results.analysis.joint
-    in_air = joint is not None and joint.drops[0].model.protocol.drag is not None
+    rig = results.analysis.rig
     return [
         *([_ALONE] if results.analysis.unsettled else []),
-        *model_lines(joint),
+        *([rig.likeness.sentence] if rig is not None and rig.likeness is not None else []),
         *alone_lines(results.analysis),
         *common_lines(results.analysis.summary),
         *(one.sentence for one in improvements(results.analysis.summary)),
         *clock_lines(results.calibration),
-        *air_lines(None if in_air else joint),  # predictions are made in stated air
+        *air_lines(None if rig is None else rig.drag),
     ]
 
 
@@ -74,12 +69,6 @@ def alone_lines(analysis: Analysis) -> list[str]:
         f"By itself run {last.run.number} says {alone}, among all {len(runs)} runs {among}: "
         "together they tell what is off in every run, and how much runs scatter."
     ]
-
-
-def model_lines(joint: JointFit | None) -> list[str]:
-    """Compare the falls with the model, where enough edges allow it."""
-    match = None if joint is None else likeness(joint)
-    return [] if match is None else [match.sentence]
 
 
 def void_lines(analysis: Analysis) -> list[str]:
@@ -134,16 +123,11 @@ def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
     return [sentence, *calibration["notes"]]
 
 
-def air_lines(joint: JointFit | None) -> list[str]:
+def air_lines(drag: Measured | None) -> list[str]:
     """State the air drag that a fit finds, where it is significant: predictions ignore it."""
-    block = None if joint is None else joint.shared.blocks.get("drag")
-    if joint is None or block is None:
-        return []
-    value = float(joint.x[block][0])
-    u = math.sqrt(joint.covariance.diagonal()[block][0]) * float(joint.sd[block][0])
-    if abs(value) <= _SIGNIFICANT * u:
+    if drag is None or abs(drag.value) <= _SIGNIFICANT * drag.u:
         return []
     return [
-        f"Air drag: κ = {plus_minus(Measured(value, u))} per m in g − κv². "
+        f"Air drag: κ = {plus_minus(drag)} per m in g − κv². "
         "Predictions ignore air; the fit estimates it."
     ]

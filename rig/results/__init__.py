@@ -5,6 +5,7 @@ from rig.results.blind import check_open, kept_back
 from rig.results.whole import (
     SessionResults,
     calibration,
+    complete_analysis,
     detailed,
     protocol_of,
     rejected,
@@ -17,6 +18,7 @@ __all__ = [
     "SessionResults",
     "calibration",
     "check_open",
+    "complete_analysis",
     "detailed",
     "kept_back",
     "protocol_of",

@@ -21,6 +21,7 @@ from rig.clock.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
 from rig.results.blind import kept_back, veiled, veiled_drop
+from rig.results.known_drops import KnownDrops
 from rig.results.whole import protocol_of, rejected
 from rig.session.drop_check import ByteReplay
 from rig.session.schema import RunState
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.fit import Fit
-    from rig.analysis.identified import Identified
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.clock.calibration import Calibration, TimeScale
@@ -104,6 +104,15 @@ class SessionView:
         return () if gates is None else tuple(gate.channel for gate in gates.gates)
 
 
+class _Scene(NamedTuple):
+    """What is planned, and what is known of drops; `complete` once the timer's beams are known."""
+
+    protocol: Protocol
+    plan: dict[int, Run]
+    known: KnownDrops
+    complete: bool
+
+
 class _Analysed(NamedTuple):
     """One drop by itself, at a tick rate."""
 
@@ -134,8 +143,6 @@ class LiveAnalysis:
     path: Path
     done: int = 0
     """Drops that were read and analysed, for who waits for the first reading."""
-    identified: dict[Job, Identified] = field(default_factory=dict)
-    """Which rods the edges of each drop are, for `rig.results.results`."""
     _known: dict[Job, _Analysed] = field(default_factory=dict)
     _log: Sequence[StateEntry] | None = None
     _drops: dict[Job, Drop] = field(default_factory=dict)
@@ -143,14 +150,13 @@ class LiveAnalysis:
     _joint_fit: _JointFit | None = None
     _calibrator: Calibrator = field(default_factory=Calibrator)
     _replay: ByteReplay = field(default_factory=ByteReplay)
-    _scene: tuple[Protocol, dict[int, Run]] | None = None
+    _scene: _Scene | None = None
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
 
     def clock(self, session: Reader) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now."""
-        protocol, _ = self._planned(session)
-        return self._calibrator.look(session, protocol.reference_u)
+        return self._calibrator.look(session, self._planned(session).protocol.reference_u)
 
     def judge(self, session: Reader, drop: Drop) -> DropResult:
         """Find out what one drop says by itself, as `read` does.
@@ -162,8 +168,8 @@ class LiveAnalysis:
         drop
             Recorded in it.
         """
-        protocol, plan = self._planned(session)
-        scale, known = self.clock(session).scale(drop), self.identified
+        protocol, plan, known, _ = self._planned(session)
+        scale = self.clock(session).scale(drop)
         found, _ = fit_drop(protocol, planned_run(plan, drop), drop, scale, known=known)
         return veiled_drop(found) if kept_back(session, protocol) else found
 
@@ -177,7 +183,8 @@ class LiveAnalysis:
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
             with session.snapshot():
-                protocol, plan = self._planned(session)
+                scene = self._planned(session)
+                protocol = scene.protocol
                 clock, states = self.clock(session), tuple(session.states())
                 if states != self._log:  # records are only added, and that is logged
                     checked = session.drops(self._replay)
@@ -187,7 +194,7 @@ class LiveAnalysis:
             drops = self._drops
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
             for job, drop in drops.items():
-                self._analyse(protocol, planned_run(plan, drop), job, drop, scales[job])
+                self._analyse(scene, job, drop, scales[job])
             results = {job: overruled(self._known[job].result, causes.get(job)) for job in drops}
             if self._curves is None:
                 self._curves = model_curves(protocol)
@@ -200,7 +207,7 @@ class LiveAnalysis:
                 protocol=protocol,
                 simulated=session.simulated,
                 created=session.meta["created"],
-                plan=plan,
+                plan=scene.plan,
                 drops=drops,
                 results=results,
                 scales=scales,
@@ -237,28 +244,33 @@ class LiveAnalysis:
         known = self._known[job]
         if known.fit is None and known.result.verdict in GOOD:
             drop, scale = view.drops[job], view.scales[job]
-            _, fit = fit_drop(view.protocol, view.plan[job.run], drop, scale, known=self.identified)
+            scene = self._scene
+            assert scene is not None
+            run = scene.plan[job.run]
+            _, fit = fit_drop(scene.protocol, run, drop, scale, known=scene.known)
             self._known[job] = known = known._replace(fit=fit)
         return known.fit
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
         return {job: (result.verdict, self._known[job].hz) for job, result in results.items()}
 
-    def _planned(self, session: Reader) -> tuple[Protocol, dict[int, Run]]:
-        if self._scene is not None:
-            return self._scene
-        protocol = protocol_of(session)
-        found = protocol, {run.number: run for run in planned_runs(protocol)}
-        if session.identities():  # which gates a timer has is known from then on
-            self._scene = found
-        return found
+    def _planned(self, session: Reader) -> _Scene:
+        scene = self._scene
+        if scene is None or not scene.complete:
+            protocol = protocol_of(session)
+            if scene is None or scene.protocol != protocol:
+                plan = {run.number: run for run in planned_runs(protocol)}
+                known = KnownDrops(protocol, blind=kept_back(session, protocol))
+                scene = _Scene(protocol, plan, known, complete=False)
+            self._scene = scene = scene._replace(complete=bool(session.identities()))
+        return scene
 
-    def _analyse(
-        self, protocol: Protocol, run: Run, job: Job, drop: Drop, scale: TimeScale
-    ) -> None:
-        known = self._known.get(job)
-        if known is None or not _as_good(known.hz, scale):
-            result, fit = fit_drop(protocol, run, drop, scale, known=self.identified)
+    def _analyse(self, scene: _Scene, job: Job, drop: Drop, scale: TimeScale) -> None:
+        analysed = self._known.get(job)
+        if analysed is None or not _as_good(analysed.hz, scale):
+            protocol, plan, known, _ = scene
+            run = planned_run(plan, drop)
+            result, fit = fit_drop(protocol, run, drop, scale, known=known)
             falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
+from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibrator
 from rig.protocol import reader
 from rig.protocol.measurable import with_gates
@@ -14,19 +15,37 @@ from rig.reasons import notes_in
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
 from rig.results.improvements import improvements
+from rig.results.known_drops import KnownDrops
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, MutableMapping
+    from collections.abc import Iterable, Mapping
 
     from rig.analysis.gravity import GravityCheck
-    from rig.analysis.identified import Identified
     from rig.analysis.session import Analysis, Progress
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
     from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.reading import Reader
+
+
+class Finished(NamedTuple):
+    """What is kept of a session, from which all results follow at once.
+
+    Attributes
+    ----------
+    analysis
+        Of all drops, without what only a joint fit needs; veiled where the session is blind.
+    gravity
+        What the free chain says of it; `None` where there is none that can be asked.
+    time_scales
+        The calibration that each drop has, by run and attempt.
+    """
+
+    analysis: Analysis
+    gravity: GravityCheck | None
+    time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +56,32 @@ class SessionResults:
     ----------
     simulated
         Whether no chain ever fell.
-    analysis
-        Of all drops.
     clock
         The time scale.
-    gravity
-        What the free chain says of it; `None` where there is none that can be asked.
-    time_scales
-        The calibration that each drop has, by run and attempt.
     blind
         Whether what was measured is kept back.
+    digest
+        Of the records, as `rig.session.reading.Reader.digest` gives it.
+    complete
+        The analysis with its joint fit, where that was just made and asked for.
     """
 
+    finished: Finished
     simulated: bool
-    analysis: Analysis
     clock: Calibration
-    gravity: GravityCheck | None
-    time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
-    blind: bool = False
+    blind: bool
+    digest: str | None
+    complete: Analysis | None = None
+
+    @property
+    def analysis(self) -> Analysis:
+        """See `Finished`."""
+        return self.finished.analysis
+
+    @property
+    def gravity(self) -> GravityCheck | None:
+        """See `Finished`."""
+        return self.finished.gravity
 
     @property
     def calibration(self) -> dict[str, Any]:
@@ -70,7 +97,7 @@ class SessionResults:
         """As `rig analyze --json` prints it."""
         said = self.analysis.json()
         for run in (*said["runs"], *said.get("superseded", [])):
-            run["calibration"] = self.time_scales[run["run"], run["attempt"]]
+            run["calibration"] = self.finished.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
         head |= {"blind": True} if self.blind else {}
         better = [one.json() for one in improvements(self.analysis.summary)]
@@ -95,9 +122,11 @@ def calibration(session: Reader) -> Calibration:
 def results(
     session: Reader,
     progress: Progress | None = None,
-    known: MutableMapping[Job, Identified] | None = None,
+    *,
+    fresh: bool = False,
+    with_joint_fit: bool = False,
 ) -> SessionResults:
-    """Analyse a session.
+    """Return the results of a session: those that are kept, or else analyse it.
 
     Parameters
     ----------
@@ -105,23 +134,54 @@ def results(
         Open, for reading at least.
     progress
         Called with the number of drops done and the number of all.
-    known
-        What was found out before about its drops, as `rig.analysis.drop.fit_drop` takes it.
+    fresh
+        Whether to analyse it in any case.
+    with_joint_fit
+        Whether a joint fit that is made may stay in memory, for `complete_analysis`.
     """
     protocol = protocol_of(session)
-    found, clock, drops = _analysed(session, protocol, progress, known)
+    complete = None
+    with session.snapshot():
+        digest, blind = session.digest(), kept_back(session, protocol)
+        kept = CacheEntry("results", digest, fresh=fresh)
+        clock = Calibrator().look(session, protocol.reference_u)
+        finished: Finished | None = kept.find()
+        drops = [] if finished else list(session.drops())
+        causes = rejected(session)
+    if finished is None:
+        known = KnownDrops(protocol, blind=blind, fresh=fresh)
+        complete = analyze(protocol, drops, clock.scale, causes, progress, known)
+        finished = kept.keep(_finished(protocol, complete, drops, clock, blind=blind))
+    if blind or not with_joint_fit:
+        complete = None
+    return SessionResults(finished, session.simulated, clock, blind, digest, complete)
+
+
+def _finished(
+    protocol: Protocol, found: Analysis, drops: Iterable[Drop], clock: Calibration, *, blind: bool
+) -> Finished:
     by_key = {(drop.run, drop.attempt): drop for drop in drops}
-    cases = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
-    blind = kept_back(session, protocol)
-    checked = [] if blind else [(run, drop, clock.scale(drop)) for run, drop in cases]
-    return SessionResults(
-        session.simulated,
-        veiled(found) if blind else found,
-        clock,
-        check_gravity(protocol, checked),
+    latest = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
+    return Finished(
+        veiled(found) if blind else replace(found, joint=None, adjusted={}),
+        None
+        if blind
+        else check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in latest]),
         {key: clock.used(drop) for key, drop in by_key.items()},
-        blind,
     )
+
+
+def complete_analysis(
+    session: Reader, found: SessionResults, progress: Progress | None = None
+) -> Analysis:
+    """Return the analysis with its joint fit; where only results were kept it is made again.
+
+    Raises
+    ------
+    SessionError
+        The session is blind.
+    """
+    return found.complete or detailed(session, progress)[0]
 
 
 def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
@@ -138,7 +198,9 @@ def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
     return {"gravity": check.json(), "notes": notes}
 
 
-def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
+def detailed(
+    session: Reader, progress: Progress | None = None, *, fresh: bool = False
+) -> tuple[Analysis, Calibration]:
     """Analyse a session and keep everything, each edge's rod too.
 
     Raises
@@ -148,21 +210,12 @@ def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysi
     """
     protocol = protocol_of(session)
     check_open(session, protocol)
-    return _analysed(session, protocol, progress)[:2]
-
-
-def _analysed(
-    session: Reader,
-    protocol: Protocol,
-    progress: Progress | None,
-    known: MutableMapping[Job, Identified] | None = None,
-) -> tuple[Analysis, Calibration, list[Drop]]:
     with session.snapshot():
         clock = Calibrator().look(session, protocol.reference_u)
         drops = list(session.drops())
         causes = rejected(session)
-    found = analyze(protocol, drops, clock.scale, causes, progress, known)
-    return found, clock, drops
+    known = KnownDrops(protocol, fresh=fresh)
+    return analyze(protocol, drops, clock.scale, causes, progress, known), clock
 
 
 def rejected(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:

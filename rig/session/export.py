@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.text_table import csv_text
 from rig.timers.edges_csv import edges_text
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterable, Mapping, Sequence
     from fractions import Fraction
 
@@ -58,31 +56,6 @@ def _meanings() -> dict[str, str]:
         found[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
         found[row.key("se")] = f"{row.symbol}: standard error of the mean"
     return found
-
-
-def export_csv(
-    directory: str | os.PathLike[str],
-    session: Reader,
-    analysis: Mapping[str, Any],
-    tick_hz: Mapping[int, float | Fraction] | None = None,
-) -> None:
-    """Write what `csv_files` gives; each file is replaced as a whole.
-
-    Parameters
-    ----------
-    directory
-        Made where it does not exist.
-    session, analysis, tick_hz
-        As there.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
-    """
-    place = make_folder(directory)
-    for name, text in csv_files(session, analysis, tick_hz).items():
-        write_atomic(place / name, text)
 
 
 def csv_files(

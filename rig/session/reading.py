@@ -108,6 +108,11 @@ class Reader:
         """Facts fixed when the file was made: created, rig_version, origin and more."""
         return self._meta
 
+    def digest(self) -> str | None:
+        """Return the SHA-256 of all records as they stand; `None` where they are not the file's."""
+        with translated(self.path):
+            return hashlib.sha256(self._opened().serialize()).hexdigest()
+
     @property
     def simulated(self) -> bool:
         """Whether the data come from a simulation."""

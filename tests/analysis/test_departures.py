@@ -16,7 +16,6 @@ from rig.analysis.session import Analysis
 from rig.errors import InputError
 from rig.protocol.protocol import Contact
 from rig.protocol.reader import parse
-from rig.report.remarks import model_lines
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import HZ, STATED, UNIFORM, Case, case, codes
@@ -123,8 +122,7 @@ def test_falls_are_said_to_look_like_the_model_or_not(straight, crooked):
     assert unlike is not None
     assert (like.like, unlike.like) == (True, False)
     assert unlike.json()["departure_m"] == pytest.approx(DEPARTURE, rel=0.15)
-    (line,) = model_lines(crooked.joint)
-    assert line.startswith("Measured positions differ from the model by ")
+    assert unlike.sentence.startswith("Measured positions differ from the model by ")
     assert not Likeness(departure=0.0, impulses=0.2).like
     assert "0.00 mm" not in Likeness(departure=4e-6, impulses=None).sentence
     assert "to 0.03 mm" in Likeness(departure=3e-5, impulses=None).sentence

@@ -12,7 +12,7 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
 from rig.reasons import plain_reason
-from rig.report.html import ReportContext, report_html, write_report
+from rig.report.html import ReportContext, report_html
 from rig.report.pictures import pictures
 from rig.sections import Sections
 from tests.report import fake_analysis
@@ -136,11 +136,6 @@ def test_what_is_missing_is_left_out() -> None:
     page = report_html(ReportContext(title="One chain", analysis=single, simulated=False))
     assert "raw Δz" not in page
     assert "skew" not in page.replace("release skew 5.3 ms", "").replace(">release skew<", "")
-
-
-def test_written_whole(tmp_path: Path) -> None:
-    write_report(tmp_path / "r.html", context())
-    assert (tmp_path / "r.html").read_text("utf-8") == report_html(context())
 
 
 def test_importing_loads_neither_matplotlib_nor_numpy() -> None:

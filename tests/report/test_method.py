@@ -32,7 +32,7 @@ def test_the_method_speaks_of_what_there_is():
     assert second.startswith("Each drop was fitted alone")
     first, _ = method_words(fake_analysis.gravity())
     assert not re.search("Eq. 9|simultaneous", first)
-    together = replace(fake_analysis.two_chains(), joint=object())
+    together = replace(fake_analysis.two_chains(), rig=object())
     assert method_words(together)[1].startswith("All good drops were fitted together")
 
 

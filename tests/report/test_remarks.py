@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from html import unescape
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from rig.analysis.result import Audit, DropResult
+from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
@@ -67,23 +65,13 @@ def test_a_session_without_a_good_run_says_why(tmp_path):
     assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
-def joint(value: float, u: float) -> SimpleNamespace:
-    """Of a joint fit what is asked of it: κ, with half its prior uncertainty."""
-    return SimpleNamespace(
-        shared=SimpleNamespace(blocks={"clock": slice(0, 1), "drag": slice(1, 2)}),
-        x=np.array([1.0, value]),
-        sd=np.array([1.0, 2.0 * u]),
-        covariance=np.diag([1.0, 0.25]),
-    )
-
-
 def test_air_that_may_be_none_is_not_mentioned():
-    for nothing in (None, joint(3e-6, 1e-6), joint(-3e-6, 1e-6)):
+    for nothing in (None, Measured(3e-6, 1e-6), Measured(-3e-6, 1e-6)):
         assert air_lines(nothing) == []
 
 
 def test_air_is_said_with_its_uncertainty():
-    (line,) = air_lines(joint(0.0312345, 1e-5))
+    (line,) = air_lines(Measured(0.0312345, 1e-5))
     assert "κ = 0.031234 ± 0.000020 per m" in line
 
 

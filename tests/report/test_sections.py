@@ -38,7 +38,7 @@ def single(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(single):
-    from rig.commands.estimate import estimate
+    from rig.estimate.session import estimate
     from rig.results import detailed, protocol_of
     from rig.session.store import Session
 
@@ -150,7 +150,7 @@ def test_a_report_is_written_without_its_estimate(single, tmp_path, capsys, monk
     def fail(*_: object) -> None:
         raise ZeroDivisionError("float division\nby zero")
 
-    monkeypatch.setattr("rig.commands.report.estimate", fail)
+    monkeypatch.setattr("rig.results.estimated.estimate", fail)
     assert main(["report", str(single), "-o", str(tmp_path / "r.html")]) == 0
     sentence = (
         "The estimate of the impacts could not be made: ZeroDivisionError: float division by zero"

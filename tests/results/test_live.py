@@ -9,10 +9,12 @@ import pytest
 from rig.analysis import identified
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import FEWEST
+from rig.analysis.session import analyze
 from rig.clock.calibration import TimeScale
 from rig.reasons import plain_reason
 from rig.records import Job
-from rig.results import detailed, results
+from rig.results import detailed
+from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -84,15 +86,15 @@ def test_a_drop_is_judged_as_it_is_read(session):
 
 def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monkeypatch):
     """And says what it says to who never saw it before, to the last bit."""
-    live = LiveAnalysis(session)
-    view = live.read()
+    view, cold = LiveAnalysis(session).read(), whole(session).json()
     known = {}
     for job, drop in view.drops.items():
         hz, u = view.scales[job]
         young = TimeScale(hz * (1.0 + 3e-6), 20.0 * u)
         fit_drop(view.protocol, view.plan[job.run], drop, young, known=known)
-    with Session.open(session, readonly=True) as opened:
-        cold = results(opened).json()
-        monkeypatch.setattr(identified, "identify", None)
-        for before in (known, live.identified):
-            assert results(opened, known=before).json() == cold
+    monkeypatch.setattr(identified, "identify", None)
+    scales = {id(drop): view.scales[job] for job, drop in view.drops.items()}
+    for before in (known, KnownDrops(view.protocol)):
+        drops = list(view.drops.values())
+        again = analyze(view.protocol, drops, lambda drop: scales[id(drop)], known=before)
+        assert again.json() == cold

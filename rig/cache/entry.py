@@ -1,0 +1,86 @@
+"""What the same program computed from the same content before, on this computer."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.cache.plain import from_text, to_text
+from rig.cache.store import CacheFile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_NUMERICS = ("numpy", "scipy", "matplotlib")
+
+
+class CacheEntry:
+    """One kept result.
+
+    Parameters
+    ----------
+    *content
+        All that enters into it, besides this program; each has a `repr` that no other content has.
+        Where any is `None`, nothing is kept.
+    fresh
+        Whether to forget what was kept.
+    """
+
+    def __init__(self, *content: object, fresh: bool = False) -> None:
+        key = "" if None in content else hashlib.sha256(repr(content).encode()).hexdigest()
+        self._key = key and _program() and f"{_program()} {key}"
+        self._fresh = fresh
+        self._file = CacheFile()
+
+    def find(self) -> Any | None:
+        """Return a kept result; `None` where there is none."""
+        text = self._file.get(self._key) if self._key and not self._fresh else None
+        with suppress(ValueError):
+            return None if text is None else from_text(text)
+        return None
+
+    def keep(self, result: Any) -> Any:
+        """Keep a result, and return it as `find` will.
+
+        Parameters
+        ----------
+        result
+            As `rig.cache.plain.to_text` takes it.
+        """
+        text = to_text(result)
+        if self._key:
+            self._file.put(self._key, text)
+        return from_text(text)
+
+
+def recall(make: Callable[[], Any], *content: object, fresh: bool = False) -> Any:
+    """Return a kept result, or else make it; arguments as for `CacheEntry`."""
+    kept = CacheEntry(*content, fresh=fresh)
+    found = kept.find()
+    return kept.keep(make()) if found is None else found
+
+
+@cache
+def _program() -> str:
+    """Tell this program, by its files and those it computes with, and this computer from others.
+
+    Returns
+    -------
+    str
+        Empty where its files cannot be read.
+    """
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    # By content: files that pip unpacks may all be of the same time.
+    for path in sorted(root.rglob("*.*")):
+        if path.suffix != ".pyc":
+            digest.update(f"{path.relative_to(root)}\0".encode())
+            digest.update(path.read_bytes())
+    surroundings = [platform.python_version(), platform.machine(), platform.node()]
+    digest.update(repr(surroundings + [version(package) for package in _NUMERICS]).encode())
+    return digest.hexdigest() if Path(__file__).is_file() else ""

@@ -1,0 +1,46 @@
+"""What `rig estimate` and a report say of the impacts: kept, or estimated now."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rig.cache.entry import CacheEntry
+from rig.estimate.session import estimate
+from rig.results.whole import complete_analysis, protocol_of
+
+if TYPE_CHECKING:
+    from rig.analysis.session import Progress
+    from rig.estimate.session import SessionEstimate
+    from rig.results.whole import SessionResults
+    from rig.session.reading import Reader
+
+
+def session_estimate(
+    session: Reader,
+    found: SessionResults,
+    progress: Progress | None = None,
+    *,
+    fresh: bool = False,
+) -> SessionEstimate:
+    """Return what the impacts of a session have in common, kept or estimated now.
+
+    Parameters
+    ----------
+    found
+        Of `results`, with its joint fit where that was made.
+    progress, fresh
+        As there.
+
+    Raises
+    ------
+    InputError, SessionError
+        As `rig.estimate.session.estimate` raises it; the session is blind.
+    """
+    kept = CacheEntry("estimate", found.digest, fresh=fresh)
+    estimated = kept.find()
+    if estimated is None:
+        analysis = complete_analysis(session, found, progress)
+        estimated = estimate(protocol_of(session), analysis)
+        if not estimated.failed:
+            estimated = kept.keep(estimated)
+    return estimated

@@ -1,0 +1,209 @@
+"""Commands on an unchanged session: the same bytes again, and nothing is computed for them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+import rig
+from rig.analysis import session as analysis
+from rig.cache.store import CacheFile
+from rig.cli import main
+from rig.session.schema import RunState
+from rig.session.store import Session
+from tests.cli.lab import PROTOCOLS, short
+from tests.waiting import PATIENCE_S
+
+SCENES = {
+    "fence": ("picket-fence.yaml", "drop_u=1mm"),
+    "ball": ("falling-ball.yaml", ""),
+    "glider": ("glider.yaml", ""),
+    "chain": ("single-chain.yaml", ""),
+    "chains": (None, "skew_sd=1ms"),
+    "voids": (None, "skew_sd=8ms"),
+}
+COMMANDS = [
+    ("analyze", "SESSION"),
+    ("analyze", "SESSION", "--json"),
+    ("analyze", "SESSION", "--scatter"),
+    ("analyze", "SESSION", "--priors", "--json"),
+    ("analyze", "SESSION", "--session-trials", "2"),
+    ("analyze", "SESSION", "--budget", "1", "--trials", "2"),
+    ("estimate", "SESSION"),
+    ("estimate", "SESSION", "--json", "-o", "OUT/pictures"),
+    ("export", "SESSION", "--csv", "OUT/tables"),
+    ("report", "SESSION", "-o", "OUT/page.html", "--figures", "OUT/figures"),
+]
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def session(request, tmp_path_factory):
+    name, options = SCENES[request.param]
+    folder = tmp_path_factory.mktemp(request.param)
+    protocol, path = folder / "p.yaml", folder / "s.session"
+    text = (PROTOCOLS / name).read_text("utf-8") if name else short("[40 deg]", 4)
+    protocol.write_text(text, "utf-8")
+    url = f"sim://?seed=3&{options}"
+    assert main(["run", str(protocol), "--port", url, "--session", str(path), "--yes"]) in {0, 3}
+    return path
+
+
+def fingerprint(folder: Path) -> dict[str, str]:
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {
+        str(at.relative_to(folder)): hashlib.sha256(at.read_bytes()).hexdigest() for at in files
+    }
+
+
+def ended(command, session, folder, capsys, *more):
+    """Exit code, both streams and all files of a command."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    capsys.readouterr()
+    places = {"SESSION": str(session)}
+    words = [places.get(word, word.replace("OUT", str(folder))) for word in command]
+    return main([*words, *more]), *capsys.readouterr(), fingerprint(folder)
+
+
+def refuse(*_, **__):
+    raise AssertionError("computed again")
+
+
+def test_what_is_kept_is_said_again_to_the_last_byte(session, tmp_path, capsys, monkeypatch):
+    """Cold, kept, forced, and kept of a copy, and the session stays as it is."""
+    before = fingerprint(session.parent)
+    out = tmp_path / "out"
+    cold = [ended(command, session, out, capsys) for command in COMMANDS]
+    with monkeypatch.context() as patch:
+        for work in ("rig.analysis.session.fit_drop", "rig.analysis.session.joint_fit",
+                     "rig.results.estimated.estimate", "rig.report.canvas.canvas",
+                     "rig.commands.budget.fit_drop"):  # fmt: skip
+            patch.setattr(work, refuse)
+        at = [n for n, end in enumerate(cold) if end[0] in {0, 3}]
+        assert len(at) > 5
+        for n in at:
+            assert ended(COMMANDS[n], session, out, capsys) == cold[n]
+    for command, end in zip(COMMANDS, cold, strict=True):
+        assert ended(command, session, out, capsys, "--fresh") == end
+    assert fingerprint(session.parent) == before
+
+
+@pytest.fixture
+def fence(tmp_path):
+    protocol, path = PROTOCOLS / "picket-fence.yaml", tmp_path / "fence.session"
+    assert main(["run", str(protocol), "--port", "sim://?seed=3", "--session", str(path)]) == 0
+    return path
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Whose drops were analysed."""
+    drops = []
+
+    def fit_drop(protocol, run, drop, *arguments, **options):
+        drops.append(drop.run)
+        return work(protocol, run, drop, *arguments, **options)
+
+    work = analysis.fit_drop
+    monkeypatch.setattr(analysis, "fit_drop", fit_drop)
+    return drops
+
+
+def test_a_record_that_was_added_to_is_analysed_again(fence, counted):
+    with rig.open(fence) as session:
+        before = session.analyze().json()
+        assert session.analyze().json() == before
+    assert len(counted) == 0  # rig run kept it
+    with Session.open(fence) as session:
+        session.add_state(3, 1, RunState.REJECTED, 0)
+    with rig.open(fence) as session:
+        again = session.analyze()
+    assert len(counted) == 10
+    assert again.runs[2].verdict == "rejected"
+    assert session.analyze(fresh=True).json() == again.json() if counted.clear() else True
+
+
+@pytest.mark.parametrize("table", ["edge", "ping"])
+def test_a_record_of_which_a_number_was_altered_is_analysed_again(fence, counted, table):
+    """The file has the same length, name and time."""
+    about = fence.stat()
+    with closing(sqlite3.connect(fence)) as connection, connection:
+        for (trigger,) in connection.execute("SELECT name FROM sqlite_master WHERE type='trigger'"):
+            connection.execute(f"DROP TRIGGER {trigger}")
+        connection.execute(f"UPDATE {table} SET tick = tick + 1 WHERE rowid > 0"
+                           if table == "ping" else "UPDATE edge SET tick = tick + 1")  # fmt: skip
+    os.utime(fence, ns=(about.st_atime_ns, about.st_mtime_ns))
+    with rig.open(fence) as session:
+        session.analyze()
+    assert len(counted) == 10
+
+
+def test_another_program_computes_itself(fence, counted, monkeypatch):
+    monkeypatch.setattr("rig.cache.entry._program", lambda: "another")
+    with rig.open(fence) as session:
+        session.analyze()
+    assert len(counted) == 10
+
+
+@pytest.mark.parametrize("text", ["", "[]", '["list",1]', "no JSON", '["rig.records:Job",1,1]'])
+def test_what_is_kept_and_cannot_be_read_is_computed_again(fence, counted, monkeypatch, text):
+    with monkeypatch.context() as patch:
+        patch.setattr(CacheFile, "get", lambda *_: text)
+        with rig.open(fence) as session:
+            session.analyze()
+    assert len(counted) == 10
+
+
+def bare(*arguments, home):
+    """Call ``rig`` with nothing of this user's surroundings."""
+    surroundings = {"PATH": os.environ["PATH"], "HOME": str(home), "LANG": "C.UTF-8"}
+    surroundings["PYTHONPATH"] = str(Path(rig.__file__).parents[1])
+    return subprocess.run(
+        [sys.executable, "-m", "rig", *map(str, arguments)],
+        env=surroundings, capture_output=True, check=False, timeout=PATIENCE_S,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("home", ["new", "missing", "a file", "closed"])
+def test_any_home_will_do(fence, tmp_path, home):
+    place = tmp_path / "home"
+    if home in {"new", "closed"}:
+        place.mkdir(mode=0o700 if home == "new" else 0o500)
+    elif home == "a file":
+        place.write_text("")
+    cold, again = (bare("analyze", fence, "--json", home=place) for _ in range(2))
+    assert (cold.returncode, cold.stderr) == (0, b"")
+    assert again.stdout == cold.stdout
+    assert (place / ".cache/chainrig/results.sqlite").is_file() == (home != "a file") or os.getuid()
+
+
+def test_doctor_tells_the_size_and_forgets(fence, capsys):
+    capsys.readouterr()
+    main(["doctor"])
+    line = next(one for one in capsys.readouterr().out.splitlines() if "kept results" in one)
+    assert str(CacheFile().folder) in line
+    assert " 11 of " in line  # ten drops and their session
+    main(["doctor", "--clear-cache"])
+    assert "kept results: 0 of " in capsys.readouterr().out
+
+
+def test_a_blind_session_keeps_no_numbers(tmp_path, capsys):
+    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
+    protocol, path = tmp_path / "p.yaml", tmp_path / "s.session"
+    protocol.write_text(f"{text}\nblind: true\n", "utf-8")
+    main(["run", str(protocol), "--port", "sim://?seed=3", "--session", str(path), "--yes"])
+    assert CacheFile().size().entries == 1
+    with rig.open(path) as session:
+        hidden = session.analyze()
+    assert not any("gravity_m_s2" in run.quantities for run in hidden.runs)
+    assert main(["unblind", str(path)]) == 0
+    with rig.open(path) as session:
+        assert session.analyze().runs[0].gravity.u > 0.0
