@@ -167,11 +167,17 @@ def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]
     return "\n".join(lines) + "\n"
 
 
+def describe_column(table: str, column: str) -> tuple[str, str]:
+    """Return a column's unit and its meaning, each empty where there is none."""
+    quantity = column.removesuffix("_u").removesuffix("_U95")
+    unit = next((unit for end, unit in _UNITS.items() if quantity.endswith(end)), "")
+    meanings = _meanings()
+    return unit, meanings.get(f"{table}: {column}", meanings.get(column, ""))
+
+
 def _describe(table: str, column: str) -> str:
     if column.endswith(("_u", "_U95")):
         return ""
-    unit = next((unit for end, unit in _UNITS.items() if column.endswith(end)), "")
-    meanings = _meanings()
-    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
+    unit, meaning = describe_column(table, column)
     words = " ".join(filter(None, [unit and f"[{unit}]", meaning]))
     return words and f": {words}"

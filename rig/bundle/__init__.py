@@ -1,0 +1,1 @@
+"""A session as one file that another person can check: a zipped RO-Crate (``.eln``)."""
