@@ -39,6 +39,7 @@ NOTES = {
 """Meaning of each bit of a point's notes; all but the last leave the model's domain."""
 
 _RODS_IN_CHUNK = 2_500_000  # 30 ms or so: nobody waits long for a running piece to end
+_LONGEST_CHUNK = 100_000  # of chains of few rods: a piece's coefficients are made in one go
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ class Swept:
 
 def chunk_length(rods: int) -> int:
     """Return how many falls make one piece of work."""
-    return max(1, _RODS_IN_CHUNK // rods)
+    return max(1, min(_LONGEST_CHUNK, _RODS_IN_CHUNK // rods))
 
 
 def compute(
