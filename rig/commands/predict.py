@@ -121,5 +121,4 @@ def _resolved(number: int) -> dict[str, list[float]]:
     say("simulating drops rod by rod; this takes some minutes")
     if number == 3:
         return resolved_paper.figure_3(resolved_paper.uniform())
-    (found,) = resolved_paper.graded(variants=resolved_paper.AS_MEASURED)
-    return resolved_paper.figure_4(found)
+    return resolved_paper.figure_4(resolved_paper.graded())
