@@ -90,7 +90,7 @@ def disturbed(
     busy
         See there, too.
     """
-    tally, chance = FaultTally(), random.Random(f"{kind} {seed}")  # noqa: S311 - moments, not secrets
+    tally, chance = FaultTally(), random.Random(f"{kind} {seed}")
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
         with ProcessFixture(

@@ -135,7 +135,7 @@ async def _deliver(folder: Path, count: int, every_s: float) -> tuple[float, lis
     serving = loop.create_task(server.run(ready.set))
     await ready.wait()
     wanted = count * EVENTS_PER_FRAME
-    client = subprocess.Popen(  # noqa: S603 - our own program
+    client = subprocess.Popen(
         [sys.executable, "-c", _WATCH, str(server.path), str(wanted)], stdout=subprocess.PIPE
     )
     assert client.stdout is not None
@@ -213,7 +213,7 @@ def flood() -> tuple[float, float]:
     """
     found: list[tuple[float, float]] = []
     for _ in range(_BEST_OF):
-        told = subprocess.run(  # noqa: S603 - our own program
+        told = subprocess.run(
             [sys.executable, "-c", _FLOOD, str(_FRAMES)], stdout=subprocess.PIPE, check=True
         )
         rate, memory = json.loads(told.stdout)

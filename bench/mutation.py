@@ -213,7 +213,7 @@ def _sampled(rooms: list[str], count: int, seed: int, where: str) -> Iterator[Mu
             for path in sorted((ROOT / folder).glob("*.c" if room == "core" else "*.py"))
             for fault in (c_faults if room == "core" else python_faults)(path.read_text("utf-8"))
         ]
-        random.Random(f"{room} {seed}").shuffle(found)  # noqa: S311 - a sample, no secrets
+        random.Random(f"{room} {seed}").shuffle(found)
         turns.append([one for one in found if where in str(one)])
     in_turn = (
         some[n] for n in range(max(map(len, turns), default=0)) for some in turns if some[n:]
@@ -271,7 +271,7 @@ def _pytest(
     copy: Path, asked: dict[str, str], tests: Iterable[str], patience_s: float | None
 ) -> tuple[int | None, str]:
     """Run tests on a copy; give the exit code, `None` when it hangs, and what was said."""
-    process = subprocess.Popen(  # noqa: S603 - our own tests
+    process = subprocess.Popen(
         [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "--tb=no", "-rf",
          "-p", "bench.mutation_plugin", "-p", "no:cacheprovider", "-p", "no:xdist",
          "-m", "not slow", *tests],

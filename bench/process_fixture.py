@@ -173,7 +173,7 @@ class ProcessFixture:
         return Client(self.socket, name)
 
     def _start(self, *arguments: object, stdin: int = subprocess.DEVNULL) -> Process:
-        return subprocess.Popen(  # noqa: S603 - our own program
+        return subprocess.Popen(
             [sys.executable, "-W", "error", *map(str, arguments)],
             stdin=stdin,
             stdout=subprocess.PIPE,

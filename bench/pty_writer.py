@@ -50,7 +50,7 @@ class PtyWriter:
         tty.setraw(self._near)
         self.path = os.ttyname(self._near)
         self._data = b"".join(len(frame).to_bytes(2, "little") + frame for frame in data)
-        self._writer = subprocess.Popen(  # noqa: S603 - our own program
+        self._writer = subprocess.Popen(
             [sys.executable, "-c", _WRITE, str(self._far), str(every_s)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

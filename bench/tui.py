@@ -77,7 +77,7 @@ class Terminal:
         columns, rows = SIZE
         fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         self.begun = time.monotonic()
-        self.process = subprocess.Popen(  # noqa: S603 - our own program
+        self.process = subprocess.Popen(
             [*_RIG, "tui", *map(str, arguments)],
             stdin=near,
             stdout=near,
@@ -154,7 +154,7 @@ async def _measure(folder: Path, protocol: str, say: Callable[[str], None]) -> d
 def _opened(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
     say("a whole session of the protocol …")
     session = folder / "whole.session"
-    subprocess.run(  # noqa: S603 - our own program
+    subprocess.run(
         [*_RIG, "run", protocol, "--port", "sim://", "--session", session, "--yes"],
         check=True,
         capture_output=True,

@@ -95,9 +95,7 @@ def measure(build: Path) -> Size:
 
 
 def _tool(name: str, *arguments: str | Path) -> str:
-    done = subprocess.run(  # noqa: S603 - the compiler's own tools
-        [f"avr-{name}", *arguments], capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([f"avr-{name}", *arguments], capture_output=True, text=True, check=True)
     return done.stdout
 
 

@@ -92,7 +92,7 @@ class VirtualBoard:
             late_ticks=LATE_TICKS,
             channels=_CHANNELS,
         )
-        self._random = random.Random(f"board {seed}")  # noqa: S311 - a simulation, not secrets
+        self._random = random.Random(f"board {seed}")
         start = self._random.getrandbits(32) if start_tick is None else start_tick
         self.counter = Counter(
             tick_hz, ppm, start, drift_ppm=drift_ppm, wander_ppm=wander_ppm, seed=seed

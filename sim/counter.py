@@ -40,7 +40,7 @@ class Counter:
         self._ppm = ppm
         self._drift = drift_ppm / _HOUR_STEPS
         self._wander = wander_ppm / _HOUR_STEPS**0.5
-        self._random = random.Random(f"resonator {seed}")  # noqa: S311 - noise, not secrets
+        self._random = random.Random(f"resonator {seed}")
         # Rates of the steps in nHz, and ticks·10¹⁸ before each: integers are exact over years.
         self._rates = [self._nhz(ppm)]
         self._counts = [0]

@@ -19,7 +19,7 @@ class LineFaults:
     def __init__(self, corrupt: float = 0.0, lose: float = 0.0, seed: int = 0) -> None:
         self._corrupt = corrupt
         self._lose = lose
-        self._random = random.Random(f"line {seed}")  # noqa: S311 - noise, not secrets
+        self._random = random.Random(f"line {seed}")
 
     def damage(self, data: bytes) -> bytes:
         """Pass bytes over the line.

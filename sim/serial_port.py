@@ -79,7 +79,7 @@ class SimulatedSerial(SerialBase):
         lose: float = 0.0,
     ) -> None:
         """Choose latencies and line faults; the parameters are those of the class."""
-        self._random = random.Random(f"latency {seed}")  # noqa: S311 - noise, not secrets
+        self._random = random.Random(f"latency {seed}")
         self._jitter_s = jitter_s
         self._stalled, self._stall_s = stalled, stall_s
         self._to_board = LineFaults(corrupt, lose, seed=2 * seed)

@@ -40,7 +40,7 @@ def published() -> list[dict[str, Any]]:
 
 
 def _lines(module: str) -> list[dict[str, Any]]:
-    done = run([sys.executable, "-m", module], stdout=PIPE, text=True, check=False)  # noqa: S603 - our own
+    done = run([sys.executable, "-m", module], stdout=PIPE, text=True, check=False)
     if done.returncode:
         raise RigError(f"the simulation ended with exit code {done.returncode}")
     return [json.loads(line) for line in done.stdout.splitlines()]

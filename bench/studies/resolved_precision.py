@@ -115,7 +115,7 @@ def speeds() -> Iterator[dict[str, float | str | None]]:
         "-c",
         f"from {__package__}.resolved_precision import *; print(time_of_many(SHORT_S))",
     ]
-    plain = run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, stdout=PIPE, check=True)  # noqa: S603 - our own
+    plain = run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, stdout=PIPE, check=True)
     yield _speed(f"{paper.RODS} rods until {SHORT_S:g} s, not compiled", float(plain.stdout))
 
 

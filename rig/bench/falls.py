@@ -76,7 +76,7 @@ def falls(asked: Sequence[Asked], module: str = "") -> Iterator[SimulatedDrop]:
         for text in (url, json.dumps([*seeds]), json.dumps([*runs]))
     ]
     command = [sys.executable, "-m", module or f"{simulation_package()}.edges", *requests]
-    with Popen(command, stdout=PIPE, text=True) as simulation:  # noqa: S603 - our own
+    with Popen(command, stdout=PIPE, text=True) as simulation:
         assert simulation.stdout is not None
         for line in simulation.stdout:
             told = json.loads(line)

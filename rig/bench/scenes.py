@@ -213,7 +213,7 @@ def account(file: Path) -> Account:
 def _child(*arguments: str) -> str:
     """Run Python and return what it prints."""
     search = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run(  # noqa: S603 - this very Python
+    done = subprocess.run(
         [sys.executable, *arguments],
         capture_output=True,
         encoding="utf-8",

@@ -85,7 +85,7 @@ class Worker:
         self._at_work = False  # for a client
         self._ending = False
         self._due_s = math.inf  # not begun
-        self._uneven = random.Random()  # noqa: S311 - spacing, not secrets
+        self._uneven = random.Random()
         self._pause_s = _FIRST_PAUSE_S
         self._trouble: RigError | None = None
         self._troubled: object = None  # the session that was open then

@@ -7,13 +7,12 @@ from collections import Counter
 from math import tau
 from typing import TYPE_CHECKING
 
-from rig.clock.epochs import RESONATOR_TOLERANCE
-from rig.clock.rate import tick_rate
 from rig.link.gatewatch import listed
 from rig.link.messages import HOST_SILENCE_MS, unpack_label
 from rig.link.restarts import causes
 from rig.reasons import make_reason
-from rig.selftest.findings import Finding, explain
+from rig.selftest.findings import CheckFailedError, Finding, explain
+from rig.selftest.line_checks import judge_clock
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -100,14 +99,10 @@ def held_drop(board: BoardFacts) -> Finding:
 
 def clock(board: BoardFacts) -> Finding:
     """See that the board's clock is within what a resonator may be off."""
-    nominal = board.identity.tick_hz
-    rate = tick_rate(board.pings, nominal)
-    if not rate.n:
-        return problem("clock", "clock_unknown", pings=len(board.pings))
-    off, u = rate.hz / nominal - 1, rate.u_hz / nominal
-    if abs(off) > RESONATOR_TOLERANCE + 2 * u:
-        return problem("clock", "clock_off", ppm=off * 1e6, U95=2e6 * u)
-    return Finding("clock", f"{off * 1e6:+.0f} ± {2 * u * 1e6:.0f} ppm")
+    try:
+        return Finding("clock", judge_clock(board.pings, board.identity.tick_hz))
+    except CheckFailedError as failure:
+        return explain("clock", failure.reason)
 
 
 def round_trip(board: BoardFacts) -> Finding:

@@ -84,7 +84,7 @@ def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None
     # -D: a boot loader erases each page as it comes, and knows no erasing of the whole chip.
     command += ["-D", "-P", port, "-U", f"flash:w:{image}:i"]
     try:
-        child = subprocess.Popen(  # noqa: S603 - no shell, and the user's own program
+        child = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

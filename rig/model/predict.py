@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, fall, free_fall_speed
+from rig.model.fall import Fall, fall, free_fall_speed, kicks
 from rig.model.impact import Impact, impact_on
 from rig.units import Quantity
 
@@ -149,7 +149,6 @@ def _ways_down(
             lambda x: fall(chain, x.alpha, x.gamma, x.drop, x.gravity, x.speed),
         )
     from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
-    from rig.model.fall import kicks  # noqa: PLC0415
 
     def in_air(x: _Inputs) -> Fall:
         gains = kicks(chain, [x.alpha] * chain.rods, x.gamma)

@@ -69,7 +69,7 @@ def _shuffled(items: list[T], seed: int) -> list[T]:
     """
     import random  # noqa: PLC0415 - most plans are not shuffled
 
-    source = random.Random(seed)  # noqa: S311 - a reproducible order, not a secret
+    source = random.Random(seed)
     result = list(items)
     for last in range(len(result) - 1, 0, -1):
         other = int(source.random() * (last + 1))

@@ -87,7 +87,7 @@ class Recorder:
         self._meet = meet
         self._port: Port | None = None
         self._device: Device | None = None
-        self._uneven = random.Random(0)  # noqa: S311 - spacing, not secrets
+        self._uneven = random.Random(0)
         self._armed: tuple[int, int] | None = None
         self.lapsed: DisarmReason | None = None
         self._sample: ClockSample | None = None  # the latest

@@ -16,6 +16,8 @@ from rig.selftest.board import LABEL
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.selftest.board import BoardUnderTest
 
 _PINGS = 60
@@ -41,17 +43,28 @@ def measure_round_trips(board: BoardUnderTest) -> str:
     late = sum(trip > limit_s for trip in trips)
     if late > _LATE:
         raise CheckFailedError("slow_answers", slowest_s=trips[-1])
-    nominal = board.known_identity().tick_hz
-    rate = tick_rate(pings, nominal)
-    if not rate.n:
-        raise CheckFailedError("clock_unknown", pings=_PINGS)
-    off, u = rate.hz / nominal - 1, rate.u_hz / nominal
-    if abs(off) > RESONATOR_TOLERANCE + 2 * u:
-        raise CheckFailedError("clock_off", ppm=off * 1e6, U95=2e6 * u)
+    clock = judge_clock(pings, board.known_identity().tick_hz)
     if late:
         raise NotPossibleError("computer_busy", interval_s=limit_s)
     low, middle, high = (1e3 * trip for trip in (trips[0], median(trips), trips[-1]))
-    return f"{low:.2f} to {high:.2f} ms, median {middle:.2f} ms; clock {off * 1e6:+.0f} ppm"
+    return f"{low:.2f} to {high:.2f} ms, median {middle:.2f} ms; clock {clock}"
+
+
+def judge_clock(pings: Sequence[ClockSample], nominal_hz: int) -> str:
+    """See that a board's clock is within what a resonator may be off; say by how much it is.
+
+    Raises
+    ------
+    CheckFailedError
+        It is not, or that is not known.
+    """
+    rate = tick_rate(pings, nominal_hz)
+    if not rate.n:
+        raise CheckFailedError("clock_unknown", pings=len(pings))
+    off, u = rate.hz / nominal_hz - 1, rate.u_hz / nominal_hz
+    if abs(off) > RESONATOR_TOLERANCE + 2 * u:
+        raise CheckFailedError("clock_off", ppm=off * 1e6, U95=2e6 * u)
+    return f"{off * 1e6:+.0f} ± {2 * u * 1e6:.0f} ppm"
 
 
 def let_arming_time_out(board: BoardUnderTest) -> str:
@@ -123,7 +136,7 @@ def send_without_seq(board: BoardUnderTest) -> str:
 
 def send_junk(board: BoardUnderTest) -> str:
     """See that junk on the line disturbs nothing."""
-    noise = random.Random(3)  # noqa: S311 - noise, not secrets
+    noise = random.Random(3)
     for _ in range(_BURSTS):
         board.line.port.write(noise.randbytes(noise.randrange(1, 300)) + DELIMITER)
         board.insist_phase(Phase.IDLE, "junk")

@@ -228,7 +228,7 @@ class ReconnectingClient:
         with self.path.with_suffix(".log").open("ab") as log:
             command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
             command += ["--idle-timeout", str(_IDLE_S)]
-            self.daemon = subprocess.Popen(  # noqa: S603 - our own program
+            self.daemon = subprocess.Popen(
                 [*command, "--socket", str(self.path)],
                 stdin=subprocess.DEVNULL,
                 stdout=log,

@@ -80,7 +80,7 @@ class Bench:
 
     def _train(self, rate: float, count: int = _EDGES) -> list[Flip]:
         """Flip gates by chance, so many times a second on the whole; all are clear at the end."""
-        chance = random.Random(1)  # noqa: S311 - a trial, not secrets
+        chance = random.Random(1)
         blocked = [False] * len(self.wiring.gates)
         cycle, gap = round(1250 * self.us), self.wiring.clock_hz / rate
         flips = []
@@ -178,9 +178,7 @@ class Bench:
         """Sum what the linker's account says, in bytes: flash, memory without the stack."""
         tool = "arm-none-eabi-size" if isinstance(self.stand.avr, PicoChip) else "avr-size"
         elf = firmware_for(self.wiring).with_suffix(".elf")
-        told = subprocess.run(  # noqa: S603 - a tool beside the compiler, and our own file
-            [tool, "-A", elf], capture_output=True, text=True, check=True
-        ).stdout
+        told = subprocess.run([tool, "-A", elf], capture_output=True, text=True, check=True).stdout
         sizes = {
             line.split()[0]: int(line.split()[1]) for line in told.splitlines() if line[:1] == "."
         }

@@ -135,7 +135,7 @@ class Fuzz:
         self._ms = 1000 * self._us
         self.judge = Judge(wiring.releases, self._us)
         self.happened: Counter[str] = Counter()
-        self._chance = random.Random(f"fuzz {wiring.mcu} {seed}")  # noqa: S311 - no secrets
+        self._chance = random.Random(f"fuzz {wiring.mcu} {seed}")
         self._decoder = Decoder()
         self._seq = 0
         self._token = 0

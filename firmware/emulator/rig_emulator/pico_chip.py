@@ -68,7 +68,7 @@ class PicoChip:
         self._bytes: list[tuple[int, str]] = []
         self._changes: list[Change] = []
         self._sent: list[Sent] = []
-        self._node = subprocess.Popen(  # noqa: S603 - our own program, and a file that was named
+        self._node = subprocess.Popen(
             ["node", HERE / "run.mjs", program, number.hex()],  # noqa: S607 - wherever node is
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -54,7 +54,7 @@ def compile_sketch(name: str, mcu: str, folder: Path) -> Path:
     options = ["-Os", "-std=gnu11", "-DF_CPU=16000000UL", f"-mmcu={mcu}", *flags]
     command = ["avr-gcc", *options, str(SOURCES / source), "-o", str(program)]
     try:
-        subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 - our own
+        subprocess.run(command, check=True, capture_output=True, text=True)
     except (OSError, subprocess.CalledProcessError) as error:
         raise DeviceError(f"cannot compile {source}: {error}", "apt-get install gcc-avr") from None
     return program
@@ -102,7 +102,7 @@ def compile_for_pico(folder: Path) -> Path:
     )
     try:
         for command in commands:
-            subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 - our own
+            subprocess.run(command, check=True, capture_output=True, text=True)
     except (OSError, subprocess.CalledProcessError) as error:
         hint = "apt-get install gcc-arm-none-eabi"
         raise DeviceError(f"cannot compile {_PICO}: {error}", hint) from None
@@ -114,7 +114,7 @@ def drop_of_pico(image: Path, flips: Sequence[Flip]) -> Account:
 
     Its time begins anywhere, so it is set by its first stamp.
     """
-    listed = subprocess.run(  # noqa: S603 - a tool beside the compiler, and our own file
+    listed = subprocess.run(
         [_NM, image.with_suffix(".elf")], capture_output=True, text=True, check=True
     ).stdout.splitlines()
     at = {name: int(address, 16) for address, _, name in map(str.split, listed)}

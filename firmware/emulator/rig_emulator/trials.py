@@ -76,7 +76,7 @@ def lab_drop(stand: Stand, lab: Lab, run: int) -> list[Stamp]:
 
 def train(gates: int, count: int, rate: float, seed: int = 1) -> list[Flip]:
     """Flip gates by chance, so many times a second on the whole; all are clear at the end."""
-    chance = random.Random(seed)  # noqa: S311 - a trial, not secrets
+    chance = random.Random(seed)
     blocked = [False] * gates
     cycle, gap = 20_000.0, HZ / rate
     flips = []
