@@ -18,7 +18,7 @@ from rig.analysis.fit import timed
 from rig.analysis.identified import Identified, identified
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
-from rig.analysis.result import NO_EDGES, Audit, DropResult
+from rig.analysis.result import Audit, DropResult
 from rig.analysis.verdict import judge, judge_record, verdict_of
 from rig.protocol.contact import at_contact
 from rig.reasons import make_reason
@@ -67,7 +67,7 @@ def fit_drop(
     """
     if drop.damage:  # the file's, and no finding about chains or gates
         damaged = (make_reason("record_damaged", text=drop.damage),)
-        return DropResult(run, drop.attempt, "void", damaged, NO_EDGES, damaged=True), None
+        return DropResult(run, drop.attempt, "void", damaged, Audit(), damaged=True), None
     known = {} if known is None else known
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     components = components or stated(protocol)

@@ -95,13 +95,7 @@ class Seen(NamedTuple):
     pick: Index
     times: Array
     burst: Array
-    rods: Index
-    gate: Index
-    sign: Array
-    turn: Array
-    drawn: Array
     alone: Flags
-    landed: Array
     paired: Flags
 
 
@@ -179,25 +173,10 @@ class Expected(NamedTuple):
     def seen(self, matches: Sequence[Index]) -> Seen:
         """Join the expected edges that are matched and the observed edge of each."""
         pick, edge = self.chosen(matches)
-        return Seen(
-            pick,
-            self.times[edge],
-            self.burst[edge],
-            self.rods[pick],
-            self.gate[pick],
-            self.sign[pick],
-            self.turn[pick],
-            self.drawn[pick],
-            self.alone[pick],
-            self.landed[pick],
-            self._pairs(pick),
-        )
-
-    def _pairs(self, pick: Index) -> Flags:
-        found = np.zeros(pick.size, dtype=np.bool_)
+        paired = np.zeros(pick.size, dtype=np.bool_)
         rods, gate = self.rods[pick], self.gate[pick]
-        found[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
-        return found
+        paired[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
+        return Seen(pick, self.times[edge], self.burst[edge], self.alone[pick], paired)
 
 
 def _landed(strike: Quantity, left: Array) -> Array:

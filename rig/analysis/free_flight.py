@@ -13,19 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
 _NONE = 1e-15  # 1/m: what takes less than an atom's width from a metre
 _FAINT = 1e-5  # 1/m: what still is in the last digits of a difference
-_SHORT = 0.02  # of y, up to which these terms of (1 − e^(−y))/y and its derivative will do
-_SERIES = (
-    [(-1.0) ** n / math.factorial(n + 1) for n in range(6)],
-    [(-1.0) ** (n + 1) * (n + 1) / math.factorial(n + 2) for n in range(6)],
-)
+_SHORT = 0.02  # of y, up to which these terms of (1 − e^(−y))/y will do
+_SERIES = [(-1.0) ** n / math.factorial(n + 1) for n in reversed(range(7))]
 _NEVER = 1.0 - 1e-9  # tanh of a time: nothing falls longer
 
 
@@ -142,15 +137,10 @@ def reach_slopes(distance: Array, kappa: float | Array) -> tuple[Array, Array]:
     """(1 − e^(−2κd))/κ and its derivative by κ, by their series where these are short."""
     y = 2.0 * kappa * distance
     if np.abs(y).max() < _SHORT:
-        one, two = (_polynomial(terms, y) for terms in _SERIES)
-        return 2.0 * distance * one, 4.0 * distance**2 * two
+        share, slope = np.zeros_like(y), np.zeros_like(y)
+        for term in _SERIES:  # Horner's rule, of the derivative too
+            slope = slope * y + share
+            share = share * y + term
+        return 2.0 * distance * share, 4.0 * distance**2 * slope
     reach = reach_of(distance, kappa)
     return reach, (2.0 * distance * np.exp(-y) - reach) / kappa
-
-
-def _polynomial(terms: Sequence[float], y: Array) -> Array:
-    found = np.full_like(y, terms[-1])
-    for term in terms[-2::-1]:
-        found *= y
-        found += term
-    return found

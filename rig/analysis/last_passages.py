@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.dual import Dual
+from rig.analysis.quantities import Adjusted
 from rig.analysis.result import Measured
+from rig.analysis.square_root import EquationRows, eliminate
 from rig.reasons import Reason, make_reason
 
 if TYPE_CHECKING:
@@ -32,29 +35,26 @@ _APART = 3.0  # standard uncertainties beyond which two opinions are not the sam
 
 
 class _Passages(NamedTuple):
-    """When a chain's top rod would have been where, shape ``(edges,)`` each.
+    """When a chain's top rod was where, shape ``(edges,)`` each.
 
     Attributes
     ----------
     times, heights
-        s, m above the gates' zero.
-    gate, rod
-        Of each edge: what a beam is off, and a rod, several edges share.
+        s, m above the gates' zero; as nominal, whatever the rod and the beam were off.
+    slopes
+        Derivatives of the heights by the drop's unknowns, in units of their prior uncertainties;
+        shape ``(edges, unknowns)``.
     sigma
         What each edge is off by itself, m.
-    sign
-        −½ where a rod's lower side darkens the beam, ½ where its upper side clears it.
-    landed
-        How much higher the rod may be because it struck before, m; one standard deviation.
+    rod
+        Of each edge.
     """
 
     times: Array
     heights: Array
-    gate: Index
-    rod: Index
+    slopes: Array
     sigma: Array
-    sign: Array
-    landed: Array
+    rod: Index
 
     def only(self, chosen: Flags) -> _Passages:
         """Leave out the others."""
@@ -93,8 +93,7 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
         if near.times.size >= 2 and np.ptp(near.times) > 0.0:
             (height, falling), covariance = _fall(fit, "free", near, when)
             u = math.hypot(_u(covariance, 1.0, 0.0), falling * moment_u)
-            datum = math.sqrt(2.0) * model.protocol.gates.datum_u if model.protocol.gates else 0.0
-            found["separation_raw_m"] = Measured(height, math.hypot(u, datum))
+            found["separation_raw_m"] = Measured(height, u)
     return found
 
 
@@ -122,49 +121,35 @@ def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) 
 
 def _passages(fit: Fit, role: str) -> _Passages:
     """Collect a side's matched edges as passages of its top rod."""
-    model, record = fit.model, fit.model.records[role]
-    expected = model.expected[role]
+    model = fit.model
+    expected, nominal = model.expected[role], Adjusted(model, np.zeros(fit.x.size))
     pick, edge = expected.chosen(fit.matches[role])
-    rod, gate = expected.rods[pick], expected.gate[pick]
-    places = np.array(record.chain.chain.heights)
     # The reference is at the level when the edge comes, and the top rod as much higher.
-    heights = expected.levels[pick] + places[-1]
-    clock = model.rate(fit.x)
+    levels = Dual(expected.levels[pick], model.slopes[role].levels[pick])
+    top = nominal.top(role, levels)
     sigma = model.residuals(role, fit.x, fit.matches[role]).sigma
-    sign, landed = expected.sign[pick], model.components.landed * expected.landed[pick]
-    return _Passages(expected.times[edge] * clock, heights, gate, rod, sigma, sign, landed)
+    times = expected.times[edge] * model.rate(fit.x)
+    return _Passages(times, top.value, top.slopes * model.unknowns.sd, sigma, expected.rods[pick])
 
 
 def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[float, float], Array]:
     """Height and speed of a chain's top rod at a moment, and their covariance.
 
-    Generalized least squares of z(t) = z − v(t − t₀) − ½(g − κv²)(t − t₀)²: edges are off by
-    themselves, and together by their beam's height and aim, their rod's place, the rods' width,
-    and what a rod that strikes early loses.
+    Least squares of z(t) = z − v(t − t₀) − ½(g − κv²)(t − t₀)²: edges are off by themselves, and
+    together by all that the table of unknowns has of beams and rods.
     """
-    protocol, chain = fit.model.protocol, fit.model.records[role].chain
-    assert protocol.gates is not None
     since = seen.times - when
     path = fit.model.trajectory(role, fit.x)
     (speed,), kappa = path.heights(np.array([when]))[1], np.ravel(path.kappas(np.array([-1])))[0]
-    pull = protocol.gravity.value - kappa * speed**2
-    fallen = seen.heights + 0.5 * pull * since**2
-    design = np.stack([np.ones_like(since), -since], axis=1)
-    ripple = fit.model.components.beam * math.tan(math.radians(chain.tilt_deg))
-    turn = np.where(seen.rod % 2, -1.0, 1.0)  # a beam off the middle sees neighbours either way
-    beam = protocol.gates.height_u**2 + ripple**2 * np.outer(turn, turn)
-    place = chain.position_u if role == "free" else 0.0
-    covariance = (
-        np.diag(seen.sigma**2)
-        + beam * (seen.gate[:, None] == seen.gate)
-        + place**2 * (seen.rod[:, None] == seen.rod)
-        + chain.width_u**2 * np.outer(seen.sign, seen.sign)
-        + np.outer(seen.landed, seen.landed)
-    )
-    root = np.linalg.cholesky(covariance)
-    basis, triangle = np.linalg.qr(np.linalg.solve(root, design))
-    inverse = np.linalg.inv(triangle)
-    height, speed = inverse @ (basis.T @ np.linalg.solve(root, fallen))
+    fallen = seen.heights + 0.5 * (fit.model.protocol.gravity.value - kappa * speed**2) * since**2
+    off = seen.slopes[:, seen.slopes.any(axis=0)]
+    own, both = np.split(np.arange(off.shape[1] + 2), [off.shape[1]])
+    rows = np.column_stack([-off, np.ones_like(since), -since]) / seen.sigma[:, None]
+    equations = EquationRows(rows, -fallen / seen.sigma, np.append(own, both))
+    ones = np.ones(rows.shape[1])
+    rest = eliminate([equations], ones, np.zeros_like(ones), own, both).rest
+    inverse = np.linalg.inv(rest.slopes[:2])
+    height, speed = -inverse @ rest.left[:2]
     return (float(height), float(speed)), np.asarray(inverse @ inverse.T, dtype=np.float64)
 
 

@@ -14,24 +14,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.result import GOOD, Measured
+from rig.analysis.result import GOOD, Measured, average
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs as planned_runs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol
 
-SIGNS = (0.5, -0.5, -0.5, 0.5)
-"""Of the four runs of a block, in the difference."""
-MEANS = (0.25, 0.25, 0.25, 0.25)
-"""The same in the mean."""
-_REST = np.array([-1.0, 3.0, -3.0, 1.0])  # orthogonal to a mean, a linear drift, and A less B
+    Array = NDArray[np.float64]
+
+_FIRST = (True, False, False, True)
+"""Whether the first chain strikes in each run of a block."""
 _CHAINS_OWN = ("spacing", "width")  # lines of a budget that are not the same for both
 
-Block = tuple["DropResult", "DropResult", "DropResult", "DropResult"]
+Block = list["DropResult"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,55 +95,49 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
         blocks = _blocks([good.get(number) for number in numbers], first)
         if blocks:
             rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
-            chain = {r.name: _contrast(blocks, r.name, SIGNS) for r in rows if r.by_chain}
-            side = {r.name: _contrast(blocks, r.name, MEANS) for r in rows if r.by_side}
+            evenly = np.ones(len(_FIRST)) / len(_FIRST)
+            signs = np.where(_FIRST, evenly, -evenly) * 2.0
+            chain = {r.name: _contrast(blocks, r.name, signs) for r in rows if r.by_chain}
+            side = {r.name: _contrast(blocks, r.name, evenly) for r in rows if r.by_side}
             found.append(Effects(incline, first, second, len(blocks), chain, side))
     return tuple(found)
 
 
 def _blocks(runs: Sequence[DropResult | None], first: str) -> list[Block]:
     """Cut an incline's runs in fours, and keep those that are whole."""
-    found = []
-    for at in range(0, len(runs) - 3, 4):
-        one, two, three, four = runs[at : at + 4]
-        if one is None or two is None or three is None or four is None:
-            continue
-        struck = [run.run.impact == first for run in (one, two, three, four)]
-        if struck == [True, False, False, True]:  # all runs shuffled leave no blocks
-            found.append((one, two, three, four))
-    return found
+    fours = (
+        runs[end - len(_FIRST) : end] for end in range(len(_FIRST), len(runs) + 1, len(_FIRST))
+    )
+    whole = ([run for run in four if run is not None] for four in fours)
+    # All runs shuffled leave no blocks.
+    return [block for block in whole if tuple(one.run.impact == first for one in block) == _FIRST]
 
 
-def _contrast(blocks: Sequence[Block], name: str, signs: Sequence[float]) -> Measured:
+def _contrast(blocks: Sequence[Block], name: str, weights: Array) -> Measured:
     """Average a weighted sum over blocks.
 
     Its uncertainty is the scatter between blocks and within them, or what the runs' own
     uncertainties make of it where that is larger, and what blocks share and the weights do not
-    cancel. Degrees of freedom are effective ones (GUM G.4).
+    cancel.
     """
-    weights = np.array(signs)
     measured = [[run.quantities[name] for run in block] for block in blocks]
     runs = np.array([[one.value for one in block] for block in measured])
     values = runs @ weights
-    n = len(blocks)
-    size = float(weights @ weights)
-    # Within a block one sum is left that knows of no chain and no linear drift.
+    n, size = len(blocks), float(weights @ weights)
+    # Within a block one sum is left that knows of no mean, no chain and no linear drift.
+    known = np.stack([np.ones(len(_FIRST)), np.arange(len(_FIRST)), np.where(_FIRST, 1.0, -1.0)])
+    rest = np.linalg.svd(known)[2][-1]
     # Its square is of the runs' own scatter only: one more degree of freedom from each block.
-    squares = float(np.sum((values - values.mean()) ** 2))
-    squares += size * float(np.sum((runs @ _REST) ** 2)) / float(_REST @ _REST)
-    seen = math.sqrt(squares / (2 * n - 1))
+    squares = float(np.sum((values - values.mean()) ** 2) + size * np.sum((runs @ rest) ** 2))
+    every = [one for block in measured for one in block]
+    own = max(0.0, fmean(one.u**2 - _shared(one) ** 2 for one in every)) * size
+    freedom = 2 * n - 1.0
     common = _common(measured, weights)
-    owns = [one.u**2 - _shared(one) ** 2 for block in measured for one in block]
-    own = math.sqrt(max(0.0, fmean(owns)) * size)
-    single = max(own, seen) / math.sqrt(n)
-    u = math.hypot(single, common)
-    known = min(max(1.0, one.degrees) for block in measured for one in block)
-    share = single**4 / (2 * n - 1.0 if seen > own else known) + common**4 / known
-    degrees = u**4 / share if share > 0.0 else math.inf
-    return Measured(float(values.mean()), u, degrees, {"runs": single, "common": common})
+    own, seen = math.sqrt(own / n), math.sqrt(squares / freedom / n)
+    return average(float(values.mean()), own, seen, freedom, common, every)
 
 
-def _common(measured: Sequence[Sequence[Measured]], weights: np.ndarray) -> float:
+def _common(measured: Sequence[Sequence[Measured]], weights: Array) -> float:
     """What the blocks share, as far as the weights do not cancel it."""
     vectors = [[one.shared for one in block] for block in measured]
     if all(one is not None for block in vectors for one in block):

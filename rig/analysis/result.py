@@ -96,6 +96,33 @@ class Measured:
         return {"value": self.value, "u": self.u, "U95": self.expanded}
 
 
+def average(
+    value: float, own: float, seen: float, freedom: float, common: float, runs: Sequence[Measured]
+) -> Measured:
+    """Put a mean, or another sum with weights, and its uncertainty together.
+
+    Where runs happen to scatter less than each one's own uncertainty allows, the latter counts.
+    Degrees of freedom are effective ones (GUM G.4): what runs say of themselves is known no better
+    than they know it, however many they are.
+
+    Parameters
+    ----------
+    own, seen
+        Uncertainty by what the runs say of themselves, and by their scatter.
+    freedom
+        Degrees of freedom of the latter.
+    common
+        What all runs share, which averaging does not reduce.
+    runs
+        Of which the one that knows its own uncertainty least speaks for all.
+    """
+    single, known = max(own, seen), min(max(1.0, run.degrees) for run in runs)
+    u = math.hypot(single, common)
+    share = single**4 / (freedom if seen > own else known) + common**4 / known
+    degrees = u**4 / share if share > 0.0 else math.inf
+    return Measured(value, u, degrees, {"runs": single, "common": common})
+
+
 @dataclass(frozen=True, slots=True)
 class Audit:
     """What became of the edges of a drop.
@@ -116,11 +143,11 @@ class Audit:
         Of the spurious ones, those that are not of a known kind either.
     """
 
-    received: int
-    matched: int
-    missed: int
-    spurious: int
-    lost: int
+    received: int = 0
+    matched: int = 0
+    missed: int = 0
+    spurious: int = 0
+    lost: int = 0
     unexplained: int = 0
 
     @property
@@ -137,9 +164,6 @@ class Audit:
         """``edges`` of a run as `rig analyze --json` prints it."""
         names = ("received", "matched", "missed", "spurious", "lost")
         return {name: getattr(self, name) for name in names}
-
-
-NO_EDGES = Audit(*[0] * 5)
 
 
 @dataclass(frozen=True, slots=True)

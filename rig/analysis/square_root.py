@@ -34,7 +34,7 @@ class EquationRows(NamedTuple):
 
     def triangle(self) -> EquationRows:
         """Return the same sum of squares of any step, in no more rows than columns and one."""
-        whole = _triangle(np.column_stack([self.slopes, self.left]))
+        whole = triangle(np.column_stack([self.slopes, self.left]))
         return self._replace(slopes=whole[:, :-1], left=whole[:, -1])
 
     def after(self, step: Array) -> EquationRows:
@@ -76,7 +76,7 @@ class Root(NamedTuple):
         whole = np.zeros((2 * size, size + 1))
         whole[:size, :size], whole[:size, size] = self.matrix, self.left
         whole[size + np.arange(size), np.arange(size)] = np.sqrt(damping) * lengths
-        whole = _triangle(whole)
+        whole = triangle(whole)
         return Root(whole[:size, :size], whole[:size, size])
 
 
@@ -171,7 +171,7 @@ def _eliminate_private(
         stack[:rows, -1] = block.left
         stack[rows + np.arange(count), np.arange(count)] = 1.0
         stack[rows:, -1] = pull[columns[:count]]
-        stack = _triangle(stack)
+        stack = triangle(stack)
         whole[begin : begin + count, np.append(columns, size)] = stack[:count]
         begin += count
         top.append(columns[:count])
@@ -191,9 +191,10 @@ def _stacked(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Arr
         stack[begin:end, -1] = block.left
     stack[end + np.arange(pull.size), np.arange(pull.size)] = 1.0
     stack[end:, -1] = pull
-    return _triangle(stack)
+    return triangle(stack)
 
 
-def _triangle(rows: Array) -> Array:
+def triangle(rows: Array) -> Array:
+    """Return R of rows QR, with the same sum of squares of any step."""
     found: Array = np.asarray(np.linalg.qr(rows, mode="r"))
     return found

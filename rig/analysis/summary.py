@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.analysis.comparison import compare
 from rig.analysis.quantities import COMMON
-from rig.analysis.result import GOOD, Measured
+from rig.analysis.result import GOOD, Measured, average
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
 from rig.protocol.protocol import Condition
@@ -208,35 +208,16 @@ def _causes(runs: Sequence[Measured]) -> dict[str, float]:
 
 
 def mean(runs: Sequence[Measured]) -> Measured:
-    """Mean of several runs: their scatter over √n, and what is common to all of them.
-
-    Where the runs happen to scatter less than each one's own uncertainty allows, the latter
-    counts. Degrees of freedom are effective ones (GUM G.4): what the runs say of themselves is
-    known no better than they know it, however many they are.
-    """
-    if len(runs) == 1:
-        (run,) = runs
-        common = _common(runs)[0]
-        alone = math.sqrt(max(0.0, run.u**2 - common**2))
-        return replace(run, budget={"runs": alone, "common": common}, shared=None, deviation=None)
-    n = len(runs)
+    """Mean of several runs: their scatter over √n, and what is common to all of them."""
     common, each = _common(runs)
     # Of a run's u² what all share is taken out: averaging does not reduce it, and it is added last.
-    own = math.sqrt(
-        fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
-    )
-    seen = stdev(run.value for run in runs)
-    single = max(own, seen) / math.sqrt(n)
-    u = math.hypot(single, common)
-    # The run that knows its own uncertainty least speaks for all.
-    known = min(max(1.0, run.degrees) for run in runs)
-    share = single**4 / (n - 1.0 if seen > own else known) + common**4 / known
-    return Measured(
-        fmean(run.value for run in runs),
-        u,
-        u**4 / share if share > 0.0 else math.inf,
-        {"runs": single, "common": common},
-    )
+    variance = fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
+    values, n = [run.value for run in runs], len(runs)
+    if n == 1:
+        parts = {"runs": math.sqrt(variance), "common": common}
+        return replace(runs[0], budget=parts, shared=None, deviation=None)
+    own, seen = math.sqrt(variance / n), stdev(values) / math.sqrt(n)
+    return average(fmean(values), own, seen, n - 1.0, common, runs)
 
 
 def _common(runs: Sequence[Measured]) -> tuple[float, list[float]]:

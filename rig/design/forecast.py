@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.square_root import triangle
 from rig.analysis.summary import by_case
 from rig.design.cases import BEAM
-from rig.estimate.coefficients import KNOWN, described, first_held, given_alphas
-from rig.estimate.hypotheses import BETA, MU, alphas
+from rig.estimate.coefficients import KNOWN, described, given_alphas, held_back
+from rig.estimate.hypotheses import alphas
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class GateLayout:
 
     def triangles(self) -> GateLayout:
         """Return the same in no more rows than columns: for beams to be added again and again."""
-        return replace(self, rows=tuple(map(_triangle, self.rows)))
+        return replace(self, rows=tuple(map(triangle, self.rows)))
 
 
 def _stacked(rows: Array, blocks: Sequence[Block]) -> Array:
@@ -74,10 +75,6 @@ def _stacked(rows: Array, blocks: Sequence[Block]) -> Array:
         whole[begin:end, beam : beam + BEAM] = block.slopes[:, -BEAM:]
         beam += BEAM
     return whole
-
-
-def _triangle(rows: Array) -> Array:
-    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +190,7 @@ class _Drop:
         """Eliminate a drop's own unknowns, and α as far as its prior goes."""
         own, size = case.own, rows.shape[1]
         # A last row of zeros: α has a row also where there is no edge.
-        whole = _triangle(np.vstack([rows, np.eye(own, size), np.zeros((1, size))]))
+        whole = triangle(np.vstack([rows, np.eye(own, size), np.zeros((1, size))]))
         alpha = whole[own, own:] if case.struck else np.zeros(1 + size - own)
         others = whole[: own + case.struck, own + case.struck :].copy()
         root = whole[: own + case.struck, : own + case.struck].copy()
@@ -239,7 +236,7 @@ def _session(observations: Sequence[tuple[Array, Index]], root: Array) -> Array:
         begin, end = end, end + rows.shape[0]
         stack[begin:end, columns] = rows
     stack[end:] = root
-    return _triangle(stack)
+    return triangle(stack)
 
 
 def _described(
@@ -277,19 +274,11 @@ def _coefficients(
         """With some held within these uncertainties; 0 is exact, which is no unknown."""
         free = [n for n, name in enumerate(now) if priors.get(name) != 0.0]
         weights = [1.0 / priors[name] if priors.get(name) else 0.0 for name in now]
-        inverse = np.linalg.inv(_triangle(np.vstack([edges, np.diag(weights)])[:, free]))
+        inverse = np.linalg.inv(triangle(np.vstack([edges, np.diag(weights)])[:, free]))
         known = dict(zip(free, np.linalg.norm(inverse, axis=1).tolist(), strict=True))
         return {name: known.get(n, 0.0) for n, name in enumerate(now)}
 
-    by_edges = present = uncertainties({})
-    held: dict[str, float] = {}
-    for name in first_held(now):  # as the estimate does
-        unsure = {other for other, u in present.items() if u > KNOWN}
-        if not unsure:
-            break
-        if name == MU and not unsure & {MU, BETA}:
-            continue
-        held[name] = stated[name].u
-        present = uncertainties(held)
+    held = held_back(stated, uncertainties)
+    by_edges, present = uncertainties({}), uncertainties(held)
     unknown = held.keys() | {name for name, u in present.items() if u > KNOWN}
     return present | {name: by_edges[name] for name in unknown}, unknown

@@ -21,7 +21,7 @@ from rig.estimate.hypothesis_fit import Parameter, fit
 from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -138,44 +138,66 @@ def words(name: str) -> str:
     return what.replace("_", " ") + (f" of chain {chain}" if chain else "")
 
 
-def first_held(names: Iterable[str]) -> list[str]:
-    """Order coefficients as they are held, one after the other, where edges do not tell all."""
-    known = list(names)
-    models = [name for name in (MU, BETA, PILE) if name in known]
-    return models + [name for name in known if name not in models]
+def held_back(
+    stated: Mapping[str, Quantity],
+    uncertainties: Callable[[Mapping[str, float]], Mapping[str, float]],
+) -> dict[str, float]:
+    """Choose the coefficients to hold, one after the other, until the edges tell the others.
+
+    μ is held first, and then β, where the edges do not tell them apart.
+
+    Parameters
+    ----------
+    uncertainties
+        Of all coefficients, with some held within what is stated of them.
+
+    Returns
+    -------
+    dict
+        Stated uncertainties of those that are held, 0 for what is exact.
+    """
+    held: dict[str, float] = {}
+    models = [name for name in (MU, BETA, PILE) if name in stated]
+    for name in [*models, *(name for name in stated if name not in models)]:
+        unsure = {other for other, u in uncertainties(held).items() if u > KNOWN}
+        if not unsure:
+            break
+        if name != MU or unsure & {MU, BETA}:
+            held[name] = stated[name].u
+    return held
 
 
 def _identified(protocol: Protocol, given: CoefficientProblem) -> CoefficientProblem:
-    """Hold μ, and then β, where the edges do not tell them apart."""
-    found = given
-    for name in first_held(given.stated):
-        outcome = best(protocol, found)
-        unsure = [one for one in found.stated if outcome[one][1] > KNOWN]
-        if not unsure:
-            break
-        if name == MU and BETA not in unsure and MU not in unsure:
-            continue
-        stated = given.stated[name]
-        said = (
-            f"{words(name)} is not identified by drops at "
-            f"{', '.join(f'{incline:g}°' for incline in given.inclines)}: held at the protocol's "
+    """Hold what the edges do not tell."""
+
+    def holding(held: Mapping[str, float]) -> CoefficientProblem:
+        exact = {name for name, u in held.items() if not u}
+        priors = {name: (given.stated[name].value, u) for name, u in held.items()}
+        return replace(
+            given,
+            parameters=tuple(
+                one._replace(prior=priors.get(one.name))
+                for one in given.parameters
+                if one.name not in exact
+            ),
+            held=tuple(name for name in held if name not in exact),
+            stated={name: one for name, one in given.stated.items() if name not in exact},
         )
-        if stated.u:
-            said += f"{stated.value:g} ± {stated.u:g}, which the other coefficients allow for"
-            parameters = tuple(
-                one._replace(prior=(stated.value, stated.u)) if one.name == name else one
-                for one in found.parameters
-            )
-            found = replace(found, parameters=parameters, held=(*found.held, name))
-        else:
-            said += f"{stated.value:g}"
-            found = replace(
-                found,
-                parameters=tuple(one for one in found.parameters if one.name != name),
-                stated={key: value for key, value in found.stated.items() if key != name},
-            )
-        found = replace(found, left_out=(*found.left_out, said))
-    return found
+
+    def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
+        found = holding(held)
+        outcome = best(protocol, found)
+        return {name: outcome[name][1] for name in found.stated}
+
+    held = held_back(given.stated, uncertainties)
+    inclines = ", ".join(f"{incline:g}°" for incline in given.inclines)
+    left_out = [
+        f"{words(name)} is not identified by drops at {inclines}: held at the protocol's "
+        f"{given.stated[name].value:g}"
+        + (f" ± {u:g}, which the other coefficients allow for" if u else "")
+        for name, u in held.items()
+    ]
+    return replace(holding(held), left_out=(*given.left_out, *left_out))
 
 
 def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
