@@ -384,6 +384,15 @@ def _parser() -> Parser:
     )
     _fresh(export)
 
+    notes = command("notes", "add a note to a recorded run")
+    _session(notes)
+    notes.add_argument("text", metavar="TEXT", help="the note")
+    notes.add_argument("--run", type=_count, required=True, metavar="N", help="number of the run")
+
+    attach = command("attach", "add a file, such as a photograph, to a session")
+    _session(attach)
+    attach.add_argument("file", metavar="FILE", help="the file")
+
     verify = command("verify", "check a bundle, and derive its numbers again from the raw edges")
     verify.add_argument("file", metavar="FILE", help="bundle, its unpacked folder, or session file")
     verify.add_argument("--key", metavar="KEY.pub", help="public key of who signed it (minisign)")

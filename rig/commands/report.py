@@ -147,8 +147,10 @@ def _version(package: str) -> str:
 
 
 def _noted(session: Session) -> list[str]:
-    """Tell what operators noted to drops."""
-    return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
+    """Tell what operators noted to drops, and which files they attached."""
+    noted = notes(session).items()
+    attached = [f"Attached: {file.name} ({file.added})" for file in session.attachments()]
+    return [*(f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in noted), *attached]
 
 
 def _estimated(session: Session, found: SessionResults, *, fresh: bool) -> SessionEstimate | None:
