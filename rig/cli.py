@@ -322,8 +322,9 @@ def _parser() -> Parser:
         "--simulated", action="store_true", help="the edges come from a simulation"
     )
 
-    analyze = command("analyze", "compute the results of a session")
+    analyze = command("analyze", "compute the results of a session, or of several together")
     _session(analyze)
+    _together(analyze, "*")
     analyze.add_argument(
         "--budget", type=_count, metavar="RUN", help="uncertainty budget of this run"
     )
@@ -350,6 +351,18 @@ def _parser() -> Parser:
     )
     _fresh(analyze)
     _json(analyze)
+
+    compare = command("compare", "compare the means of sessions with those of the first one")
+    _session(compare)
+    _together(compare, "+")
+    compare.add_argument(
+        "-o",
+        "--output",
+        type=_place("comparison.html"),
+        metavar="FILE",
+        help="write the comparison as a page (.html), or its figure (.svg, .png, .pdf)",
+    )
+    _json(compare)
 
     estimated = command("estimate", "estimate restitution, friction and impulses from a session")
     _session(estimated)
@@ -635,6 +648,19 @@ def _session(parser: argparse.ArgumentParser) -> None:
 def _fresh(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fresh", action="store_true", help="compute everything again, use no kept results"
+    )
+
+
+def _together(parser: argparse.ArgumentParser, nargs: str) -> None:
+    parser.add_argument("others", metavar="SESSION", nargs=nargs, help="further sessions")
+    parser.add_argument(
+        "--same-rig",
+        action=argparse.BooleanOptionalAction,
+        help="whether several sessions have the same posts, gates and chains (default: those with "
+        "the same title and board, as far as their protocols agree)",
+    )
+    parser.add_argument(
+        "--unfinished", action="store_true", help="add sessions whose plan is not finished too"
     )
 
 

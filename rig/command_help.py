@@ -21,6 +21,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "A session": ("run", "tui", "daemon", "import", "notes", "attach"),
     "Results": (
         "analyze",
+        "compare",
         "report",
         "estimate",
         "export",
@@ -66,6 +67,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "rig import logger.txt --protocol my-chains.yaml --dry-run",
     ),
     "analyze": ("rig analyze my.session", "rig analyze my.session --budget 1"),
+    "compare": ("rig compare before.session after.session",
+                "rig compare group-1.session group-2.session -o groups.html"),
     "report": ("rig report my.session -o report.html",
                "rig report my.session -o report.html --figures my-figures"),
     "estimate": ("rig estimate my.session", "rig estimate my.session -o my-pictures"),

@@ -22,6 +22,7 @@ from rig.protocol import reader
 from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
 from rig.results import calibration, protocol_of, results
+from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.export import flatten
 from rig.session.store import Session
 
@@ -41,9 +42,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Edges",
+    "MeanDifference",
     "MeanResult",
     "PredictedIncline",
     "RecordedSession",
+    "RecordedSessions",
     "Results",
     "RunResult",
     "open",
@@ -168,6 +171,10 @@ class RecordedSession:
         """Let go of the file."""
         self._file.close()
 
+    def __add__(self, other: RecordedSession) -> RecordedSessions:
+        """Return both sessions as one."""
+        return RecordedSessions((self, other))
+
     def __enter__(self) -> Self:
         return self
 
@@ -177,6 +184,51 @@ class RecordedSession:
     def __repr__(self) -> str:
         stamp = ", simulated" if self.simulated else ""
         return f"<session {self._file.path.name}: {len(self._file.latest_drops())} runs{stamp}>"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedSessions:
+    """Several sessions as one, as the sum of open sessions makes them.
+
+    Attributes
+    ----------
+    sessions
+        In the order of the sum; differences are from the first.
+    """
+
+    sessions: tuple[RecordedSession, ...]
+
+    def __add__(self, other: RecordedSession) -> RecordedSessions:
+        """Return these sessions and one more."""
+        return RecordedSessions((*self.sessions, other))
+
+    def analyze(self, *, same_rig: bool | None = None, unfinished: bool = False) -> Results:
+        """Compute everything in one joint fit, as `rig analyze A B` does.
+
+        Parameters
+        ----------
+        same_rig
+            Whether all have the same posts, gates and chains; if `None`, those with the same title
+            and board, as far as their protocols agree.
+        unfinished
+            Whether planned runs may be missing.
+
+        Raises
+        ------
+        InputError, SessionError
+            A session cannot be added to the others.
+        """
+        return Results(self._together(same_rig, unfinished))
+
+    def compare(
+        self, *, same_rig: bool | None = None, unfinished: bool = False
+    ) -> list[MeanDifference]:
+        """Return each mean less that of the first session; parameters as for `analyze`."""
+        return self._together(same_rig, unfinished).differences()
+
+    def _together(self, same_rig: bool | None, unfinished: bool) -> TogetherResults:
+        files = [session._file for session in self.sessions]
+        return results_together(files, same_rig=same_rig, unfinished=unfinished)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -237,6 +289,8 @@ class RunResult(_Quantities):
         ``accepted``, ``marginal``, ``void`` or ``rejected``, and why.
     gates
         How one object passed each gate; empty for chains.
+    session
+        Name of the session, where there are several.
     """
 
     run: int = field(kw_only=True)
@@ -246,9 +300,10 @@ class RunResult(_Quantities):
     verdict: str = field(kw_only=True)
     reasons: tuple[str, ...] = field(kw_only=True)
     gates: tuple[GatePassage, ...] = field(kw_only=True)
+    session: str = field(kw_only=True, default="")
 
     @classmethod
-    def _of(cls, one: DropResult) -> RunResult:
+    def _of(cls, one: DropResult, session: str = "") -> RunResult:
         return cls(
             one.quantities,
             run=one.run.number,
@@ -258,6 +313,7 @@ class RunResult(_Quantities):
             verdict=one.verdict,
             reasons=tuple(reason.text for reason in one.reasons),
             gates=one.gates,
+            session=session,
         )
 
     @property
@@ -315,7 +371,7 @@ class MeanResult(_Quantities):
 
 
 class Results:
-    """What a session says.
+    """What a session says, or several together.
 
     Attributes
     ----------
@@ -325,10 +381,12 @@ class Results:
         Means, in order of incline.
     """
 
-    def __init__(self, found: SessionResults) -> None:
+    def __init__(self, found: SessionResults | TogetherResults) -> None:
         self._found = found
-        self.runs = tuple(RunResult._of(one) for one in found.analysis.runs)
-        self.summary = tuple(MeanResult._of(one) for one in found.analysis.summary)
+        self.runs = tuple(
+            RunResult._of(run, name) for name, part in found.analyses() for run in part.runs
+        )
+        self.summary = tuple(MeanResult._of(line) for line in found.summary)
 
     def json(self) -> dict[str, Any]:
         """Return what `rig analyze --json` prints."""
@@ -355,8 +413,8 @@ class Results:
 
     def __str__(self) -> str:
         stamp = "SIMULATED DATA\n" if self._found.simulated else ""
-        analysis = self._found.analysis
-        return "\n".join([stamp + summary_table(analysis.summary), *analysis.damage])
+        damage = [line for _, analysis in self._found.analyses() for line in analysis.damage]
+        return "\n".join([stamp + summary_table(self._found.summary), *damage])
 
     def __repr__(self) -> str:
         good = sum(run.verdict in GOOD for run in self.runs)

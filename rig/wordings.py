@@ -531,6 +531,27 @@ WORDINGS: dict[str, Wording] = {
         "a session needs a folder you may write to; copy it to one, or only read it"),
     "session_in_use": _void("{path} is being written by {holder}",
         "stop that program first, use its daemon, or open the session read-only"),
+    # Several sessions together.
+    "sessions_unlike": _void(
+        "{path} has another kind of scene, or other priors, than {other}",
+        "add and compare sessions of one kind of scene and of like `priors`"),
+    "sessions_disagree": _void(
+        "no joint fit holds for {names}: they do not have the same rig",
+        "tell rigs apart with --no-same-rig, or analyse each session by itself"),
+    "option_for_one_session": _void(
+        "{options}: for one session only", "name one session, or leave these options out"),
+    "session_repeated": _void(
+        "{path} repeats {other}: {drops} drops are the same",
+        "name each session once; a copy and its original are one session"),
+    "session_blind": _void(
+        "{path} is blind, as its protocol says: its numbers are kept back",
+        "when all drops are judged, once and for good: rig unblind {path}"),
+    "records_damaged": _void("{path} has {records}", _RECOVER),
+    "session_unfinished": _void(
+        "{path} is unfinished: {missing} of {planned} planned runs are not recorded",
+        "continue it with rig run, or accept what there is with --unfinished"),
+    "session_no_results": _void(
+        "{path} has no good run", "rig analyze {path} says why its runs do not count"),
     "session_two_names": _void("{path} has a second name (a hard link)",
         "both would be written at once: copy it to a new file, and use that file"),
     "session_there": _void(

@@ -158,7 +158,7 @@ class Dials:
 
 
 _NAMES = tuple(field.name for field in fields(Dials))
-_OF_THE_URL = ("dynamics", "pace", "seed", "truth")  # no disturbances, and read by the scene
+_OF_THE_URL = ("dynamics", "pace", "seed", "series", "truth")  # no disturbances, read by the scene
 
 
 def known(dial: float, stated: float) -> float:

@@ -89,6 +89,8 @@ class ChainLab:
     ----------
     filmed
         Whether the truth says how every rod moved, where that is known: it is much to say.
+    series
+        Which drops of the same rig: those of another series are others.
 
     Raises
     ------
@@ -109,6 +111,7 @@ class ChainLab:
         self.dials = dials = dials.on(protocol, self._share)
         self.tell = tell
         self.filmed = False
+        self.series = 0
         self.runs = {run.number: run for run in runs(protocol)}
         self.gates = protocol.gates.gates if protocol.gates else ()
         rig = self._rng("rig")
@@ -163,6 +166,11 @@ class ChainLab:
         """Give each thing that is drawn a stream of its own."""
         digest = hashlib.sha256(repr((self.seed, *what)).encode()).digest()
         return np.random.default_rng(int.from_bytes(digest[:16], "little"))
+
+    def _drop_rng(self, what: str, run: Run, attempt: int, *side: Side) -> np.random.Generator:
+        """Give what is drawn anew in each drop a stream of its own."""
+        series = (self.series,) if self.series else ()
+        return self._rng(what, *side, run.number, attempt, *series)
 
     def _body(self, spec: RodChain) -> Body:
         rng = self._rng("chain", spec.name)
@@ -232,7 +240,7 @@ class ChainLab:
         return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
 
     def _hung(self, run: Run, attempt: int) -> Hung:
-        rng = self._rng("drop", run.number, attempt)
+        rng = self._drop_rng("drop", run, attempt)
         dials = self.dials
         release = dials.delay + dials.delay_sd * float(rng.normal())
         skew = dials.skew_sd * float(rng.normal())
@@ -332,7 +340,7 @@ class ChainLab:
         truth.fall_time_s = path.hits[-1].time_s
         # The top rod falls on, from where it passes the level or not so far.
         above = self.protocol.contact.strike.value + self._contact(run)
-        above += self.dials.strike_sd * float(self._rng("strike", run.number, attempt).normal())
+        above += self.dials.strike_sd * float(self._drop_rng("strike", run, attempt).normal())
         late, truth.speed_strike_m_s = path.last_at(above)
         if "free" not in paths:
             return truth

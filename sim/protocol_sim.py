@@ -4,7 +4,7 @@
 ``sim://?protocol=protocols/inclined-uniform.yaml&seed=3&missed=2%25&skew_sd=4ms``. ``quiet=1``
 switches all disturbances off. The truth file gets one line of JSON a drop. With
 ``dynamics=resolved`` chains fall in the resolved world; its drops are made a dozen at a time, for
-which the first of them waits some seconds.
+which the first of them waits some seconds. ``series=1`` has other drops fall on the rig of a seed.
 """
 
 from __future__ import annotations

@@ -171,7 +171,7 @@ class ResolvedLab(ChainLab):
 
     def _make(self, label: int) -> dict[str, Any]:
         """Find a drop on the disk, or let its chains fall."""
-        name = fall_cache.key(self._key, self.filmed, label)
+        name = fall_cache.key(self._key, self.filmed, self.series, label)
         made: dict[str, Any] | None = fall_cache.load(name)
         if made is None:
             chains = self._checked(label)
@@ -249,7 +249,7 @@ class ResolvedLab(ChainLab):
         world, body = self.world, self.bodies[name]
         nominal = self._nominal(body.spec)
         own = self._rng("tilts", name)
-        now = self._rng("hung", side, run.number, attempt)
+        now = self._drop_rng("hung", run, attempt, side)
         count = nominal.masses.size
         tilts = nominal.tilts + math.radians(world.tilt_sd) * own.normal(size=count)
         yaws = math.radians(world.yaw_sd) * now.normal(size=count)
@@ -288,7 +288,7 @@ class ResolvedLab(ChainLab):
     def _seen(self, label: int, falls: dict[Side, Fall]) -> dict[str, Any]:
         """Keep of a drop's falls what beams and truth need."""
         run, attempt = self._run(label)
-        aside = self._rng("centre", run.number, attempt).normal(size=2) * self.world.off_centre_sd
+        aside = self._drop_rng("centre", run, attempt).normal(size=2) * self.world.off_centre_sd
         seen: dict[str, list[tuple[float, float, int]]] = {}
         for gate in self.gates:
             if gate.side not in falls:
@@ -351,7 +351,7 @@ class ResolvedLab(ChainLab):
             lambda t: float(np.interp(t, struck.times, struck.heights[:, -1])),
             lambda t: free_top(t - skew),
             struck.strike_s,
-            self._rng("camera", run.number, attempt),
+            self._drop_rng("camera", run, attempt),
         )
         return truth
 

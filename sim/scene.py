@@ -81,7 +81,7 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     scheme
         Of the URL, for messages.
     settings
-        ``protocol``, and perhaps ``seed``, ``truth``, ``pace`` and dials.
+        ``protocol``, and perhaps ``seed``, ``series``, ``truth``, ``pace`` and dials.
 
     Raises
     ------
@@ -96,6 +96,7 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
         )
     seed = _number(scheme, "seed", rest.pop("seed", "0"))
     pace = _number(scheme, "pace", rest.pop("pace", "0"))
+    series = _number(scheme, "series", rest.pop("series", "0"))
     truth = rest.pop("truth", "")
     hang, rest = choose_world(rest, scheme)
     dials = read_dials(rest, scheme)
@@ -107,7 +108,7 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
             append_truth(Path(truth), what)
 
     lab = hang(reader.read(source), dials, seed, tell)
-    lab.filmed = bool(truth)
+    lab.filmed, lab.series = bool(truth), series
     return Scene(lab, dials, seed, pace)
 
 

@@ -59,6 +59,12 @@ class DropModel:
         How much everything scatters; as the protocol states it if not given.
     sides
         Models of these same records: what was made of their trains need not be made again.
+
+    Attributes
+    ----------
+    owners
+        What follows the names of common unknowns, by whose they are, where not all drops that are
+        fitted together have the same rig: see `rig.analysis.several`.
     """
 
     def __init__(
@@ -80,6 +86,7 @@ class DropModel:
         self.clock_u: float = clock_u
         self.components: Components = components or stated(protocol)
         self.suspects: tuple[Unknown, ...] = ()
+        self.owners: Mapping[str, str] = {}
         made: dict[str, DropModel] = {role: one for one in sides for role in one.records}
         self.expected: dict[str, Expected] = {
             role: made[role].expected[role] if role in made else Expected.of(record, protocol)
@@ -148,6 +155,12 @@ class DropModel:
         }
         other.unknowns = Unknowns(other)
         other._paths = {}
+        return other
+
+    def owned(self, owners: Mapping[str, str]) -> DropModel:
+        """Return the same drop with its rig told from others."""
+        other = copy(self)
+        other.owners = owners
         return other
 
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:

@@ -215,8 +215,11 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
         Good drops, each adjusted by itself, or all of them before.
     """
     shared = SharedUnknowns(fit.model for fit in fits)
-    # One clock for all: its error is common, and as large as the least sure calibration allows.
-    clock_u = max(fit.model.clock_u for fit in fits)
+    # One clock a rig: its error is common, and as large as the least sure calibration allows.
+    clock_u: dict[str | None, float] = {}
+    for model in (fit.model for fit in fits):
+        rig = model.owners.get("rig")
+        clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
     drops = [_begin(fit, shared) for fit in fits]
     x = _average(drops, shared)
     beforehand = stated(fits[0].model.protocol)
@@ -227,7 +230,8 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
         sd = np.zeros(len(shared))
         for drop in drops:
             # Priors follow the scatter that was found, and impulses the α that was found.
-            drop.model = drop.model.informed(evidence.components, clock_u, drop.x)
+            rig = drop.model.owners.get("rig")
+            drop.model = drop.model.informed(evidence.components, clock_u[rig], drop.x)
             drop.x[drop.common] = x[drop.here]
             if round_ == _REMATCH:
                 drop.matches = match(drop.model, drop.x)

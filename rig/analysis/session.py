@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     Progress = Callable[[int, int], None]
 
 _EXPLAINED = 6  # void drops of a session, after which it is not sought what else the next ones are
-_KEPT = 0.9
+KEPT = 0.9
 """Share of its edges that a drop must keep among others: without them priors are all it has."""
 
 
@@ -259,7 +259,7 @@ def _fit_jointly(
         fewer = {
             n: make_reason("differs_from_session", words, matched=drop.matched, alone=fit.matched)
             for (n, fit), drop in zip(good.items(), joint.drops, strict=True)
-            if drop.matched < _KEPT * fit.matched
+            if drop.matched < KEPT * fit.matched
         }
         if 2 * len(fewer) > len(good):
             # It is the adjustment that fails, and no drop is to blame for that.
@@ -273,21 +273,28 @@ def _fit_jointly(
         return found, None, _good(found, good), unsettled
     budgets = Budgets(joint)
     for n, drop in zip(good, joint.drops, strict=True):
-        unmatched, measured = unmatched_edges(drop), budgets.measured(drop)
-        reasons = [one for one in found[n].reasons if not one.code.startswith("release_skew")]
-        reasons += release_reasons(protocol, measured)
-        found[n] = replace(
-            found[n],
-            verdict=verdict_of(reasons),
-            reasons=tuple(reasons),
-            audit=found[n].audit.count(drop.matched, count_unexplained(unmatched)),
-            quantities=measured,
-            gates=budgets.gates(drop),
-            matches=drop.rods,
-            alone=found[n].quantities,
-            unmatched=unmatched,
-        )
+        found[n] = joint_result(protocol, found[n], drop, budgets)
     return found, joint, _good(found, dict(zip(good, joint.drops, strict=True))), False
+
+
+def joint_result(
+    protocol: Protocol, result: DropResult, drop: JointDrop, budgets: Budgets
+) -> DropResult:
+    """Give a drop the numbers that it has in the light of all."""
+    unmatched, measured = unmatched_edges(drop), budgets.measured(drop)
+    reasons = [one for one in result.reasons if not one.code.startswith("release_skew")]
+    reasons += release_reasons(protocol, measured)
+    return replace(
+        result,
+        verdict=verdict_of(reasons),
+        reasons=tuple(reasons),
+        audit=result.audit.count(drop.matched, count_unexplained(unmatched)),
+        quantities=measured,
+        gates=budgets.gates(drop),
+        matches=drop.rods,
+        alone=result.alone or result.quantities,
+        unmatched=unmatched,
+    )
 
 
 def _good(

@@ -209,7 +209,7 @@ def _causes(runs: Sequence[Measured]) -> dict[str, float]:
 
 def mean(runs: Sequence[Measured]) -> Measured:
     """Mean of several runs: their scatter over √n, and what is common to all of them."""
-    common, each = _common(runs)
+    common, each = common_part(runs)
     # Of a run's u² what all share is taken out: averaging does not reduce it, and it is added last.
     variance = fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
     values, n = [run.value for run in runs], len(runs)
@@ -220,7 +220,7 @@ def mean(runs: Sequence[Measured]) -> Measured:
     return average(fmean(values), own, seen, n - 1.0, common, runs)
 
 
-def _common(runs: Sequence[Measured]) -> tuple[float, list[float]]:
+def common_part(runs: Sequence[Measured]) -> tuple[float, list[float]]:
     """What averaging leaves, of the mean and of each run.
 
     Runs of one session share errors with known signs, which may cancel where chains change places.

@@ -102,7 +102,8 @@ class Unknown:
         Whose it is: ``impact`` or ``free`` for what only that chain knows of, ``each`` where each
         chain has its own, ``all`` for what both have in common.
     shared
-        In which drops it is the same.
+        In which drops it is the same: those of a rig, of its posts, beams, chain or starting
+        height, of a condition, or one drop alone. Of several sessions see `DropModel.owners`.
     moves
         Which parameters of a side's trajectory it acts on, see `parameters`.
     path
@@ -122,7 +123,7 @@ class Unknown:
     line: str
     sd: Callable[[Side], float | Sequence[float] | Array | None]
     of: Literal["all", "each", "impact", "free"] = "all"
-    shared: Literal["rig", "chain", "condition", "drop"] = "drop"
+    shared: Literal["rig", "posts", "beams", "start", "chain", "condition", "drop"] = "drop"
     moves: str = ""
     path: Effect = lambda _side: np.ones(1)
     level: Effect | None = None
@@ -220,6 +221,7 @@ def _all(_: Side) -> float:
 
 
 _rig = partial(Unknown, shared="rig")
+_beams = partial(Unknown, shared="beams")
 _chain = partial(Unknown, of="each")
 _struck = partial(Unknown, of="impact")
 _stretch = partial(
@@ -245,7 +247,9 @@ TABLE = (
         lambda side: ANY_GRAVITY if side.protocol.surface is None else None,
         moves="gravity",
     ),
-    _rig("drop", "drop height", lambda side: side.protocol.drop.u, moves="start"),
+    Unknown(
+        "drop", "drop height", lambda side: side.protocol.drop.u, shared="start", moves="start"
+    ),
     _rig(
         "side",
         "side",
@@ -260,17 +264,21 @@ TABLE = (
         moves="drag",
         absent=lambda side: float(side.protocol.drag is None),
     ),
-    _rig(
-        "datum", "datum", lambda side: [side.gates.datum_u] * len(side.gates.posts), level=_by_post
+    Unknown(
+        "datum",
+        "datum",
+        lambda side: [side.gates.datum_u] * len(side.gates.posts),
+        shared="posts",
+        level=_by_post,
     ),
-    _rig(
+    _beams(
         "beams",
         "beam heights",
         lambda side: [side.gates.height_u] * len(side.gates.gates),
         level=_by_gate,
         scale="gates",
     ),
-    _rig("ripple", "beam offsets", _ripple_sd, level=_rippled, scale="beam"),
+    _beams("ripple", "beam offsets", _ripple_sd, level=_rippled, scale="beam"),
     _chain(  # Told by the edges alone, so its uncertainty counts as theirs.
         "release", "edges", lambda _: ANYTHING, moves="release"
     ),
@@ -518,10 +526,13 @@ def _common(model: DropModel) -> dict[str, str]:
     """Return the names of a drop's common blocks in its own vector, by those they have for all."""
     names: dict[str, str] = {}
     for own, row in model.unknowns.rows.items():
-        if row.shared == "rig":
-            names[own] = own
-        elif row.shared == "chain":
-            names[f"{model.records[own.partition(' ')[0]].chain.name} {row.name}"] = own
+        if row.shared == "drop":
+            continue
+        name, owner = own, str(row.shared)
+        if row.shared == "chain":
+            chain = model.records[own.partition(" ")[0]].chain.name
+            name, owner = f"{chain} {row.name}", f"chain {chain}"
         elif row.shared == "condition":
-            names[f"{own} at {model.records['impact'].condition}"] = own
+            name = f"{own} at {model.records['impact'].condition}"
+        names[name + model.owners.get(owner, "")] = own
     return names

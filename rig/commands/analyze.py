@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Compute the results of a session."""
+    if arguments.others:
+        from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
+
+        return analyze_together(arguments)
     if arguments.budget is not None:
         from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.report.attachments import Attachment
+    from rig.report.chapters import Chapter
     from rig.report.embed import PageFigure
     from rig.report.parts import Part
     from rig.report.timeline import Timeline
@@ -86,10 +87,22 @@ def report_html(context: ReportContext) -> str:
     context
         What to say. All text is escaped; figures are trusted.
     """
-    title = escape(context.title)
-    stamp = '<p class="stamp">SIMULATED DATA</p>' if context.simulated else ""
-    mark = "SIMULATED – " if context.simulated else ""
-    made = chapters(context)
+    return page_html(context.title, chapters(context), simulated=context.simulated)
+
+
+def page_html(heading: str, made: Sequence[Chapter], *, simulated: bool) -> str:
+    """Return a page of chapters.
+
+    Parameters
+    ----------
+    heading
+        Of the page, which is escaped; chapters are trusted.
+    simulated
+        Whether to stamp the page.
+    """
+    title = escape(heading)
+    stamp = '<p class="stamp">SIMULATED DATA</p>' if simulated else ""
+    mark = "SIMULATED – " if simulated else ""
     links = "".join(f'<li><a href="#{one.anchor}">{one.heading}</a></li>' for one in made)
     body = "\n".join(
         f'<section id="{one.anchor}" aria-labelledby="{one.anchor}-h">'

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.session import Analysis
 from rig.errors import SessionError
 from rig.measurands import RELEASE_SKEW
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from rig.analysis.result import DropResult
@@ -34,10 +35,7 @@ def check_open(session: Reader, protocol: Protocol) -> None:
         The session is blind.
     """
     if kept_back(session, protocol):
-        raise SessionError(
-            f"{session.path} is blind, as its protocol says: its numbers are kept back",
-            f"when all drops are judged, once and for good: rig unblind {session.path}",
-        )
+        raise make_error(SessionError, "session_blind", path=str(session.path))
 
 
 def veiled_drop(result: DropResult) -> DropResult:

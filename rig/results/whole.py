@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
+    from rig.analysis.summary import Incline
     from rig.clock.calibration import Calibration
     from rig.protocol.protocol import Protocol
     from rig.reasons import Reason
@@ -87,6 +88,15 @@ class SessionResults:
     def calibration(self) -> dict[str, Any]:
         """``calibration`` of `json`: what is known of the clock, the free chain's word included."""
         return self.clock.said | _checked(self.clock.said["notes"], self.gravity)
+
+    @property
+    def summary(self) -> tuple[Incline, ...]:
+        """Means over the runs."""
+        return self.analysis.summary
+
+    def analyses(self) -> list[tuple[str, Analysis]]:
+        """Return the analysis of each session by its name, which alone needs none."""
+        return [("", self.analysis)]
 
     def records(self) -> list[dict[str, Any]]:
         """Return each drop as JSON has it, those with a later attempt last."""

@@ -31,8 +31,9 @@ def here(finished, tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.usefixtures("here")
-def test_the_page_can_be_typed_in():
+def test_the_page_can_be_typed_in(here, call):
+    other = "--session", here / "other.session"
+    assert call("run", here / "my-chains.yaml", "--port", "sim://?seed=2", *other).code == 0
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL)
     assert len(blocks) > 4
     exec("".join(blocks), {})

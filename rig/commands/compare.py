@@ -1,0 +1,74 @@
+"""``rig compare``."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.output import VOID, print_json, progress, say, show
+from rig.errors import InputError
+from rig.files import check_place, write_atomic
+from rig.reasons import make_error
+from rig.report.canvas import write_figure
+from rig.report.comparison import (
+    comparison_page,
+    difference_lines,
+    draw_comparison,
+    pooled_lines,
+)
+from rig.results.together import results_together
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from rig.results.together import TogetherResults
+
+
+def main(arguments: Namespace) -> int:
+    """Compare sessions with the first of them."""
+    if arguments.output is not None:
+        check_place(arguments.output)
+    found = read_together(arguments)
+    if arguments.json:
+        print_json(found.comparison_json())
+    else:
+        show(difference_lines(found))
+    if arguments.output is not None:
+        path = Path(arguments.output)
+        if path.suffix in {".html", ".htm"}:
+            write_atomic(path, comparison_page(found))
+        else:
+            write_figure(path, draw_comparison(found))
+        say(f"comparison: {path}")
+    return 0
+
+
+def analyze_together(arguments: Namespace) -> int:
+    """Print the results of several sessions in one joint fit, as ``rig analyze A B`` does."""
+    alone = ("budget", "video", "session_trials", "priors", "scatter")
+    if options := [name for name in alone if getattr(arguments, name) not in {None, False}]:
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in options)
+        raise make_error(InputError, "option_for_one_session", options=names)
+    found = read_together(arguments)
+    if arguments.json:
+        print_json(found.json())
+    else:
+        show(pooled_lines(found))
+    return VOID if found.void else 0
+
+
+def read_together(arguments: Namespace) -> TogetherResults:
+    """Analyse the sessions of a command line together."""
+    with ExitStack() as open_files:
+        files = [
+            open_files.enter_context(Session.open(path, readonly=True))
+            for path in (arguments.session, *arguments.others)
+        ]
+        return results_together(
+            files,
+            same_rig=arguments.same_rig,
+            unfinished=arguments.unfinished,
+            progress=progress("analysing run"),
+        )

@@ -1,0 +1,260 @@
+"""Several sessions as one: their results in one joint fit, and what they differ by.
+
+Each session counts once, and is finished, undamaged, unblinded and of the same kind of scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+from rig.analysis.differences import difference
+from rig.analysis.result import GOOD
+from rig.analysis.several import SessionPart, fit_sessions
+from rig.analysis.summary import good_cases
+from rig.errors import InputError
+from rig.measurands import averaged
+from rig.protocol.plan import runs as planned_runs
+from rig.reasons import make_error
+from rig.results.blind import check_open
+from rig.results.whole import protocol_of, results
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.session import Analysis, Progress
+    from rig.analysis.several import SessionsFit
+    from rig.analysis.summary import Incline
+    from rig.protocol.protocol import Condition
+    from rig.results.whole import SessionResults
+    from rig.session.reading import Reader
+
+
+@dataclass(frozen=True, slots=True)
+class MeanDifference:
+    """A session's mean less that of the reference, the first of the sessions.
+
+    Attributes
+    ----------
+    quantity
+        JSON name of the measurand.
+    session, reference
+        Names of the sessions.
+    condition, reference_condition
+        Of their runs.
+    value
+        Of the difference, with its uncertainty.
+    """
+
+    quantity: str
+    session: str
+    reference: str
+    condition: Condition
+    reference_condition: Condition
+    value: Measured
+
+    def json(self) -> dict[str, Any]:
+        """One member of ``differences``."""
+        return {
+            "session": self.session,
+            "reference": self.reference,
+            **self.condition.json(),
+            "quantity": self.quantity,
+            **self.value.json(),
+            "normalized_error": self.value.normalized_error,
+            "budget": dict(self.value.budget),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class TogetherResults:
+    """All that follows from several sessions.
+
+    Attributes
+    ----------
+    sessions
+        What each says by itself, by name, in the order given.
+    fit
+        Of all.
+    """
+
+    sessions: Mapping[str, SessionResults]
+    fit: SessionsFit
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any of the sessions is simulated."""
+        return any(one.simulated for one in self.sessions.values())
+
+    @property
+    def summary(self) -> tuple[Incline, ...]:
+        """Means over the runs of all sessions of a scene."""
+        return tuple(line for scene in self.fit.pooled for line in scene.summary)
+
+    def analyses(self) -> list[tuple[str, Analysis]]:
+        """Return the analysis of each session, in the light of all, by its name."""
+        return [(part.name, part.analysis) for part in self.fit.parts]
+
+    @property
+    def void(self) -> bool:
+        """Whether any run is void."""
+        return any(run.verdict == "void" for _, one in self.analyses() for run in one.runs)
+
+    def json(self) -> dict[str, Any]:
+        """As ``rig analyze A B --json`` prints it."""
+        joint = self.fit.joint
+        return {
+            "simulated": self.simulated,
+            "sessions": [
+                {"session": name, "simulated": one.simulated, "calibration": one.calibration}
+                for name, one in self.sessions.items()
+            ],
+            "shared": self._shared(),
+            "runs": [
+                {"session": name, **run.json()}
+                for name, analysis in self.analyses()
+                for run in analysis.runs
+            ],
+            "summary": [
+                {"sessions": list(scene.sessions), **line.json()}
+                for scene in self.fit.pooled
+                for line in scene.summary
+            ],
+            **({} if joint is None else {"learned": joint.json()}),
+        }
+
+    def _shared(self) -> list[dict[str, Any]]:
+        return [
+            {"what": owner, "sessions": [list(group) for group in groups]}
+            for owner, groups in self.fit.shared.items()
+        ]
+
+    def comparison_json(self) -> dict[str, Any]:
+        """As ``rig compare --json`` prints it."""
+        return {
+            "simulated": self.simulated,
+            "shared": self._shared(),
+            "means": [
+                {"session": part.name, **line.json()}
+                for part in self.fit.parts
+                for line in part.analysis.summary
+            ],
+            "differences": [one.json() for one in self.differences()],
+        }
+
+    def differences(self) -> list[MeanDifference]:
+        """Return each session's means less those of the first, where both have the condition.
+
+        Chains need not have the same names to be compared: where no condition is alike, means of
+        the same incline are, in their order.
+        """
+        first, *others = self.fit.parts
+        reference = _cases(first)
+        return [
+            MeanDifference(name, part.name, first.name, condition, beside, value)
+            for part in others
+            for condition, beside, runs, reference_runs in _paired(_cases(part), reference)
+            for name, value in _differences(runs, reference_runs)
+        ]
+
+
+def _cases(part: SessionPart) -> dict[Condition, list[DropResult]]:
+    """Good runs of a session by condition."""
+    cases = good_cases(part.protocol, part.analysis.runs)
+    return {part.protocol.condition(case[0].run): case for case in cases}
+
+
+def _paired(
+    cases: Mapping[Condition, list[DropResult]], reference: Mapping[Condition, list[DropResult]]
+) -> Iterator[tuple[Condition, Condition, list[DropResult], list[DropResult]]]:
+    """Pair runs of like conditions."""
+    for condition, runs in cases.items():
+        like = [one for one in reference if one.incline_deg == condition.incline_deg]
+        same = [one for one in like if one.impact_chain == condition.impact_chain] or like
+        if len(same) == 1:
+            yield condition, same[0], runs, reference[same[0]]
+
+
+def _differences(
+    runs: Sequence[DropResult], reference: Sequence[DropResult]
+) -> Iterator[tuple[str, Measured]]:
+    """Differences of those measurands that all these runs have."""
+    for row in averaged():
+        if all(row.name in one.quantities for one in (*runs, *reference)):
+            sets = ([one.quantities[row.name] for one in some] for some in (runs, reference))
+            yield row.name, difference(*sets)
+
+
+def results_together(
+    files: Sequence[Reader],
+    *,
+    same_rig: bool | None = None,
+    unfinished: bool = False,
+    progress: Progress | None = None,
+) -> TogetherResults:
+    """Analyse several sessions in one joint fit.
+
+    Parameters
+    ----------
+    files
+        Open, for reading at least.
+    same_rig
+        See `rig.analysis.several.same_owners`.
+    unfinished
+        Whether planned runs may be missing.
+    progress
+        As for `rig.results.results`, for one session after the other.
+
+    Raises
+    ------
+    InputError, SessionError
+        A session cannot be added to the others.
+    """
+    _check_repeats(files)
+    names = _names(files)
+    parts, own = [], {}
+    for name, session in zip(names, files, strict=True):
+        protocol = protocol_of(session)
+        check_open(session, protocol)
+        own[name] = found = results(session, progress)
+        _check_whole(session, found, len(planned_runs(protocol)), unfinished=unfinished)
+        boards = [identity.get("unique_id", "") for _, identity in session.identities()]
+        parts.append(SessionPart(name, protocol, found.analysis, str(boards[-1] if boards else "")))
+    return TogetherResults(own, fit_sessions(parts, same_rig=same_rig))
+
+
+def _names(files: Sequence[Reader]) -> list[str]:
+    """Name sessions by their files, with folders where these do not tell them apart."""
+    names = [session.path.name for session in files]
+    return names if len(set(names)) == len(names) else [str(session.path) for session in files]
+
+
+def _check_repeats(files: Sequence[Reader]) -> None:
+    """Refuse to count drops more than once: a session named twice, its copy, or that continued."""
+    recorded = [
+        {(drop.tick_hz, drop.edges): drop.run for drop in session.drops() if drop.edges}
+        for session in files
+    ]
+    for one, other in combinations(range(len(files)), 2):
+        common = recorded[one].keys() & recorded[other].keys()
+        # Of few edges and a coarse timer single drops may happen to be alike.
+        if common and len(common) == min(len(recorded[one]), len(recorded[other])):
+            paths = {"path": str(files[other].path), "other": str(files[one].path)}
+            raise make_error(InputError, "session_repeated", **paths, drops=len(common))
+
+
+def _check_whole(session: Reader, found: SessionResults, planned: int, *, unfinished: bool) -> None:
+    """Refuse a session that is damaged, or lacks runs."""
+    path, runs = str(session.path), found.analysis.runs
+    if found.analysis.damaged:
+        records = "; ".join(found.analysis.damage)
+        raise make_error(InputError, "records_damaged", path=path, records=records)
+    missing = planned - len(runs)
+    if missing and not unfinished:
+        raise make_error(
+            InputError, "session_unfinished", path=path, missing=missing, planned=planned
+        )
+    if not any(run.verdict in GOOD for run in runs):
+        raise make_error(InputError, "session_no_results", path=path)

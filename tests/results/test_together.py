@@ -1,0 +1,172 @@
+"""Several sessions as one: what cancels, what is refused, and what each command says of them."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+
+import pytest
+
+import rig as door
+from rig.analysis.several import SessionPart, same_owners
+from rig.errors import InputError, SessionError
+from rig.protocol import reader
+from rig.results.together import results_together
+from rig.session.store import Session
+from tests.cli.conftest import call  # noqa: F401 - a fixture
+from tests.cli.lab import PROTOCOLS
+from tests.session.altering import unguarded
+
+SCENES = ("falling-ball", "picket-fence", "glider", "single-chain", "graded-chain")
+
+
+def record(folder, name, scene="picket-fence", seed=1, series=0, change=("", "")):
+    """Record a session of few simulated drops."""
+    from rig.cli import main
+
+    text = (PROTOCOLS / f"{scene}.yaml").read_text("utf-8")
+    text = re.sub(r"repeats: \d+", "repeats: 4", text)
+    text = re.sub(r"incline: \[[^]]*\]", "incline: [40 deg]", text).replace(*change)
+    protocol, session = folder / f"{name}.yaml", folder / f"{name}.session"
+    protocol.write_text(text, "utf-8")
+    port = f"sim://?stated=1&missed=0&seed={seed}&series={series}"
+    assert main(["run", str(protocol), "--port", port, "--session", str(session), "--yes"]) == 0
+    return session
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    """Two sessions of a fence, on two rigs."""
+    folder = tmp_path_factory.mktemp("two")
+    return record(folder, "a", seed=1), record(folder, "b", seed=2)
+
+
+def together(*paths, **options):
+    files = [Session.open(path, readonly=True) for path in paths]
+    try:
+        return results_together(files, **options)
+    finally:
+        for file in files:
+            file.close()
+
+
+def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call):  # noqa: F811
+    said = json.loads(call("analyze", *two, "--json").out)
+    assert [run["session"] for run in said["runs"]] == ["a.session"] * 4 + ["b.session"] * 4
+    (line,) = said["summary"]
+    assert line["sessions"] == ["a.session", "b.session"]
+    assert line["n"] == 8
+    values = [run["gravity_m_s2"]["value"] for run in said["runs"]]
+    assert line["gravity_m_s2"]["value"] == pytest.approx(sum(values) / 8)
+    assert said["learned"]["runs"] == 8
+
+
+def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
+    one = together(*two, same_rig=True).fit.joint.shared.blocks
+    each = together(*two, same_rig=False).fit.joint.shared.blocks
+    assert {"beams", "datum", "drop", "clock"} <= set(one)
+    assert {f"{name} ({place}.session)" for name in one for place in "ab"} == set(each)
+
+
+def test_errors_of_one_rig_cancel_in_the_difference_of_its_sessions(tmp_path):
+    first, other = (record(tmp_path, f"s{n}", series=n) for n in (1, 2))
+    (cancelled,) = together(first, other, same_rig=True).differences()
+    (whole,) = together(first, other, same_rig=False).differences()
+    assert cancelled.value.budget["common"] < 0.1 * whole.value.budget["common"]
+    summary = together(first, other, same_rig=False).fit.parts
+    means = [part.analysis.summary[0].means["gravity_m_s2"] for part in summary]
+    assert whole.value.value == pytest.approx(means[1].value - means[0].value)
+    commons = [mean.budget["common"] for mean in means]
+    assert whole.value.budget["common"] == pytest.approx(sum(u**2 for u in commons) ** 0.5, rel=0.1)
+
+
+def test_of_one_rig_only_what_is_stated_alike_is_shared():
+    text = (PROTOCOLS / "inclined-uniform.yaml").read_text("utf-8")
+    moved = re.sub(r"height: 22 mm", "height: 23 mm", text, count=1)
+    assert moved != text
+    parts = [SessionPart(name, reader.parse(t), None) for name, t in (("a", text), ("b", moved))]
+    owners = same_owners(parts, same_rig=None)
+    assert owners["beams"] == [[0], [1]]
+    assert owners["posts"] == owners["chain A"] == owners["start"] == [[0, 1]]
+    titled = reader.parse(text.replace("title: ", "title: Other "))
+    parts[1] = SessionPart("b", titled, None)
+    assert same_owners(parts, same_rig=None)["posts"] == [[0], [1]]
+    assert same_owners(parts, same_rig=True)["posts"] == [[0, 1]]
+    parts[1] = SessionPart("b", parts[0].protocol, None, board="another")
+    assert same_owners(parts, same_rig=None)["posts"] == [[0], [1]]
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_scene_is_compared(tmp_path, call, scene):  # noqa: F811
+    first, other = (record(tmp_path, f"s{n}", scene, series=n) for n in (1, 2))
+    said = json.loads(call("compare", first, other, "--json").out)
+    assert said["differences"]
+    for row in said["differences"]:
+        assert row["reference"] == "s1.session"
+        assert row["normalized_error"] == pytest.approx(row["value"] / row["U95"])
+        assert abs(row["normalized_error"]) < 1.6
+    page = tmp_path / "page.html"
+    done = call("compare", first, other, "-o", page)
+    assert done.code == 0, done.err
+    assert "SIMULATED DATA" in done.out
+    assert "Differences of" in page.read_text("utf-8")
+    assert call("compare", first, other, "-o", tmp_path / "c.png").code == 0
+    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+
+
+def refused(code, kind, *paths, **options):
+    with pytest.raises(kind) as caught:
+        together(*paths, **options)
+    assert [reason.code for reason in caught.value.reasons] == [code]
+
+
+def test_a_session_and_its_copy_are_one(two, tmp_path):
+    copy = shutil.copy(two[0], tmp_path / "copy.session")
+    refused("session_repeated", InputError, two[0], two[1], two[0])
+    refused("session_repeated", InputError, two[0], copy)
+
+
+def test_another_scene_is_refused(two, tmp_path):
+    refused("sessions_unlike", InputError, two[0], record(tmp_path, "ball", "falling-ball"))
+
+
+def test_a_blind_session_is_refused(two, tmp_path, call):  # noqa: F811
+    blind = record(tmp_path, "blind", change=("protocol: 1\n", "protocol: 1\nblind: true\n"))
+    refused("session_blind", SessionError, two[1], blind)
+    for command in ("compare", "analyze"):
+        done = call(command, two[1], blind, "--json")
+        assert (done.code, done.out) == (2, "")
+
+
+def test_an_unfinished_session_is_refused_unless_it_is_asked_for(two, tmp_path):
+    more = tmp_path / "more.session"
+    with Session.open(record(tmp_path, "whole", seed=3), readonly=True) as whole:
+        first = next(whole.drops())
+        with Session.create(
+            more, whole.protocol_text, "more", simulated=True, origin="test"
+        ) as part:
+            part.add_drop(first)
+    refused("session_unfinished", InputError, two[0], more)
+    assert together(two[0], more, unfinished=True).differences()
+
+
+@pytest.mark.parametrize("sql", ['UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2'])
+def test_a_damaged_session_is_refused(two, tmp_path, sql):
+    copy = shutil.copy(two[0], tmp_path / "copy.session")
+    with unguarded(copy) as connection:
+        connection.execute(sql)
+    refused("records_damaged", InputError, two[1], copy)
+
+
+def test_options_of_one_session_are_refused(two, call):  # noqa: F811
+    done = call("analyze", *two, "--budget", "1")
+    assert done.code == 2
+    assert "--budget" in done.err
+
+
+def test_two_sessions_are_added_in_python(two):
+    with door.open(two[0]) as first, door.open(two[1]) as other:
+        found = (first + other).analyze()
+    assert [run.session for run in found.runs] == ["a.session"] * 4 + ["b.session"] * 4
+    assert found.summary[0].n == 8
