@@ -12,18 +12,19 @@ Values are in SI units, angles in degrees. A session is opened for reading; noth
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, optional_package
 from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS, SEPARATION
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
+from rig.report.chapters import summary_html
 from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
 from rig.results import calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
-from rig.session.export import flatten
+from rig.session.export import column_unit, result_tables
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -392,24 +393,37 @@ class Results:
         """Return what `rig analyze --json` prints."""
         return self._found.json()
 
-    def to_frame(self) -> Any:
-        """Return the runs as a pandas table, a row a run, columns as in `rig export`'s runs.csv.
+    def to_frame(self, table: Literal["runs", "summary", "gates"] = "runs") -> Any:
+        """Return a pandas table, with columns as in the files of `rig export`.
+
+        Parameters
+        ----------
+        table
+            ``runs``, a row a run; ``summary``, a row a mean; ``gates``, of one object a row for
+            each gate and run.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Its ``attrs`` have ``units``, by column, and ``simulated``.
 
         Raises
         ------
         InputError
             Where pandas is not installed.
         """
-        try:
-            import pandas as pd  # noqa: PLC0415 - only who wants a table needs it
-        except ImportError as error:
-            raise InputError("a table needs pandas", "pip install pandas") from error
-        left_out = {"budget", "causes"}
-        rows = [
-            flatten({key: value for key, value in run.items() if key not in left_out})
-            for run in self.json()["runs"]
-        ]
-        return pd.DataFrame(rows).set_index("run")
+        pd = optional_package("pandas")
+        latest = {key: value for key, value in self.json().items() if key != "superseded"}
+        frame = pd.DataFrame(result_tables(latest).get(table, []))
+        frame.attrs["units"] = {name: column_unit(name) for name in frame if column_unit(name)}
+        frame.attrs["simulated"] = self._found.simulated
+        index = [name for name in ("session", "run") if name in frame]
+        return frame.set_index(index) if table == "runs" and index else frame
+
+    def _repr_html_(self) -> str:
+        """Show the summary as notebooks do."""
+        stamp = "<p>SIMULATED DATA</p>" if self._found.simulated else ""
+        return stamp + summary_html(self._found.summary)
 
     def __str__(self) -> str:
         stamp = "SIMULATED DATA\n" if self._found.simulated else ""

@@ -538,6 +538,9 @@ WORDINGS: dict[str, Wording] = {
     "sessions_disagree": _void(
         "no joint fit holds for {names}: they do not have the same rig",
         "tell rigs apart with --no-same-rig, or analyse each session by itself"),
+    "package_absent": _void(
+        "this needs {package}, which is not installed",
+        "pip install 'chainrig[notebook]', or that package alone"),
     "option_for_one_session": _void(
         "{options}: for one session only", "name one session, or leave these options out"),
     "session_repeated": _void(

@@ -104,7 +104,6 @@ def test_all_that_a_session_needs_is_a_plain_dependency():
     packages = {"pyserial": "serial", "pyyaml": "yaml"}
     known = {packages.get(name, name) for name in named} | sys.stdlib_module_names
     known |= {"rig", "sim", "rich"}  # the last comes with Textual
-    known.add("pandas")  # a table for whoever has it
     files = [path for room in ("rig", "sim") for path in ROOT.glob(f"{room}/**/*.py")]
     assert set().union(*map(imported, files)) - known == set(OPTIONAL)
 

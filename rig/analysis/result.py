@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
-from rig.reasons import reasons_json
+from rig.errors import InputError
+from rig.reasons import make_error, reasons_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,6 +25,20 @@ if TYPE_CHECKING:
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
 """Verdicts that take part in a summary."""
+
+
+def optional_package(name: str) -> Any:
+    """Import a package of the extra ``notebook``.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        raise make_error(InputError, "package_absent", package=name) from error
 
 
 class Deviation(NamedTuple):
@@ -90,6 +106,16 @@ class Measured:
         """Expanded uncertainty for 95 %."""
         # Effective degrees of freedom may come out below one, where t has no quantile of use.
         return coverage_factor(max(1.0, self.degrees)) * self.u
+
+    def ufloat(self) -> Any:
+        """Return it for the package ``uncertainties``, as a number independent of all others.
+
+        Raises
+        ------
+        InputError
+            Where that package is not installed.
+        """
+        return optional_package("uncertainties").ufloat(self.value, self.u)
 
     def json(self) -> dict[str, float]:
         """``{"value", "u", "U95"}``."""

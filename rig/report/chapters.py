@@ -97,18 +97,24 @@ def _results(context: ReportContext) -> str:
     return _figures(context, "results") + (summary or "")
 
 
-def _summary(analysis: Analysis) -> str:
-    lines = analysis.summary
-    if not lines:
-        good = any(drop.verdict in GOOD for drop in analysis.runs)
-        reason = "No mean can be given." if good else "No accepted runs, so no summary."
-        return paragraphs([reason], "")
+def summary_html(lines: Sequence[Incline]) -> str:
+    """Return the tables of the means of each measurand."""
     html = ""
     for row in averaged():
         those = [line for line in lines if row.name in line.means]
         if those:
             html += f"<h3>{escape(_titled(row))}</h3>"
             html += table(f"Means of {row.symbol}", summary_columns(row), those)
+    return html
+
+
+def _summary(analysis: Analysis) -> str:
+    lines = analysis.summary
+    if not lines:
+        good = any(drop.verdict in GOOD for drop in analysis.runs)
+        reason = "No mean can be given." if good else "No accepted runs, so no summary."
+        return paragraphs([reason], "")
+    html = summary_html(lines)
     note = "n is the number of runs that count, U the expanded uncertainty of their mean (95 %)."
     if any(line.normalized_error(name) is not None for line in lines for name in line.means):
         note += (

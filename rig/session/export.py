@@ -82,6 +82,24 @@ def csv_files(
     dict
         Texts by file name.
     """
+    tables = {f"{name}.csv": rows for name, rows in result_tables(analysis).items()}
+    tables["states.csv"] = [
+        {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
+    ]
+    tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
+    made = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
+    made["edges.csv"] = edges_text(session.latest_drops(), tick_hz)
+    return made | {"README.txt": _readme(session, tables)}
+
+
+def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Spread results over the rows of tables: ``runs``, ``summary``, ``budget``, ``gates``.
+
+    Parameters
+    ----------
+    analysis
+        What ``rig analyze --json`` prints. Without gates' passages there is no table of them.
+    """
     latest, superseded = analysis.get("runs", []), analysis.get("superseded", [])
     # Where nothing is struck, nothing is inclined either.
     struck = any(run.get("impact_chain", "") is not None for run in (*latest, *superseded))
@@ -90,35 +108,33 @@ def csv_files(
     def row(record: Mapping[str, Any]) -> dict[str, object]:
         return flatten({key: record[key] for key in record if key not in no_columns})
 
+    def names(run: Mapping[str, Any]) -> dict[str, object]:
+        return {key: run[key] for key in ("session", "run", "attempt") if key in run}
+
     runs = [row(run) for run in latest]
     if superseded:
         runs = [{**run, "superseded": 0} for run in runs]
         runs += [{**row(run), "superseded": 1} for run in superseded]
         runs.sort(key=lambda run: (run.get("run", 0), run.get("attempt", 0)))
     tables = {
-        "runs.csv": runs,
-        "summary.csv": [row(line) for line in analysis.get("summary", [])],
-        "budget.csv": [
-            {"run": run["run"], "attempt": run["attempt"]}
-            | {"quantity": line["quantity"], "source": line["name"], "u": line["u"]}
+        "runs": runs,
+        "summary": [row(line) for line in analysis.get("summary", [])],
+        "budget": [
+            names(run) | {"quantity": line["quantity"], "source": line["name"], "u": line["u"]}
             for run in (*latest, *superseded)
             for line in run.get("budget", [])
         ],
-        "states.csv": [
-            {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
+        "gates": [
+            {**names(run), **flatten(gate)} for run in latest for gate in run.get("gates", ())
         ],
-        "pings.csv": [ping._asdict() for ping in session.pings()],
     }
-    gates = [
-        {"run": run["run"], "attempt": run["attempt"], **flatten(gate)}
-        for run in latest
-        for gate in run.get("gates", ())
-    ]
-    if gates:
-        tables["gates.csv"] = gates
-    made = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
-    made["edges.csv"] = edges_text(session.latest_drops(), tick_hz)
-    return made | {"README.txt": _readme(session, tables)}
+    return tables if tables["gates"] else {n: rows for n, rows in tables.items() if n != "gates"}
+
+
+def column_unit(column: str) -> str:
+    """Return the unit of a table's column, by the end of its name; empty where there is none."""
+    name = column.removesuffix("_U95").removesuffix("_u")
+    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
 
 
 def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
@@ -169,10 +185,8 @@ def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]
 
 def describe_column(table: str, column: str) -> tuple[str, str]:
     """Return a column's unit and its meaning, each empty where there is none."""
-    quantity = column.removesuffix("_u").removesuffix("_U95")
-    unit = next((unit for end, unit in _UNITS.items() if quantity.endswith(end)), "")
     meanings = _meanings()
-    return unit, meanings.get(f"{table}: {column}", meanings.get(column, ""))
+    return column_unit(column), meanings.get(f"{table}: {column}", meanings.get(column, ""))
 
 
 def _describe(table: str, column: str) -> str:

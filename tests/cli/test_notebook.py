@@ -1,0 +1,71 @@
+"""Tables and numbers for notebooks, of one session and of several."""
+
+from __future__ import annotations
+
+import csv
+import sys
+
+import pytest
+
+import rig
+from rig.errors import InputError
+from rig.session.export import column_unit
+from tests.cli.lab import PROTOCOLS
+
+
+@pytest.fixture
+def ball(call, tmp_path):
+    session = tmp_path / "ball.session"
+    port = "sim://?stated=1&seed=3"
+    done = call("run", PROTOCOLS / "falling-ball.yaml", "--port", port, "--session", session)
+    assert done.code == 0, done.err
+    return session
+
+
+@pytest.mark.parametrize("table", ["runs", "summary", "gates"])
+def test_a_frame_has_the_columns_of_the_exported_file_and_their_units(table, ball, call, tmp_path):
+    pytest.importorskip("pandas")
+    assert call("export", ball, "--csv", tmp_path).code == 0
+    with (tmp_path / f"{table}.csv").open(encoding="utf-8", newline="") as file:
+        rows = [*csv.DictReader(file)]
+    frame = rig.open(ball).analyze().to_frame(table)
+    assert frame.attrs["simulated"] is True
+    whole = frame.reset_index(drop=table != "runs")
+    assert set(whole) == set(rows[0])
+    for column, unit in frame.attrs["units"].items():
+        assert unit == column_unit(column)
+        values = [float(row[column]) for row in rows if row[column]]
+        assert whole[column].dropna().tolist() == pytest.approx(values)
+    assert "m/s²" in frame.attrs["units"].values() or table == "gates"
+
+
+def test_a_value_is_a_number_with_its_uncertainty(ball):
+    pytest.importorskip("uncertainties")
+    gravity = rig.open(ball).analyze().summary[0].gravity
+    twice = 2.0 * gravity.ufloat()
+    assert (twice.nominal_value, twice.std_dev) == pytest.approx((2 * gravity.value, 2 * gravity.u))
+
+
+def test_without_the_packages_it_says_which_ones(ball, monkeypatch):
+    for package in ("pandas", "uncertainties"):
+        monkeypatch.setitem(sys.modules, package, None)
+    found = rig.open(ball).analyze()
+    for ask, package in ((found.to_frame, "pandas"), (found.summary[0].gravity.ufloat, "unc")):
+        with pytest.raises(InputError, match=package) as caught:
+            ask()
+        assert [reason.code for reason in caught.value.reasons] == ["package_absent"]
+
+
+def test_a_notebook_shows_the_means(ball):
+    shown = rig.open(ball).analyze()._repr_html_()
+    assert "SIMULATED DATA" in shown
+    assert "<table>" in shown
+    assert "g ± U (m/s²)" in shown
+
+
+@pytest.mark.parametrize(
+    ("column", "unit"),
+    [("speed_m_s", "m/s"), ("speed_m_s_U95", "m/s"), ("gravity_m_s2_u", "m/s²"), ("n", "")],
+)
+def test_units_stand_at_the_end_of_names(column, unit):
+    assert column_unit(column) == unit
