@@ -181,12 +181,21 @@ class _Number(float):
         return format(self * 1e3, digits) + f" {unit}" if unit else float.__format__(self, digits)
 
 
+class _Count(int):
+    """A whole number that knows how many there are of a noun: ``1 run``, ``3 runs``."""
+
+    def __format__(self, spec: str) -> str:
+        noun = f" {spec}" + "s" * (self != 1) if len(spec) > 1 and spec.isalpha() else ""
+        return f"{int(self)}{noun}" if noun else int.__format__(self, spec)
+
+
 class _Phrases(dict[str, Any]):
     """What may stand in a sentence: values, words of the scene, and phrases made of both."""
 
     def __init__(self, values: Mapping[str, Any], words: Vocabulary) -> None:
         numbers = {n: _Number(v) for n, v in values.items() if isinstance(v, float)}
-        super().__init__({**values, **numbers})
+        counts = {n: _Count(v) for n, v in values.items() if type(v) is int}
+        super().__init__({**values, **numbers, **counts})
         self.words = words
 
     def __missing__(self, name: str) -> object:

@@ -371,16 +371,15 @@ WORDINGS: dict[str, Wording] = {
         "the file's inputs {inputs} are not the gates' channels {channels}",
         "say which is which: --map '{pairs}'"),
     "run_unplanned": _doubt(
-        "run {run} is not in the plan of {protocol}, which has {planned} runs",
+        "run {run} is not in the plan of {protocol}, which has {planned:run}",
         "raise plan.repeats, or number the runs as the plan does"),
     "several_readings": _doubt(
         "the file may be read in more than one way", "decide with {options}"),
     "no_reading_fits": _doubt(
-        "at most {share:.0f} % of the edges are where a fall of this protocol puts them, and the "
-        "file leaves open how to read it",
-        "is it the right protocol? otherwise decide with {options}, or with --as-read"),
+        "at most {share:.0f} % of a run's edges are where a fall of this protocol puts them",
+        "are protocol, unit, states and runs right? otherwise decide with {options}"),
     "more_edges": _doubt(
-        "run {run} has {count} edges at channel {channel}; the object makes at most {most}",
+        "run {run} has {count:edge} at channel {channel}; the object makes at most {most}",
         "say which input is which gate with --map, or take the file as it is with --as-read"),
     "one_wire": _doubt(
         "the file has a single input, with the edges of all gates",
@@ -389,16 +388,24 @@ WORDINGS: dict[str, Wording] = {
         "run {run}: two inputs change at the same time, {time_s:.6f} s from its first second",
         "is a row missing? otherwise take the file as it is with --as-read"),
     "rows_unused": _doubt(
-        "{unused} of {rows} rows unused: lines {lines}",
+        "{unused} of {rows:row} unused: lines {lines}",
         "--allow-unused leaves them out; --map says which input is which gate"),
+    "layout_unclear": _doubt(
+        "not how a file is read: {text}",
+        "accepted: unit (s, ms, us, ns), dark (high, low, states, inverted, turns, turns-clear, "
+        "each), groups (runs, gates, passing), pause_s (0 to 3600), channels ({{INPUT: CHANNEL}})"),
     "no_session_file": _doubt("no file is named", "--session FILE, or --dry-run to look first"),
     # What an import assumes of another timer's file.
     "samples": _remark(
         "sampled every {period_us:.4g} µs: an edge is known to {u_us:.3g} µs at best; state that "
         "as priors: {{jitter: ...}} in the protocol if it is more than 2 µs"),
-    "rows_used": _remark("{runs} runs, {rows} rows: {edges} edges; {silent} rows without a change"),
+    "rows_used": _remark("{runs:run}, {rows:row}: {edges:edge}; {silent:row} without a change"),
     "rows_left_out": _remark(
-        "{runs} runs, {rows} rows: {edges} edges; {unused} rows unused: lines {lines}"),
+        "{runs:run}, {rows:row}: {edges:edge}; {unused:row} unused: lines {lines}"),
+    "falls_fit": _remark("{runs:run}: {near} of {due:edge} where a fall puts them"),
+    "same_twice": _doubt(
+        "run {run} has the same times as run {other}",
+        "is it a copy? leave it out, or take the file as it is with --as-read"),
     "reading_chosen": _remark("read as {option}: {fit}"),
     "gates_absent": _remark("the file has nothing of the gates at channels {channels}"),
     "inputs_unused": _remark("inputs that are no gate: {inputs}; see --map"),
@@ -406,7 +413,7 @@ WORDINGS: dict[str, Wording] = {
     "columns_unused": _remark("not used: {columns}"),
     "no_passage": _remark("{input}: nothing passes, {low:.3g} to {high:.3g}"),
     "crossings": _remark("{input}: {crossings} crossings of {level:.3g}"),
-    "several_drops": _remark("split into {drops} drops at pauses longer than {pause_s:g} s"),
+    "several_drops": _remark("split into {drops:drop} at pauses longer than {pause_s:g} s"),
     "blocked_level": _remark(
         "assumed: a {level} signal is a blocked beam, because beams are clear at the beginning; "
         "--dark {other} reverses this"),

@@ -112,7 +112,9 @@ def read_with_protocol(
     if arguments.as_read:
         reading, fit = readings[0], FallMatch(0.0)
     else:
-        reading, fit = choose(readings, arguments.events, partial(fit_falls, protocol))
+        fit_drops = partial(fit_falls, protocol)
+        is_stated = "channels" in stated
+        reading, fit = choose(readings, arguments.events, fit_drops, is_stated=is_stated)
     if reading.layout.groups == "passing" and file.labels and "groups" not in stated:
         raise refusal(arguments.events, "one_wire", option=str(reading.layout))
     _account(file, reading, bars, arguments)
@@ -153,7 +155,11 @@ def _note_assumptions(file: TimerFile, reading: FileReading, passed: Sequence[in
 
 def _account(file: TimerFile, reading: FileReading, bars: int, arguments: Namespace) -> None:
     """Say what became of every row; refuse rows that are not used, and more edges than can be."""
+    alike: dict[object, int] = {}
     for drop in reading.drops:
+        other = alike.setdefault(drop.edges, drop.run)
+        if other != drop.run and not arguments.as_read:
+            raise refusal(arguments.events, "same_twice", run=drop.run, other=other)
         for channel, count in Counter(edge.channel for edge in drop.edges).items():
             if count > 2 * bars and not arguments.as_read:
                 excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
@@ -182,23 +188,24 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
     protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
-    share = near = received = expected = 0.0
+    shares, near, expected = [1.0], 0, 0
     evidence, gravity = 0.0, []
-    for drop in [drop for drop in drops if drop.run in planned][:_COMPARED]:
-        run, rate = planned[drop.run], TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
-        for record in chain_records(protocol, run, drop, TICK_HZ):
-            near += most_votes(protocol, record, rate.u, stated(protocol))
-            expected += record.expected
-        received += len(drop.edges)
-        if exact:
+    rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
+    for drop in [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]:
+        run = planned[drop.run]
+        records = chain_records(protocol, run, drop, TICK_HZ)
+        votes = sum(most_votes(protocol, record, rate.u, stated(protocol)) for record in records)
+        due = sum(record.expected for record in records)
+        shares.append(votes / max(1, len(drop.edges), due))
+        near, expected = near + votes, expected + due
+        if exact and len(gravity) < _COMPARED:
             result, fit = fit_drop(protocol, run, drop, rate, explain=False)
             evidence += log_evidence(fit) if fit else 0.0
             gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
-    share = min(1.0, 2.0 * near / max(1.0, received + expected))
-    text = f"{len(drops)} runs: {near:.0f} of {expected:.0f} edges where a fall puts them"
+    text = make_reason("falls_fit", runs=len(drops), near=near, due=expected).text
     if gravity:
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
-    return FallMatch(share, evidence, text)
+    return FallMatch(min(shares), evidence, text)
 
 
 def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:

@@ -36,12 +36,14 @@ _CLOSE = 0.1
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
-SETTINGS = ("unit", "dark", "groups", "pause_s")
-ACCEPTED = {
+_MOST_MAPS = 200
+
+_CHOICES = {
     "unit": ("", *POWERS),
-    "dark": ("high", "low", "states", "turns", "turns-clear", "each"),
+    "dark": ("high", "low", "states", "inverted", "turns", "turns-clear", "each"),
     "groups": ("runs", "gates", "passing"),
 }
+SETTINGS = (*_CHOICES, "pause_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +56,8 @@ class FileLayout:
         Of the times; empty where the file says it.
     dark
         Which level is that of a blocked beam, ``high`` or ``low``; ``states`` where the file says
-        when a beam is blocked; of times alone, whether the beam darkens and clears in turns, clears
-        first (``turns-clear``), or darkens at ``each``.
+        when a beam is blocked, ``inverted`` where it says the contrary; of times alone, whether the
+        beam darkens and clears in turns, clears first (``turns-clear``), or darkens at ``each``.
     groups
         Whether parts of the file are ``runs`` or ``gates``, or all gates stand in the order of the
         way (``passing``).
@@ -70,6 +72,16 @@ class FileLayout:
     groups: str = "runs"
     pause_s: float = 0.0
     channels: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def power(self) -> int:
+        """Decimal power of the unit, where the file does not say it."""
+        return POWERS.get(self.unit, 0)
+
+    @property
+    def is_contrary(self) -> bool:
+        """Whether it contradicts what the file says."""
+        return self.dark == "inverted"
 
     def __str__(self) -> str:
         settings = [
@@ -107,6 +119,11 @@ class FileReading(NamedTuple):
     lines: set[int]
 
     @property
+    def is_guess(self) -> bool:
+        """Whether the file does not say when a beam is blocked."""
+        return self.layout.dark not in {"states", "inverted"}
+
+    @property
     def is_whole(self) -> bool:
         """Whether beams that darken and clear in turns do both equally often."""
         counts = Counter((drop.run, edge.channel) for drop in self.drops for edge in drop.edges)
@@ -115,65 +132,48 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    power = POWERS[layout.unit] if layout.unit and not file.has_unit else 0
     runs: dict[int, list[Passage]] = {}
     for run, number in _runs(file, layout):
-        free = number if number and number not in runs else max(runs, default=0) + 1
-        runs[free] = run
+        runs[number if number and number not in runs else max(runs, default=0) + 1] = run
     drops, lines = [], set[int]()
     for number, run in sorted(runs.items()):
-        edges: list[Edge] = []
-        by_label: dict[str, list[Passage]] = {}
+        counts, edges = Counter[str](), []
         for passage in run:
-            by_label.setdefault(passage.label, []).append(passage)
-        for label, passages in by_label.items():
-            if label in layout.channels:
-                lines |= {passage.line for passage in passages}
-                for n, passage in enumerate(passages):
-                    tick = passage.tick // 10**power
-                    dark = _is_dark(passage, layout.dark, n)
-                    edges.append(Edge(tick, layout.channels[label], dark))
+            if passage.label in layout.channels:
+                dark = _is_dark(passage, layout.dark, counts[passage.label])
+                tick = passage.tick // 10**layout.power
+                edges.append(Edge(tick, layout.channels[passage.label], dark))
+                lines.add(passage.line)
+                counts[passage.label] += 1
         if edges:
             drops.append(drop_of(number, edges))
     return FileReading(layout, drops, lines)
 
 
 def _runs(file: TimerFile, layout: FileLayout) -> Iterable[tuple[list[Passage], int]]:
-    """Yield the passages of each run, with its number where the file says it."""
+    """Yield the passages of each run in order, with its number where the file says it."""
+    parts = [(group.passages, group.number) for group in file.groups]
     if layout.groups == "gates":
-        merged = [
-            passage._replace(label=passage.label or label)
-            for label, group in zip(part_names(file), file.groups, strict=True)
-            for passage in group.passages
-        ]
-        parts = [(merged, 0)]
-    else:
-        parts = [(group.passages, group.number) for group in file.groups]
+        names = zip(part_names(file), file.groups, strict=True)
+        parts = [([p._replace(label=p.label or name) for name, g in names for p in g.passages], 0)]
+    limit = round(layout.pause_s * TICK_HZ) * 10**layout.power
     for passages, number in parts:
         ordered = sorted(passages, key=lambda passage: passage.tick)
-        power = POWERS[layout.unit] if layout.unit and not file.has_unit else 0
-        limit = round(layout.pause_s * TICK_HZ) * 10**power or None
-        begin = 0
-        split = False
-        for n in range(1, len(ordered) + 1):
-            last = n == len(ordered)
-            if last or (limit and ordered[n].tick - ordered[n - 1].tick >= limit):
-                run = ordered[begin:n]
-                split |= not last
-                if layout.groups == "passing":
-                    size = max(1, len(run) // len(layout.channels))
-                    names = list(layout.channels)
-                    run = [
-                        p._replace(label=names[min(k // size, len(names) - 1)])
-                        for k, p in enumerate(run)
-                    ]
-                yield run, 0 if split else number
-                begin = n
+        gaps = [b.tick - a.tick for a, b in itertools.pairwise(ordered)]
+        cuts = [0, *(n for n, gap in enumerate(gaps, 1) if limit and gap >= limit), len(ordered)]
+        for begin, end in itertools.pairwise(cuts):
+            run = ordered[begin:end]
+            if layout.groups == "passing":
+                # As many passages at each gate, in the order of the way.
+                size, names_ = max(1, len(run) // len(layout.channels)), list(layout.channels)
+                last = len(names_) - 1
+                run = [p._replace(label=names_[min(k // size, last)]) for k, p in enumerate(run)]
+            yield run, number if len(cuts) == 2 else 0
 
 
 def _is_dark(passage: Passage, dark: str, n: int) -> bool:
     if passage.blocked is not None:
-        return passage.blocked
+        return passage.blocked is (dark != "inverted")
     if passage.high is not None:
         return passage.high is (dark != "low")
     return dark == "each" or (n % 2 == 0) is (dark != "turns-clear")
@@ -200,13 +200,14 @@ def find_layouts(
     stated
         What is decided: attributes of `FileLayout`.
     """
-    passages = [passage for group in file.groups for passage in group.passages]
     choices: dict[str, Sequence[Any]] = {
-        "unit": [""] if file.has_unit else list(POWERS),
-        "dark": _darkness(file, passages, bars),
+        "unit": list(POWERS),
+        "dark": _darkness(file, bars),
         "groups": _groupings(file, gates, bars),
     }
     choices |= {name: [value] for name, value in stated.items() if name in choices}
+    if file.has_unit:
+        choices["unit"] = [""]
     layouts = []
     for values in itertools.product(*choices.values()):
         layout = FileLayout(*values)
@@ -220,46 +221,36 @@ def find_layouts(
     return layouts
 
 
-def _darkness(file: TimerFile, passages: Sequence[Passage], bars: int) -> list[str]:
-    if any(passage.high is not None for passage in passages):
-        moved = {passage.label for passage in passages}
-        begins = [high for label, high in file.begins.items() if label in moved]
-        if not begins:  # the first edge of a beam darkens it
-            first: dict[tuple[int, str], bool] = {}
-            for n, group in enumerate(file.groups):
-                for passage in group.passages:
-                    first.setdefault((n, passage.label), passage.high is True)
-            starts = [not high for high in first.values()]
-        else:
-            starts = begins
-        order = ["low", "high"] if sum(starts) * 2 > len(starts) else ["high", "low"]
-        # A protocol has all beams clear before the release: where all inputs begin alike, that
-        # level is the clear one.
-        return order[:1] if begins and len(set(begins)) == 1 else order
-    if any(passage.blocked is None for passage in passages):
-        counts: dict[tuple[int, str], int] = {}
-        for n, group in enumerate(file.groups):
-            for passage in group.passages:
-                counts[n, passage.label] = counts.get((n, passage.label), 0) + 1
-        both = max(counts.values()) > bars
+def _darkness(file: TimerFile, bars: int) -> list[str]:
+    by_input = Counter[tuple[int, str]]()
+    first: dict[tuple[int, str], Passage] = {}
+    for n, group in enumerate(file.groups):
+        by_input.update((n, passage.label) for passage in group.passages)
+        first = {(n, passage.label): passage for passage in reversed(group.passages)} | first
+    if all(passage.blocked is not None for passage in first.values()):
+        return ["states", "inverted"]
+    if all(passage.high is None for passage in first.values()):
+        both = max(by_input.values()) > bars
         return ["turns", "turns-clear", "each"] if both else ["each", "turns", "turns-clear"]
-    return ["states"]
+    begins = [file.begins.get(label, not passage.high) for (_, label), passage in first.items()]
+    order = ["low", "high"] if sum(begins) * 2 > len(begins) else ["high", "low"]
+    # A protocol has all beams clear before the release: where all inputs begin alike, that level
+    # is the clear one.
+    return order[:1] if file.begins and len(set(begins)) == 1 else order
 
 
 def _is_part_a_gate(file: TimerFile) -> bool:
     """Whether each part of a file is of an input of its own."""
     labels = [{passage.label for passage in group.passages} for group in file.groups]
-    return "" not in set().union(*labels) and sum(map(len, labels)) == len(labels) == len(
-        file.labels
-    )
+    alone = all(len(part) == 1 and "" not in part for part in labels)
+    return alone and len(set().union(*labels)) == len(labels)
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    if len(file.groups) > 1 and _is_part_a_gate(file):
+    parts, named = len(file.groups), any(group.number for group in file.groups)
+    if parts > 1 and _is_part_a_gate(file):
         return ["gates", "runs"]
-    bare = not file.labels
-    named = any(group.number for group in file.groups)
-    if bare and 1 < len(file.groups) == len(gates) and not named:
+    if not file.labels and 1 < parts == len(gates) and not named:
         return ["runs", "gates"]
     single = len(file.labels) < 2 and bars == 1 and len(gates) > 1
     return ["runs", "passing"] if single else ["runs"]
@@ -268,13 +259,10 @@ def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
 def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     if layout.groups == "gates" or (len(file.groups) > 1 and layout.groups != "passing"):
         return [0.0]
-    scale = TICK_HZ * 10 ** (POWERS[layout.unit] if layout.unit and not file.has_unit else 0)
     for group in file.groups:
-        ticks = sorted(passage.tick for passage in group.passages)
-        pause = widest_pause([tick * TICK_HZ // scale for tick in ticks]) / TICK_HZ
-        if pause:
-            whole = (ticks[-1] - ticks[0]) / scale > MAX_SPAN_S
-            return [pause] if whole else [0.0, pause]
+        ticks = sorted(passage.tick // 10**layout.power for passage in group.passages)
+        if pause := widest_pause(ticks) / TICK_HZ:
+            return [pause] if ticks[-1] - ticks[0] > MAX_SPAN_S * TICK_HZ else [0.0, pause]
     return [0.0]
 
 
@@ -292,23 +280,23 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     if len(labels) == 1:
         return [by_number] if by_number else [{labels[0]: channel} for channel in gates]
     distinct = len({n for n in numbers.values() if n is not None}) == len(labels)
+    first = {p.label: p.tick for group in file.groups for p in reversed(group.passages)}
     ordered = sorted(labels, key=lambda label: numbers[label] or 0) if distinct else labels
-    maps = [dict(zip(ordered, chosen, strict=True))
-            for chosen in _assignments(sorted(gates), gates, len(labels))]  # fmt: skip
-    if by_number and len(labels) > len(gates):
-        maps.insert(0, by_number)
-    return maps
-
-
-def _assignments(ordered: Sequence[int], passed: Sequence[int], count: int) -> list[list[int]]:
-    """Return channels for inputs in order: by number, as they are passed, and the reverse."""
-    starts = range(len(ordered) - count + 1)
-    rows = [tuple(gates[n : n + count]) for gates in (ordered, passed) for n in starts]
-    return [list(row) for row in dict.fromkeys([*rows, *(row[::-1] for row in rows)])]
+    # In order of their numbers, or as they are passed first; and the reverse.
+    rows = [(ordered, chosen) for chosen in itertools.combinations(sorted(gates), len(labels))]
+    if len(labels) == len(gates):
+        rows += [(sorted(labels, key=lambda label: first.get(label, 0)), tuple(gates))]
+    rows += [(inputs, chosen[::-1]) for inputs, chosen in rows]
+    maps = [dict(zip(inputs, chosen, strict=True)) for inputs, chosen in rows[:_MOST_MAPS]]
+    return [by_number, *maps] if by_number and len(labels) > len(gates) else maps
 
 
 def choose(
-    readings: Sequence[FileReading], place: str, fit: Callable[[Sequence[Drop], bool], FallMatch]
+    readings: Sequence[FileReading],
+    place: str,
+    fit: Callable[[Sequence[Drop], bool], FallMatch],
+    *,
+    is_stated: bool,
 ) -> tuple[FileReading, FallMatch]:
     """Return the reading that a fall of the protocol bears out, and how well.
 
@@ -318,6 +306,9 @@ def choose(
         What a refusal begins with: the name of the file.
     fit
         Compares drops with falls; roughly, or with the evidence that weighs readings.
+    is_stated
+        Whether the user said which input is which gate: such a reading, if there is no other, is
+        taken whatever falls say.
 
     Raises
     ------
@@ -327,21 +318,26 @@ def choose(
     readings = [reading for reading in readings if reading.is_whole] or readings
     distinct = {repr(reading.drops): reading for reading in reversed(readings) if reading.drops}
     candidates = list(reversed(distinct.values()))
-    if len(candidates) == 1:
+    if is_stated and len(candidates) == 1:
         return candidates[0], fit(candidates[0].drops, True)
     rough = [(fit(reading.drops, False).share, reading) for reading in candidates]
     rough.sort(key=lambda row: -row[0])
     best = rough[0][0]
     near = [reading for share, reading in rough if share >= best - _CLOSE][:_FINALISTS]
     ranked = [(fit(reading.drops, True), reading) for reading in near]
-    ranked.sort(key=lambda row: (row[0].share < GOOD, -row[0].evidence))
+    # What the file says comes first: the contrary may be proposed, and is never taken.
+    ranked = [row for row in ranked if row[0].share >= GOOD and not row[1].layout.is_contrary]
+    ranked.sort(key=lambda row: -row[0].evidence)
+    if not ranked:
+        options = [str(reading.layout) for share, reading in rough if share >= GOOD]
+        options = options or [str(reading.layout) for _, reading in rough if reading.is_guess]
+        share = max(share for share, reading in rough if not reading.layout.is_contrary)
+        listed = "; ".join([*options[:3], "--as-read"])
+        raise refusal(place, "no_reading_fits", share=100 * share, options=listed)
     (first, reading), *rest = ranked
-    if best < GOOD or first.share < GOOD:
-        options = "; ".join(str(reading.layout) for _, reading in rough[:3])
-        raise refusal(place, "no_reading_fits", share=100 * best, options=options)
-    if rest and rest[0][0].share >= GOOD and first.evidence - rest[0][0].evidence < _DECISIVE:
-        options = " or ".join(str(row[1].layout) for row in ranked[:2])
-        raise refusal(place, "several_readings", options=options)
+    if rest and first.evidence - rest[0][0].evidence < _DECISIVE:
+        options = [str(row[1].layout) for row in ranked[:2]]
+        raise refusal(place, "several_readings", options=" or ".join(options))
     return reading, first
 
 
@@ -358,7 +354,7 @@ def read_layout(path: str) -> dict[str, Any]:
     except OSError as error:
         raise refusal(path, "unreadable", text=error.strerror or "") from error
     except (ValueError, RecursionError):
-        content = "this file"
+        content = None
     return check_layout(content, path)
 
 
@@ -370,31 +366,18 @@ def check_layout(content: object, place: str) -> dict[str, Any]:
     InputError
         Other settings, with what is accepted.
     """
-    accepted = {
-        **{name: f"accepted: {', '.join(filter(None, ACCEPTED[name]))}" for name in ACCEPTED},
-        "pause_s": "accepted: a number of seconds from 0 to 3600",
-        "channels": 'accepted: {"INPUT": CHANNEL}',
-    }
-    if not isinstance(content, dict):
-        listed = ", ".join(accepted)
-        values = {"text": str(content), "accepted": f"a mapping; accepted: {listed}"}
-        raise refusal(place, "not_accepted", **values)
-    for name, value in content.items():
-        if name in ACCEPTED:
-            good = value in ACCEPTED[name]
+    settings = content if isinstance(content, dict) else {"content": content}
+    for name, value in settings.items():
+        if name == "channels":
+            channels = value.values() if isinstance(value, dict) else [value]
+            good = all(type(channel) is int and 0 <= channel < GATES for channel in channels)
         elif name == "pause_s":
             good = type(value) in {int, float} and 0 <= value <= 3600
         else:
-            good = (
-                name == "channels"
-                and isinstance(value, dict)
-                and all(type(channel) is int and 0 <= channel < GATES for channel in value.values())
-            )
+            good = value in _CHOICES.get(name, ())
         if not good:
-            meant = accepted.get(name, f"accepted: {', '.join(accepted)}")
-            values = {"text": f"{name}: {value}", "accepted": f"a setting; {meant}"}
-            raise refusal(place, "not_accepted", **values)
-    return content
+            raise refusal(place, "layout_unclear", text=f"{name}: {value!s:.40}")
+    return settings
 
 
 def save_layout(layout: FileLayout, path: str) -> None:

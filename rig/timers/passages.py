@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import re
 from dataclasses import dataclass, field
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers.edges_csv import TICK_HZ, picoseconds
+from rig.timers.table import CLOCK
 from rig.timers.vocabulary import number_of, state_of
 
 if TYPE_CHECKING:
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from rig.timers.table import Row, RowBlock, Table
 
 _DAY_S = 86400
-_DATE = re.compile(
-    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]{1,15})?)"
-    r"(?:Z|[+-][0-9:]{4,6})?"
-)
 
 
 class Passage(NamedTuple):
@@ -146,7 +142,7 @@ class RowReader:
         number = self._whole(row, self._run)
         for stream in self._streams:
             text = row.cell(stream.time.at)
-            if not text or text.casefold() == "nan":
+            if not text:
                 continue
             label = stream.label if self._gate is None else row.cell(self._gate)
             key: tuple[object, ...] = (number, stream.run)
@@ -223,16 +219,22 @@ class RowReader:
 
 def moment(text: str, table: Table, power: int) -> int | None:
     """Read a time as picoseconds: a number, or a date with its time of day."""
-    match = _DATE.fullmatch(text)
+    match = CLOCK.fullmatch(text) if ":" in text else None
     if match is None:
         return picoseconds(table.with_point(text), -power)
-    try:
-        day = date.fromisoformat(match[1]).toordinal()
-    except ValueError:
-        return None
-    seconds = picoseconds(match[4])
-    assert seconds is not None
-    return ((day * 24 + int(match[2])) * 60 + int(match[3])) * 60 * TICK_HZ + seconds
+    first, mark, second, third, hours, minutes, rest = match.groups()
+    day, seconds = 0, picoseconds(rest.replace(",", "."))
+    if first:
+        # Only how many days lie between two times matters: which part is the year is enough.
+        parts = [int(first), int(second), int(third)]
+        year, month, of_month = parts if len(first) > 2 else parts[::-1]
+        if mark == "/" and parts[0] <= 12:
+            month, of_month = parts[0], parts[1]
+        try:
+            day = date(year, month, of_month).toordinal()
+        except ValueError:
+            return None
+    return ((day * 24 + int(hours or 0)) * 60 + int(minutes)) * 60 * TICK_HZ + (seconds or 0)
 
 
 def _is_yes(text: str, yes: str, no: str) -> bool | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.reasons import make_reason
 from rig.timers.columns import as_float, find_label
 from rig.timers.edges_csv import TICK_HZ
 from rig.timers.passages import Passage, moment
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.reasons import Reason
     from rig.timers.columns import TimerColumn
     from rig.timers.problems import ProblemList
     from rig.timers.table import RowBlock, Table
@@ -29,6 +32,9 @@ _NAMES = re.compile(r"channels\s?(?:\([0-9/ ]{1,12}\))?\s?:\s?(.{1,400})", re.IG
 _SETTING = re.compile(r"[=:]\s?([+-]?[0-9][0-9.]{0,30}(?:[eE][+-]?[0-9]{1,3})?)")
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
+LEVELS = {"high": 1.0, "one": 1.0, "low": 0.0, "zero": 0.0}
+_UNKNOWN = {"x", "z", ""}
+_ACCEPTED = {"time": "a time", "level": "a level: 0 or 1", "volts": "a number of volts"}
 _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
 
@@ -70,16 +76,18 @@ def _setting(block: RowBlock, role: str) -> float | None:
 class SampleReader:
     """Reads the inputs that stand beside each other in rows of samples.
 
+    A level is a signal of 0 and 1: it changes where a row has it otherwise than the row before.
+    Volts change where a straight line between two samples crosses the middle between dark and
+    bright; both sides of the hysteresis lie around it.
+
     Attributes
     ----------
     passages
         Of all inputs.
     begins
         The level that each input begins with.
-    crossings
-        Of volts: how many, and of which level, by input.
-    idle
-        Of volts where nothing passes: the least and the greatest, by input.
+    notes
+        What was seen of inputs in volts.
     step_s
         Between samples; 0 where they are not at regular times.
     """
@@ -89,50 +97,59 @@ class SampleReader:
     ) -> None:
         self.passages: list[Passage] = []
         self.begins: dict[str, bool] = {}
-        self.crossings: dict[str, tuple[int, float]] = {}
-        self.idle: dict[str, tuple[float, float]] = {}
+        self.notes: list[Reason] = []
         self._block, self._table, self._problems = block, table, problems
+        inputs = [column for column in columns if column.role in {"level", "volts"}]
         self._time = next((column for column in columns if column.role == "time"), None)
-        base = time_base(block, table)
-        rows = len(block.rows)
-        self._times: Array
-        if self._time is not None:
-            self._times = self._floats(self._time, "a time") * 10.0 ** -(self._time.power or 0)
-            for n in np.flatnonzero(np.diff(self._times) < 0.0)[:50].tolist():
-                line = block.rows[n + 1]
-                text = table.row(line).cell(self._time.at)
-                place = table.column(line, self._time.at)
-                problems.add(line, place, "time", "backwards", text=text)
-        elif base is not None:
-            self._times = base[0] + base[1] * np.arange(rows, dtype=np.float64)
-        else:
-            problems.refuse(block.rows[0], 1, "no_rate", lacks="a column of times or a rate")
-        steps = np.diff(self._times) if rows > 1 else np.zeros(1)
+        self._times = self._read_times()
+        steps = np.diff(self._times) if len(block.rows) > 1 else np.zeros(1)
         middle = float(np.median(steps))
         self.step_s = middle if float(steps.max()) < 1.5 * middle else 0.0
-        names = [c.name for c in columns]
-        for column in columns:
+        names = [column.name for column in columns]
+        samples = self._read_cells(inputs)
+        for column, values in zip(inputs, samples.T, strict=True):
             plain = names.count(column.name) > 1 or not find_label(column.name, "gate")
             label = column.gate if plain and column.gate else column.name
-            if column.role == "level":
-                self._read_levels(column, label)
-            elif column.role == "volts":
-                self._read_volts(column, label)
+            self._find_passages(label, values, column.role == "level")
 
-    def _floats(self, column: TimerColumn, accepted: str) -> Array:
-        table = self._table
+    def _read_times(self) -> Array:
+        block, table = self._block, self._table
+        base = time_base(block, table)
+        if self._time is not None:
+            times = self._read_cells([self._time])[:, 0]
+        elif base is not None:
+            return base[0] + base[1] * np.arange(len(block.rows), dtype=np.float64)
+        else:
+            self._problems.refuse(block.rows[0], 1, "no_rate", lacks="a column of times or a rate")
+        for n in np.flatnonzero(np.diff(times) < 0.0)[:50].tolist():
+            line = block.rows[n + 1]
+            place = table.column(line, self._time.at)
+            text = table.row(line).cell(self._time.at)
+            self._problems.add(line, place, "time", "backwards", text=text)
+        return times
 
-        def value(line: int) -> float:
-            text = table.row(line).cell(column.at)
-            if is_number(text):
-                return as_float(text, table)
-            time = moment(text, table, 0) if accepted == "a time" else None
-            if time is not None:
-                return time / TICK_HZ
-            self._problems.reject(line, table.column(line, column.at), accepted[2:], text, accepted)
-            return 0.0
+    def _read_cells(self, columns: Sequence[TimerColumn]) -> Array:
+        """Return columns as numbers, shape ``(rows, columns)``; times in s."""
+        values = (
+            self._read_cell(column, row)
+            for row in map(self._table.row, self._block.rows)
+            for column in columns
+        )
+        count = len(self._block.rows) * len(columns)
+        return np.fromiter(values, float, count).reshape(-1, len(columns))
 
-        return np.fromiter(map(value, self._block.rows), float, len(self._block.rows))
+    def _read_cell(self, column: TimerColumn, row: Row) -> float:
+        text = row.cell(column.at)
+        if column.role == "level" and (text.casefold() in _UNKNOWN or state_of(text) in LEVELS):
+            return LEVELS.get(state_of(text), math.nan)
+        if column.role != "level" and is_number(text):
+            return as_float(text, self._table) * 10.0 ** -(column.power or 0)
+        time = moment(text, self._table, 0) if column.role == "time" else None
+        if time is None:
+            accepted = _ACCEPTED[column.role]
+            place = self._table.column(row.line, column.at)
+            self._problems.reject(row.line, place, accepted[2:], text, accepted)
+        return (time or 0) / TICK_HZ
 
     def _tick(self, n: int) -> int:
         """Return the time of a sample, ps, exactly as the file has it."""
@@ -141,50 +158,32 @@ class SampleReader:
         text = self._table.row(self._block.rows[n]).cell(self._time.at)
         return moment(text, self._table, self._time.power or 0) or 0
 
-    def _read_levels(self, column: TimerColumn, label: str) -> None:
-        current: bool | None = None
-        for n, line in enumerate(self._block.rows):
-            text = self._table.row(line).cell(column.at)
-            state = state_of(text)
-            if text.casefold() in {"x", "z", ""}:
-                continue
-            if state not in {"high", "low", "one", "zero"}:
-                place = self._table.column(line, column.at)
-                self._problems.reject(line, place, label, text, "a level: 0 or 1")
-                continue
-            high = state in {"high", "one"}
-            if current is None:
-                self.begins[label] = high
-            elif high is not current:
-                self.passages.append(Passage(self._tick(n), label, None, high, line))
-            current = high
-
-    def _read_volts(self, column: TimerColumn, label: str) -> None:
-        """Find where volts cross the middle between dark and bright, with hysteresis.
-
-        Between two samples the crossing of the middle is where a straight line has it.
-        """
-        volts, times = self._floats(column, "a number of volts"), self._times
-        middle = find_middle(volts)
+    def _find_passages(self, label: str, values: Array, is_level: bool) -> None:
+        middle = (0.5, 0.0) if is_level else find_middle(values)
         if middle is None:
-            self.idle[label] = float(volts.min()), float(volts.max())
+            low, high = float(values.min()), float(values.max())
+            self.notes.append(make_reason("no_passage", input=label, low=low, high=high))
             return
         centre, half = middle
-        high = self.begins[label] = bool(volts[0] > centre)
-        count = len(self.passages)
-        for n in np.flatnonzero(np.abs(volts - centre) > half).tolist():
-            if bool(volts[n] > centre) is high:
-                continue
-            high = not high
-            k = n  # back to where it crossed the middle
-            while k > 0 and (volts[k - 1] > centre) == high:
-                k -= 1
-            a, b = float(volts[k - 1]), float(volts[k])
-            share = (centre - a) / (b - a) if b != a else 1.0
-            time = float(times[k - 1] + share * (times[k] - times[k - 1]))
-            line = self._block.rows[k]
-            self.passages.append(Passage(round(time * TICK_HZ), label, None, high, line))
-        self.crossings[label] = len(self.passages) - count, centre
+        firm = np.flatnonzero(np.abs(values - centre) > half)
+        if not firm.size:
+            return
+        above = values[firm] > centre
+        self.begins[label] = bool(above[0])
+        changes = np.flatnonzero(np.diff(above)) + 1
+        for before, n, high in zip(firm[changes - 1], firm[changes], above[changes], strict=True):
+            k, tick = int(n), 0
+            if is_level:
+                tick = self._tick(k)
+            else:  # back to where it crossed the middle
+                k = int(before + np.flatnonzero((values[before : n + 1] > centre) != high)[-1]) + 1
+                share = (centre - values[k - 1]) / (values[k] - values[k - 1])
+                time = self._times[k - 1] + share * (self._times[k] - self._times[k - 1])
+                tick = round(float(time) * TICK_HZ)
+            self.passages.append(Passage(tick, label, None, bool(high), self._block.rows[k]))
+        if not is_level:
+            values_said = {"input": label, "crossings": changes.size, "level": centre}
+            self.notes.append(make_reason("crossings", **values_said))
 
 
 def find_middle(volts: Array) -> tuple[float, float] | None:

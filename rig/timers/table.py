@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,10 +19,18 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 200_000_000
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
+_SAMPLE = 2000
+"""Lines that show how a file is written."""
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 _PLAIN = re.compile(r"[-+0-9.,;eE\t ]*")
-_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9:.]{8,20}(?:Z|[+-][0-9:]{4,6})?")
+CLOCK = re.compile(
+    r"(?:([0-9]{1,4})([-./])([0-9]{1,2})[-./]([0-9]{1,4})[T ]+)?"
+    r"(?:([0-9]{1,2}):)?([0-9]{1,3}):([0-9]{1,2}(?:[.,][0-9]{1,15})?)(?:Z|[+-][0-9:]{4,6})?"
+)
+"""A time of day, perhaps with its date."""
+MISSING = {"", "nan", "n/a", "na", "null", "none", "--", "-nan", "#n/a", "#nv"}
+"""What stands in a cell that has nothing."""
 _NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
 _CLOCK = re.compile(r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> ")
 """What Arduino's serial monitor writes before a line."""
@@ -45,7 +54,8 @@ class Row(NamedTuple):
 
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
-        return self.texts[at] if at < len(self.texts) else ""
+        text = self.texts[at] if at < len(self.texts) else ""
+        return "" if len(text) < 6 and text.casefold() in MISSING else text
 
 
 @dataclass(slots=True)
@@ -159,6 +169,13 @@ def read_table(lines: Sequence[str]) -> Table:
         [line for line, remark in zip(lines, marked, strict=True) if not remark]
     )
     table = Table(list(lines), separator)
+    shapes = Counter(
+        shape
+        for number, remark in enumerate(marked[:_SAMPLE], 1)
+        if not remark and any(map(all, shape := _shape(table.row(number), table)))
+    )
+    (usual, count), *_ = shapes.most_common(1) or [((), 0)]
+    usual = usual if 2 * count > max(2, shapes.total()) else ()
     table.blocks.append(RowBlock([Row(1, names)] if names else []))
     heading: Row | None = None
     for number, line in enumerate(table.lines, 1):
@@ -172,21 +189,27 @@ def read_table(lines: Sequence[str]) -> Table:
             if _is_mark(heading):
                 table.blocks.append(RowBlock([heading]))
         elif line.strip():
-            _place(table.row(number), table, heading)
+            row = table.row(number)
+            _place(row, table, heading, is_usual=_shape(row, table) == usual)
     table.blocks[:] = [block for block in table.blocks if block.rows]
     for block in table.blocks:
         _take_rows_beside_settings(block, table)
     return table
 
 
-def _place(row: Row, table: Table, remark: Row | None) -> None:
+def _shape(row: Row, table: Table) -> tuple[tuple[bool, bool], ...]:
+    """Return which cells of a row are filled, and numbers; of most rows of data it is the same."""
+    return tuple((text != "", table.is_number(text)) for text in row.texts)
+
+
+def _place(row: Row, table: Table, remark: Row | None, *, is_usual: bool) -> None:
     """Put a line among the rows, or the headings, of a block; the last remark may be a heading."""
     block = table.blocks[-1]
     if not any(row.texts):
         return
     if block.rows and (_is_mark(row) or _is_heading(row, block, table)):
         table.blocks.append(RowBlock([row]))
-    elif is_data(row.texts, table) or _is_faulty(row, block, table):
+    elif is_usual or is_data(row.texts, table) or _is_faulty(row, block, table):
         if not block.rows and not block.headings and remark is not None:
             # A heading that is marked as a remark has as many names as there are cells.
             names = [text for text in remark.texts if text]
@@ -253,17 +276,17 @@ def is_number(text: str) -> bool:
 
 def is_value(text: str) -> bool:
     """Whether a word is a number, a date, a state or the name of an input."""
-    if is_number(text) or state_of(text) or text.casefold() in {"x", "z", "nan"}:
+    if is_number(text) or state_of(text) or text.casefold() in {"x", "z", *MISSING}:
         return True
     if len(text) > LONGEST or has_role(text, "start"):
         return False
-    return bool(_NAME.fullmatch(text) or _DATE.fullmatch(text))
+    return bool(_NAME.fullmatch(text) or CLOCK.fullmatch(text))
 
 
 def is_data(texts: Sequence[str], table: Table) -> bool:
     """Whether a row holds values only, and at least one number or date."""
     filled = [text for text in texts if text]
-    return any(table.is_number(text) or _DATE.fullmatch(text) for text in filled) and all(
+    return any(table.is_number(text) or CLOCK.fullmatch(text) for text in filled) and all(
         is_value(text) and not (table.separator == "," and "," in text) for text in filled
     )
 
@@ -281,9 +304,12 @@ def _is_mark(row: Row) -> bool:
     """Whether a row says that another run, or gate, begins: ``--- Run 2 ---``."""
     text = normal(" ".join(row.texts)).strip("-=*#:<>[] ")
     roles = words()["run"] | words()["gate"]
-    name = re.match(r"([^\W\d]+(?: set)?)\s*(?:[#:]|nr|no)?\s*[0-9]{0,4}", text)
+    name = re.match(r"([^\W\d]+(?: set)?)\s*(?:[#:]|nr|no)?\s*([0-9]{0,4})", text)
+    rest = "" if name is None else text[name.end() :].strip(" :-=*#")
     return "vernier format" in text or bool(
-        name and name[1].strip() in roles and len(name[0]) >= len(text) - 12
+        name
+        and name[1].strip() in roles
+        and (not rest or (name[2] and len(rest) <= 12 and not re.search("[0-9]", rest)))
     )
 
 
@@ -311,7 +337,7 @@ def _is_faulty(row: Row, block: RowBlock, table: Table) -> bool:
 
 def find_separator(lines: Sequence[str]) -> str:
     """Find what stands between the cells of most lines with a number."""
-    rows = [line.strip() for line in lines[:2000] if re.search("[0-9]", line)]
+    rows = [line.strip() for line in lines[:_SAMPLE] if re.search("[0-9]", line)]
     for separator in ("\t", ";"):
         if sum(separator in row for row in rows) * 2 > len(rows):
             return separator

@@ -210,9 +210,9 @@ def _add_rows(
         for part in parts:
             part.name = part.name or mark
         file.groups += parts
-    derived = [column.name for column in columns if column.role == "other"]
-    if derived:
-        file.notes.append(make_reason("columns_unused", columns=", ".join(derived)))
+    unused = [column.name for column in columns if column.role in {"other", "duration"}]
+    if unused:
+        file.notes.append(make_reason("columns_unused", columns=", ".join(unused)))
 
 
 def _add_samples(file: TimerFile, reader: SampleReader, block: RowBlock) -> None:
@@ -220,8 +220,4 @@ def _add_samples(file: TimerFile, reader: SampleReader, block: RowBlock) -> None
     file.silent |= set(block.rows)
     file.begins |= reader.begins
     file.period_s = reader.step_s or None
-    for label, (low, high) in reader.idle.items():
-        file.notes.append(make_reason("no_passage", input=label, low=low, high=high))
-    for label, (count, level) in reader.crossings.items():
-        values = {"input": label, "level": level}
-        file.notes.append(make_reason("crossings", crossings=count, **values))
+    file.notes += reader.notes

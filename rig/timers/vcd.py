@@ -12,10 +12,13 @@ if TYPE_CHECKING:
 
     from rig.timers.problems import ProblemList
 
-_SCALE = re.compile(r"(1|10|100)\s*(s|ms|us|ns|ps|fs)")
+_SCALE = re.compile(r"\$timescale\s+(1|10|100)\s*(s|ms|us|ns|ps)\s+\$end")
+_STATED = re.compile(r"\$timescale\s+(.{0,40}?)\s*(?:\$end|$)")
+_WIRE = re.compile(r"\$var\s+\w+\s+1\s+(\S+)\s+(\S+)")
+"""A wire of one bit: ``$var wire 1 ! D0``."""
 LONGEST = 30
 """Digits of a time: more would be no number that a computer reads at once."""
-_PS = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3, "ps": 1, "fs": 0}
+_PS = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3, "ps": 1}
 
 
 def is_vcd(lines: Sequence[str]) -> bool:
@@ -34,59 +37,34 @@ def read_vcd(
     list of Passage, dict, int
         Changes, the level that each wire begins with, and the unit of time in ps.
     """
-    names: dict[str, str] = {}
-    unit, time = 0, 0
+    end = next((n for n, line in enumerate(lines) if "$enddefinitions" in line), len(lines))
+    head = " ".join(line[:200] for line in lines[: end + 1])
+    names, scale, stated = dict(_WIRE.findall(head)), _SCALE.search(head), _STATED.search(head)
+    if scale is None and stated is not None:
+        problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
+    elif scale is None:
+        problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
+    unit, time = int(scale[1]) * _PS[scale[2]] if scale else 0, 0
     first: dict[str, bool] = {}
-    current: dict[str, bool] = {}
-    changed: dict[str, int] = {}
+    current: dict[str, tuple[bool, int]] = {}
     passages: list[Passage] = []
-    text, skipping = "", False
-    for number, line in enumerate(lines, 1):
-        for word in line.split():
-            if word == "$end":
-                _note_wire(text, names)
-                if text.startswith("$timescale"):
-                    match = _SCALE.search(text)
-                    unit = int(match[1]) * _PS[match[2]] if match else 0
-                    if not unit:
-                        scale = text[10:].strip()
-                        problems.reject(number, 1, "$timescale", scale, "a unit of time")
-                        return [], {}, 0
-                text, skipping = "", False
-            elif word in {"$date", "$version", "$timescale", "$comment", "$scope", "$var",
-                           "$upscope", "$enddefinitions"}:  # fmt: skip
-                text, skipping = word, True
-            elif skipping:
-                text += f" {word:.200}"
-            elif word[0] == "#" and word[1:].isdecimal():
-                time = _read_time(word, unit, time, number, problems)
+    for number, line in enumerate(lines[end + 1 :], end + 2):
+        for word in line.split() if not line.startswith("$comment") else ():
+            if word[0] == "#" and word[1:].isdecimal():
+                if len(word) > LONGEST:
+                    problems.reject(number, 1, "time", word, "a time that a drop can have")
+                    continue
+                last, time = time, int(word[1:]) * unit
+                if time < last:
+                    problems.add(number, 1, "time", "backwards", text=word)
             elif word[0] in "01" and word[1:] in names:
                 name, high = names[word[1:]], word[0] == "1"
-                if name in current and current[name] is not high:
-                    if changed[name] == time:
-                        accepted = "a change: this wire has another value at this time already"
-                        problems.reject(number, 1, name, word, accepted)
+                before, since = current.get(name, (high, -1))
+                if before is not high and since == time:
+                    accepted = "a change: this wire has another value at this time already"
+                    problems.reject(number, 1, name, word, accepted)
+                if before is not high:
                     passages.append(Passage(time, name, None, high, number))
                 first.setdefault(name, high)
-                current[name] = high
-                changed[name] = time
-    if not unit:
-        problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
+                current[name] = high, time
     return passages, first, unit
-
-
-def _read_time(word: str, unit: int, last: int, line: int, problems: ProblemList) -> int:
-    if len(word) > LONGEST:
-        problems.reject(line, 1, "time", word, "a time that a drop can have")
-        return last
-    time = int(word[1:]) * unit
-    if time < last:
-        problems.add(line, 1, "time", "backwards", text=word)
-    return time
-
-
-def _note_wire(text: str, names: dict[str, str]) -> None:
-    """Note a wire of one bit: ``$var wire 1 ! D0``."""
-    parts = text.split()
-    if parts[:1] == ["$var"] and len(parts) >= 5 and parts[2] == "1":
-        names[parts[3]] = parts[4]

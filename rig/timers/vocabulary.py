@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
@@ -67,6 +67,7 @@ def unit_of(heading: str) -> str:
     return named[-1] if named else ""
 
 
+@lru_cache(1000)
 def state_of(text: str) -> str:
     """Return what a word says of a beam: a role among states, or nothing.
 

@@ -36,7 +36,7 @@ HEAD = "gate,time (s),state\n"
 def test_every_row_is_counted(look):
     done = look(HEAD + rows(RUNS[0]))
     assert done.code == 0, done.err
-    assert "1 runs, 8 rows: 8 edges" in done.err
+    assert "1 run, 8 rows: 8 edges" in done.err
     assert "8 of 8 edges where a fall puts them; g 9.8" in done.out
 
 

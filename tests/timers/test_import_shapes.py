@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import random
-import re
 from argparse import Namespace
 
 import pytest
@@ -12,18 +10,12 @@ from rig.commands.import_edges import read_with_protocol
 from rig.errors import InputError
 from rig.protocol import reader
 from rig.timers.edges_csv import TICK_HZ
+from tests.timers.mutations import mutate
 from tests.timers.shapes import PROTOCOL, Shape, shapes
+from tests.timers.strangers import NOT_READ, REFUSED, strangers
 
 SHAPES = shapes()
-TRANSLATIONS = {
-    "time": ("zeit", "temps", "tempo", "tiempo"),
-    "gate": ("lichtschranke", "porte", "fotocellula", "puerta"),
-    "state": ("zustand", "état", "stato", "estado"),
-    "run": ("lauf", "essai", "prova", "ensayo"),
-    "blocked": ("unterbrochen", "bloqué", "bloccato", "bloqueado"),
-    "channel": ("kanal", "canal", "canale", "voie"),
-}
-BACK = {word: name for name, listed in TRANSLATIONS.items() for word in listed}
+STRANGERS = strangers()
 
 
 def options(path, *more: str) -> Namespace:
@@ -76,68 +68,29 @@ def test_every_shape_is_read_as_the_truth(tmp_path, name):
     assert differs(read(tmp_path / "file", shape.content, shape), shape) == ""
 
 
-def mutant(shape: Shape, seed: int) -> tuple[bytes, int, str]:
-    """Delete rows, exchange columns or translate headings; say how many edges may be missing."""
-    rng = random.Random(seed)
-    encoding = next(
-        (name for name, start in (("utf-16", b"\xff\xfe"), ("utf-16-le", b"L\0"))
-         if shape.content.startswith(start)), "utf-8")  # fmt: skip
+def try_reading(path, content: bytes, shape: Shape):
+    """Return the edges of each run, or nothing and what the refusal advises."""
     try:
-        text = shape.content.decode(encoding)
-    except UnicodeDecodeError:
-        encoding = "cp1252"
-        text = shape.content.decode(encoding)
-    lines = text.splitlines()
-    data = [n for n, line in enumerate(lines) if n > 2 and re.search(r"[0-9]{3}", line)]
-    kind = rng.choice(("delete", "exchange", "translate"))
-    deleted = 0
-    if kind == "delete" and data:
-        for n in sorted(rng.sample(data, rng.randint(1, min(2, len(data)))), reverse=True):
-            del lines[n]
-            deleted += 3 * (not shape.sampled)
-    elif kind == "exchange":
-        separator = next((s for s in "\t;," if text.count(s) > len(lines)), " ")
-        width = max(line.count(separator) for line in lines) + 1
-        order = rng.sample(range(width), width)
-        for n, line in enumerate(lines):
-            cells = line.split(separator)
-            if len(cells) == width and '"' not in line:
-                lines[n] = separator.join(cells[k] for k in order)
-        if any('"' in line for line in lines):
-            lines = text.splitlines()
-    else:
-        language = rng.randrange(4)
-        pairs = [(word, listed[language]) for word, listed in TRANSLATIONS.items()]
-        lines = [_translate(line, pairs) for line in lines]
-        back = [(word, name) for word, name in BACK.items() if rng.random() < 0.5]
-        lines = [_translate(line, back) for line in lines]
-    return ("\n".join(lines) + "\n").encode(encoding, "replace"), deleted, kind
-
-
-def _translate(line: str, pairs) -> str:
-    for word, other in pairs:
-        line = re.sub(rf"(?i)(?<![^\W\d_]){word}(?![^\W\d_])", other, line)
-    return line
+        return read(path, content, shape), ""
+    except InputError as error:
+        return None, error.hint
 
 
 def wrong_mutants(path, name: str, seeds) -> list[str]:
-    found = []
+    wrong = []
     for seed in seeds:
-        shape = SHAPES[name]
-        content, deleted, kind = mutant(shape, seed)
-        try:
-            runs = read(path, content, shape)
-        except InputError:
+        shape, mutant = SHAPES[name], mutate(SHAPES[name].content, seed)
+        runs, advice = try_reading(path, mutant.content, shape)
+        if runs is None:
+            assert advice
             continue
-        if why := differs(runs, shape, deleted):
-            found.append(f"seed {seed}, {kind}: {why}")
-    return found
+        runs = [[(time / mutant.scale, *rest) for time, *rest in edges] for edges in runs]
+        if why := differs(runs, shape, mutant.deleted):
+            wrong.append(f"seed {seed}, {mutant.kind}: {why}")
+    return wrong
 
 
-SMALL = [name for name, shape in SHAPES.items() if not shape.sampled]
-
-
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", [name for name, shape in SHAPES.items() if not shape.sampled])
 def test_no_mutant_is_read_as_another_truth(tmp_path, name):
     assert wrong_mutants(tmp_path / "file", name, range(4)) == []
 
@@ -146,3 +99,18 @@ def test_no_mutant_is_read_as_another_truth(tmp_path, name):
 @pytest.mark.parametrize("name", SHAPES)
 def test_none_of_many_mutants_is_read_as_another_truth(tmp_path, name):
     assert wrong_mutants(tmp_path / "file", name, range(100)) == []
+
+
+@pytest.mark.parametrize("name", STRANGERS)
+def test_what_a_stranger_writes_is_read_rightly_or_refused_with_advice(tmp_path, name):
+    shape = STRANGERS[name]
+    runs, advice = try_reading(tmp_path / "file", shape.content, shape)
+    assert (runs is None) is (name in NOT_READ)
+    assert advice if runs is None else differs(runs, shape) == ""
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_timer_s_file_is_refused(tmp_path, name):
+    runs, advice = try_reading(tmp_path / "file", REFUSED[name], Shape(b"", []))
+    assert runs is None
+    assert advice
