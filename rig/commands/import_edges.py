@@ -54,6 +54,9 @@ if TYPE_CHECKING:
 
 _COMPARED = 3
 """Drops that are compared with falls: as many as tell a way of reading from another."""
+_EXCESS = 4
+"""Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
+that flickers makes a few more than two."""
 _EXACT_S = 1e-5
 """Of times: two gates never change within the same one, but for one drop in thousands."""
 
@@ -118,7 +121,8 @@ def read_with_protocol(
     if reading.layout.groups == "passing" and file.labels and "groups" not in stated:
         raise refusal(arguments.events, "one_wire", option=str(reading.layout))
     _account(file, reading, bars, arguments)
-    if len(readings) > 1 or (fit.share < GOOD and not arguments.as_read):
+    is_open = len([other for other in readings if not other.layout.is_contrary]) > 1
+    if is_open or (fit.share < GOOD and not arguments.as_read):
         file.notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=fit.text))
     if pause_s := reading.layout.pause_s:
         drops = len(reading.drops)
@@ -154,14 +158,14 @@ def _note_assumptions(file: TimerFile, reading: FileReading, passed: Sequence[in
 
 
 def _account(file: TimerFile, reading: FileReading, bars: int, arguments: Namespace) -> None:
-    """Say what became of every row; refuse rows that are not used, and more edges than can be."""
+    """Say what became of every row; refuse rows that are not used, and what cannot be."""
     alike: dict[object, int] = {}
     for drop in reading.drops:
         other = alike.setdefault(drop.edges, drop.run)
         if other != drop.run and not arguments.as_read:
             raise refusal(arguments.events, "same_twice", run=drop.run, other=other)
         for channel, count in Counter(edge.channel for edge in drop.edges).items():
-            if count > 2 * bars and not arguments.as_read:
+            if count > _EXCESS * bars and not arguments.as_read:
                 excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
                 raise refusal(arguments.events, "more_edges", **excess)
         ticks = Counter(edge.tick for edge in drop.edges)
@@ -189,7 +193,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     # Of gates that the file does not have nothing is due.
     protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
     shares, near, expected = [1.0], 0, 0
-    evidence, gravity = 0.0, []
+    evidence, gravity = 0.0, list[float]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     for drop in [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]:
         run = planned[drop.run]
@@ -197,7 +201,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         votes = sum(most_votes(protocol, record, rate.u, stated(protocol)) for record in records)
         due = sum(record.expected for record in records)
         shares.append(votes / max(1, len(drop.edges), due))
-        near, expected = near + votes, expected + due
+        near, expected = near + min(votes, due), expected + due
         if exact and len(gravity) < _COMPARED:
             result, fit = fit_drop(protocol, run, drop, rate, explain=False)
             evidence += log_evidence(fit) if fit else 0.0

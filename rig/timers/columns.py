@@ -121,7 +121,7 @@ def columns_of(
     for column in columns:
         if column.role == "time" and column.power is None:
             column.power = POWERS[unit] if unit else _plain_power(values[column.at])
-    _leave_out_coarser(columns, values, table)
+    _leave_out_coarser(columns)
     return columns
 
 
@@ -294,25 +294,16 @@ def _plain_role(n: int, values: Sequence[list[str]], times: Sequence[int]) -> st
     return next((role for role, fits in rules if fits), "other")
 
 
-def _leave_out_coarser(
-    columns: Sequence[TimerColumn], values: Sequence[list[str]], table: Table
-) -> None:
+def _leave_out_coarser(columns: Sequence[TimerColumn]) -> None:
     """Of columns that say the same times in other units, keep the finest."""
-    times = [column for column in columns if column.role == "time" and column.power is not None]
-    finest = max(times, key=lambda column: column.power or 0, default=None)
-    for column in times:
-        if finest is None or column.power == finest.power:
-            continue
-        least = 10.0 ** -(column.power or 0)
-        ratio = 10.0 ** -(finest.power or 0)
-        pairs = list(zip(values[column.at][:20], values[finest.at][:20], strict=False))
-        if pairs and all(
-            is_number(a)
-            and is_number(b)
-            and abs(as_float(a, table) * least - as_float(b, table) * ratio) < 3.0 * least
-            for a, b in pairs
-        ):
-            column.role = "coarse"
+    finest: dict[tuple[str, str, bool | None], TimerColumn] = {}
+    for column in (c for c in columns if c.role == "time" and not c.numbered):
+        key = column.gate, column.run, column.blocked
+        other = finest.setdefault(key, column)
+        coarse = other if (column.power or 0) > (other.power or 0) else column
+        if column.power != other.power and None not in {column.power, other.power}:
+            coarse.role = "coarse"
+            finest[key] = column if coarse is other else other
 
 
 def as_float(text: str, table: Table) -> float:

@@ -372,7 +372,7 @@ def check_layout(content: object, place: str) -> dict[str, Any]:
             channels = value.values() if isinstance(value, dict) else [value]
             good = all(type(channel) is int and 0 <= channel < GATES for channel in channels)
         elif name == "pause_s":
-            good = type(value) in {int, float} and 0 <= value <= 3600
+            good = type(value) in (int, float) and 0 <= float(str(value)) <= 3600
         else:
             good = value in _CHOICES.get(name, ())
         if not good:

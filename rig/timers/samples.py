@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.reasons import make_reason
-from rig.timers.columns import as_float, find_label
+from rig.timers.columns import as_float, find_label, has_levels
 from rig.timers.edges_csv import TICK_HZ
 from rig.timers.passages import Passage, moment
 from rig.timers.table import Row, is_number
-from rig.timers.vocabulary import has_role, number_of, state_of
+from rig.timers.vocabulary import POWERS, has_role, state_of, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 
 _RATE = re.compile(r"([0-9.,]{1,20})\s?([kMG]?)Hz", re.IGNORECASE)
 _NAMES = re.compile(r"channels\s?(?:\([0-9/ ]{1,12}\))?\s?:\s?(.{1,400})", re.IGNORECASE)
-_SETTING = re.compile(r"[=:]\s?([+-]?[0-9][0-9.]{0,30}(?:[eE][+-]?[0-9]{1,3})?)")
+_SETTING = re.compile(r"[=:]\s?([+-]?[0-9].{0,40})")
+_QUANTITY = re.compile(
+    r"([+-]?[0-9][0-9.,]{0,30}(?:[eE][+-]?[0-9]{1,3})?)\s?([a-zµμ]{0,3})", re.IGNORECASE
+)
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
 LEVELS = {"high": 1.0, "one": 1.0, "low": 0.0, "zero": 0.0}
@@ -39,14 +42,17 @@ _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
 
 
-def input_names(table: Table, width: int) -> list[str]:
-    """Return a name for each column of levels without headings: as a remark lists, or D0, D1."""
-    for remark in table.remarks:
-        match = _NAMES.search(remark)
-        names = match[1].split(",") if match else []
-        if len(names) == width:
-            return [n if number_of(n) is not None else f"input {n}" for n in map(str.strip, names)]
-    return [f"D{n}" for n in range(width)]
+def name_levels(block: RowBlock, table: Table) -> list[Row]:
+    """Return a heading for levels that have none, only a rate: as a remark lists, or D0, D1."""
+    first, *_ = rows = [table.row(line).texts for line in block.rows[:200]]
+    own = {text.casefold() for text in block.headings[-1].texts} if block.headings else set()
+    if own - {"logic", "analog"} or not time_base(block, table) or not all(map(has_levels, rows)):
+        return []
+    lists = [match[1].split(",") for remark in table.remarks if (match := _NAMES.search(remark))]
+    names = next((names for names in lists if len(names) == len(first)), None)
+    texts = [f"D{n}" for n in range(len(first))] if names is None else names
+    numbered = (text.strip() for text in texts)
+    return [Row(0, [t if find_label(t, "gate") else f"input {t}" for t in numbered])]
 
 
 def time_base(block: RowBlock, table: Table) -> tuple[float, float] | None:
@@ -61,15 +67,16 @@ def time_base(block: RowBlock, table: Table) -> tuple[float, float] | None:
 
 
 def _setting(block: RowBlock, role: str) -> float | None:
-    """Return the number that stands behind, or below, the name of a setting."""
+    """Return the number that stands behind, or below, the name of a setting, in s."""
     for above, below in zip(block.headings, [*block.headings[1:], Row(0, [])], strict=False):
         for n, text in enumerate(above.texts):
             if len(text) > 60 or not has_role(text, role):
                 continue
             inside = _SETTING.search(text)
             for place in (inside[1] if inside else "", above.cell(n + 1), below.cell(n)):
-                if is_number(place):
-                    return float(place.replace(",", "."))
+                if match := _QUANTITY.fullmatch(place):
+                    power = POWERS.get(unit_of(match[2].lower()), 0)
+                    return float(match[1].replace(",", ".")) * 10.0**-power
     return None
 
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rig.reasons import make_reason
-from rig.timers.columns import TimerColumn, columns_of, has_levels
+from rig.timers.columns import columns_of
 from rig.timers.edges_csv import HEADER, TICK_HZ
 from rig.timers.passages import Group, RowReader, split_at_jumps
 from rig.timers.problems import ProblemList
-from rig.timers.samples import SampleReader, input_names, time_base
+from rig.timers.samples import SampleReader, name_levels
 from rig.timers.table import read_lines, read_table
 from rig.timers.vcd import is_vcd, read_vcd
 from rig.timers.vocabulary import number_of, recognise_format
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.reasons import Reason
+    from rig.timers.columns import TimerColumn
     from rig.timers.table import RowBlock, Table
 
 MAX_COLUMNS = 200
@@ -141,7 +142,8 @@ def _read_blocks(file: TimerFile, table: Table, unit: str | None, problems: Prob
         ):
             block.headings = [*own, *(above.headings if above else ())]
         above = block
-        columns = _bare_levels(block, table) or columns_of(block, table, unit, problems)
+        block.headings += name_levels(block, table)
+        columns = columns_of(block, table, unit, problems)
         problems.raise_if_any()
         file.columns |= {column.name: column.meaning for column in columns}
         roles = {column.role for column in columns}
@@ -152,27 +154,11 @@ def _read_blocks(file: TimerFile, table: Table, unit: str | None, problems: Prob
         elif "time" in roles:
             _add_rows(file, block, columns, table, problems)
         else:
-            durations = [column.name for column in columns if column.role == "duration"]
+            durations = [repr(column.name) for column in columns if column.role == "duration"]
             heading = block.headings[0].line if block.headings else block.rows[0]
-            if durations:
-                numbers = repr(durations[0])
-                problems.refuse(heading, 1, "durations", numbers=numbers)
-            problems.refuse(heading, 1, "no_time_column")
+            code = "durations" if durations else "no_time_column"
+            problems.refuse(heading, 1, code, numbers=", ".join(durations))
     file.rows = sorted([*file.rows, *table.strays])
-
-
-def _bare_levels(block: RowBlock, table: Table) -> list[TimerColumn]:
-    """Return the columns of levels that have no names of their own, only a rate above."""
-    rows = [table.row(line).texts for line in block.rows[:200]]
-    bare = not block.headings or {t.lower() for t in block.headings[-1].texts} <= {
-        "logic",
-        "analog",
-    }
-    if not bare or time_base(block, table) is None or not all(map(has_levels, rows)):
-        return []
-    return [
-        TimerColumn(n, name, "level") for n, name in enumerate(input_names(table, len(rows[0])))
-    ]
 
 
 def _add_rows(

@@ -211,6 +211,18 @@ def shapes() -> dict[str, Shape]:
         "index,CH1_Voltage(V),CH2_Voltage(V),CH3_Voltage(V),CH4_Voltage(V)\n",
         lambda k, t, v: f"{k}," + ",".join(f"{x:.3f}" for x in v) + "\n",
     )
+    found["OWON in microseconds"] = scope(
+        "Channel\t\t:,CH1,CH2,CH3,CH4\nFrequency\t:,F=?,F=?,F=?,F=?\n"
+        "Vertical pos\t:,0.00mV,0.00mV,0.00mV,0.00mV\nTime interval\t:,200.00uS\n\n"
+        "index,CH1_Voltage(mV),CH2_Voltage(mV),CH3_Voltage(mV),CH4_Voltage(mV)\n",
+        lambda k, t, v: f"{k}," + ",".join(f"{x * 1e3:.2f}" for x in v) + "\n",
+    )
+    found["Tektronix, digital, head marked"] = Shape((
+        "#Model,MDO3014\n#Firmware Version,1.26\n#\n#Waveform Type,DIGITAL,,,\n#Point Format,Y,,,\n"
+        "#Horizontal Units,s,,,\n#Sample Interval,2e-04,,,\n#Record Length,4000,,,\n#,,,,\n"
+        "#Vertical Units,V,V,V,V\n#Label,,,,\nTIME,D0,D1,D2,D3\n"
+        + "".join(f"{n * STEP:.4e}," + ",".join(map(str, levels(RUNS[0], n * STEP))) + "\n"
+                  for n in range(4000))).encode(), RUNS[:1], sampled=STEP)  # fmt: skip
     found["Hantek"] = scope("nr,time,ch1,ch2,ch3,ch4\n",
         lambda k, t, v: f"{k},{t:.6g}," + ",".join(f"{x:.2f}" for x in v) + "\n")  # fmt: skip
     found["PicoScope"] = scope(

@@ -254,14 +254,14 @@ def strangers() -> dict[str, Shape]:
         "Twice the same",
         2 * ("gate,time (s),state\n" + rows(lambda t, c, d: f"{c},{t:.6f},{int(d)}\n")),
     )
-    put(
-        "A bouncing gate",
-        "gate,time (s),state\n"
-        + "".join(
-            f"{c},{t:.6f},{int(d)}\n"
-            + (f"{c},{t + 2e-6:.6f},{int(not d)}\n{c},{t + 4e-6:.6f},{int(d)}\n" if n == 3 else "")
-            for n, (t, c, d) in enumerate(one)
-        ),
+    time, channel, dark = one[3]
+    bounce = [(time + 2e-6, channel, not dark), (time + 4e-6, channel, dark)]
+    found["A bouncing gate"] = Shape(
+        (
+            "gate,time (s),state\n"
+            + "".join(f"{c},{t:.6f},{int(d)}\n" for t, c, d in [*one[:4], *bounce, *one[4:]])
+        ).encode(),
+        [[*one[:4], *bounce, *one[4:]]],
     )
     put(
         "Changes in nanoseconds",
@@ -322,7 +322,7 @@ NOT_READ = {
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A row for each run", "A column for each run",
     "Rows out of order", "Newest first", "A clock that overflows", "Samples with an index",
-    "Two tables", "Twice the same", "A bouncing gate", "Changes in nanoseconds",
+    "Two tables", "Twice the same", "Changes in nanoseconds",
     "Written by hand", "Thousands apart", "Thousands by points", "Pipes", "XML", "JSON in a line",
 }  # fmt: skip
 """Refused with what to do: the file leaves open, or contradicts, what is in it."""
