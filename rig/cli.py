@@ -124,173 +124,122 @@ def _parser() -> Parser:
     commands = parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)
     texts: dict[str, str] = {}
 
-    def command(name: str, text: str, module: str = "") -> argparse.ArgumentParser:
+    def command(name: str, text: str, module: str = "") -> Parser:
         texts[name] = text
         added = commands.add_parser(name, description=text)
         added.set_defaults(module=module or name)
         return added
 
     demo = command("demo", "simulate drops of two chains and compare results with the hidden truth")
-    demo.add_argument("-o", "--output", metavar="DIR", help="folder for all files (default: out/…)")
-    demo.add_argument(
-        "--repeats", type=_count, default=1, metavar="N", help="drops at each incline (default 1)"
-    )
-    demo.add_argument(
-        "--seed", type=_seed, default=1, metavar="N", help="of the simulation (default 1)"
-    )
-    demo.add_argument("--open", action="store_true", help="always show the report in a browser")
+    demo.value("-o --output", "DIR", "folder for all files (default: out/…)")
+    demo.value("--repeats", "N", "drops at each incline (default 1)", type=_count, default=1)
+    demo.value("--seed", "N", "of the simulation (default 1)", type=_seed, default=1)
+    demo.flag("--open", "always show the report in a browser")
 
     new = command("new", "ask a few questions, write a protocol, draw it and simulate it")
-    new.add_argument(
-        "output", type=_place("protocol.yaml"), metavar="FILE.yaml", help="the new protocol"
-    )
+    new.value("output", "FILE.yaml", "the new protocol", type=_place("protocol.yaml"))
     new.add_argument(
         "--scene",
         choices=("two-chains", "one-chain", "object", "track", "picket-fence"),
         help="what you drop; an object is a ball, a card or a cylinder",
     )
     new.add_argument("--board", choices=(*BOARDS, "other"), help="the timer")
-    new.add_argument("--gates", metavar="N", help="number of photogates")
-    new.add_argument("--rods", metavar="N", help="number of rods of a chain or bars of a fence")
-    new.add_argument("--length", metavar="L", help='of a chain or a fence, such as "1165 mm"')
-    new.add_argument("--diameter", metavar="D", help="of a rod; for an object its length in a beam")
+    new.value("--gates", "N", "number of photogates")
+    new.value("--rods", "N", "number of rods of a chain or bars of a fence")
+    new.value("--length", "L", 'of a chain or a fence, such as "1165 mm"')
+    new.value("--diameter", "D", "of a rod; for an object its length in a beam")
     new.add_argument(
         "--aim", choices=("separation", "speed", "coefficients"), help="what to measure"
     )
-    new.add_argument(
-        "--incline", metavar="A", help='of the board or the track, such as "40 deg, 60 deg"'
-    )
-    new.add_argument("--drop", metavar="H", help='drop height, such as "180 mm ± 2 mm"')
-    new.add_argument("--repeats", metavar="N", help="number of drops at each incline")
-    new.add_argument(
-        "--title", metavar="TEXT", help="of the protocol (default: the name of the file)"
-    )
-    new.add_argument("--yes", action="store_true", help="accept the defaults without questions")
+    new.value("--incline", "A", 'of the board or the track, such as "40 deg, 60 deg"')
+    new.value("--drop", "H", 'drop height, such as "180 mm ± 2 mm"')
+    new.value("--repeats", "N", "number of drops at each incline")
+    new.value("--title", "TEXT", "of the protocol (default: the name of the file)")
+    new.flag("--yes", "accept the defaults without questions")
 
     run = command("run", "run a protocol, or continue it")
     _protocol(run)
     run.add_argument(
         "--port", type=_port, required=True, help="device path or URL; sim:// needs no hardware"
     )
-    run.add_argument(
-        "--session", required=True, metavar="FILE", help="a new file, or a session to continue"
-    )
-    run.add_argument("--seed", type=_seed, metavar="N", help="of a simulation (default 0)")
-    run.add_argument(
-        "--yes", action="store_true", help="do not wait for Enter; implied without a terminal"
-    )
+    run.value("--session", "FILE", "a new file, or a session to continue", required=True)
+    run.value("--seed", "N", "of a simulation (default 0)", type=_seed)
+    run.flag("--yes", "do not wait for Enter; implied without a terminal")
     _json(run)
-    run.add_argument(
-        "--socket", metavar="PATH", help="socket of the daemon (default: the usual place)"
-    )
+    run.value("--socket", "PATH", "socket of the daemon (default: the usual place)")
 
     daemon = command("daemon", "keep a port and its session open for several clients")
     daemon.add_argument("--port", type=_port, required=True, help="device path or URL")
-    daemon.add_argument(
-        "--socket", metavar="PATH", help="socket for clients (default: the usual place)"
-    )
-    daemon.add_argument(
-        "--tcp",
-        action="store_true",
-        help="listen on a port of 127.0.0.1, for programs without Unix sockets",
-    )
-    daemon.add_argument(
+    daemon.value("--socket", "PATH", "socket for clients (default: the usual place)")
+    daemon.flag("--tcp", "listen on a port of 127.0.0.1, for programs without Unix sockets")
+    daemon.value(
         "--idle-timeout",
-        type=_seconds,
-        metavar="S",
-        help="end after so many seconds without a client, if no drop is armed, running or "
+        "S",
+        "end after so many seconds without a client, if no drop is armed, running or "
         "unsaved (default: run until a signal comes)",
+        type=_seconds,
     )
 
     _tui(command("tui", "run and watch a lab session in the terminal"))
 
     check = command("check", "check a protocol: its scene, gates, plan and limits")
     _protocol(check, nargs="?")
-    check.add_argument("--keys", action="store_true", help="list every key that a protocol accepts")
-    check.add_argument(
-        "--schema", action="store_true", help="print the keys as a JSON Schema, for editors"
-    )
+    check.flag("--keys", "list every key that a protocol accepts")
+    check.flag("--schema", "print the keys as a JSON Schema, for editors")
     check.add_argument("--board", choices=tuple(BOARDS), help="report what this board cannot do")
-    check.add_argument(
-        "-o",
-        "--output",
+    check.value(
+        "-o --output",
+        "FILE",
+        "draw how to mount the gates (.svg, .png, .pdf)",
         type=_place("mounting.svg"),
-        metavar="FILE",
-        help="draw how to mount the gates (.svg, .png, .pdf)",
     )
 
     design = command(
         "design", "predict the uncertainties of a gate layout, and propose better heights"
     )
     _protocol(design)
-    design.add_argument(
-        "-o",
-        "--output",
+    design.value(
+        "-o --output",
+        "NEW.yaml",
+        "write the protocol with the proposed heights",
         type=_place("proposed.yaml"),
-        metavar="NEW.yaml",
-        help="write the protocol with the proposed heights",
     )
-    design.add_argument("--repeats", type=_count, metavar="N", help="drops at each incline")
-    design.add_argument(
-        "--learned",
-        metavar="SESSION",
-        help="take the scatter from an earlier session of the same rig",
-    )
-    design.add_argument(
-        "--lowest", metavar="H", help='lowest beam, such as "20 mm" (default: as now)'
-    )
-    design.add_argument("--highest", metavar="H", help="highest beam (default: as now)")
-    design.add_argument(
-        "--spacing", metavar="D", help="least distance of two beams (default 10 mm)"
-    )
-    design.add_argument(
-        "--no-search", action="store_true", help="only predict the layout of the protocol"
-    )
+    design.value("--repeats", "N", "drops at each incline", type=_count)
+    design.value("--learned", "SESSION", "take the scatter from an earlier session of the same rig")
+    design.value("--lowest", "H", 'lowest beam, such as "20 mm" (default: as now)')
+    design.value("--highest", "H", "highest beam (default: as now)")
+    design.value("--spacing", "D", "least distance of two beams (default 10 mm)")
+    design.flag("--no-search", "only predict the layout of the protocol")
     _json(design)
 
     predict = command("predict", "print the predictions of the model")
-    predict.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="the protocol file (YAML)")
+    predict.value("protocol", "PROTOCOL", "the protocol file (YAML)", nargs="?")
     predict.add_argument(
         "--figure", type=int, choices=(3, 4, 6), help="draw this figure of the paper"
     )
-    predict.add_argument(
-        "-o",
-        "--output",
+    predict.value(
+        "-o --output",
+        "FILE.svg",
+        "the figure (.svg, .png or .pdf); its numbers go to FILE.csv",
         type=_place("figure.svg"),
-        metavar="FILE.svg",
-        help="the figure (.svg, .png or .pdf); its numbers go to FILE.csv",
     )
-    predict.add_argument(
-        "--resolved",
-        action="store_true",
-        help="add drops simulated rod by rod (figures 3 and 4)",
-    )
+    predict.flag("--resolved", "add drops simulated rod by rod (figures 3 and 4)")
     _json(predict)
 
     _sweep(command("sweep", "map the model's Δz and V over a grid of parameters"))
 
     imported = command("import", "make a session from the data of another timer", "import_edges")
-    imported.add_argument(
+    imported.value(
         "events",
-        metavar="EVENTS",
-        help="columns run,channel,time_s,state; any other timer's table of times; samples of a "
+        "EVENTS",
+        "columns run,channel,time_s,state; any other timer's table of times; samples of a "
         "logic analyser or an oscilloscope; a value change dump",
     )
-    imported.add_argument(
-        "--protocol", required=True, metavar="FILE", help="the protocol of these drops"
-    )
-    imported.add_argument("-o", "--session", metavar="FILE", help="the new session")
-    imported.add_argument(
-        "--dry-run", action="store_true", help="show how the file is read, without a session"
-    )
-    imported.add_argument(
-        "--channel", type=int, metavar="N", help="channel of the gate, if the file has one gate"
-    )
-    imported.add_argument(
-        "--map",
-        metavar="D0=2,D1=5",
-        help="channel of each input of the file; also: --map D0=2 D1=5",
-    )
+    imported.value("--protocol", "FILE", "the protocol of these drops", required=True)
+    imported.value("-o --session", "FILE", "the new session")
+    imported.flag("--dry-run", "show how the file is read, without a session")
+    imported.value("--channel", "N", "channel of the gate, if the file has one gate", type=int)
+    imported.value("--map", "D0=2,D1=5", "channel of each input of the file; also: --map D0=2 D1=5")
     imported.add_argument(
         "--unit",
         choices=("s", "ms", "us", "ns"),
@@ -302,84 +251,63 @@ def _parser() -> Parser:
         help="level of a signal while its beam is blocked; of times alone: beams darken and clear "
         "in turns, clear first, or darken at each",
     )
-    imported.add_argument(
-        "--map-file", metavar="FILE", help="save how the file is read, or use what was saved"
-    )
-    imported.add_argument(
-        "--as-read", action="store_true", help="do not compare the drops with the protocol's falls"
-    )
-    imported.add_argument(
-        "--allow-unused", action="store_true", help="accept rows of which no edge is made"
-    )
+    imported.value("--map-file", "FILE", "save how the file is read, or use what was saved")
+    imported.flag("--as-read", "do not compare the drops with the protocol's falls")
+    imported.flag("--allow-unused", "accept rows of which no edge is made")
     imported.add_argument("--list-formats", action=_ListFormats, nargs=0, help="list known formats")
-    imported.add_argument(
+    imported.value(
         "--clock-uncertainty",
-        metavar="U",
-        help='relative standard uncertainty of the timer, such as "50 ppm" (default 0.29 %%: a '
+        "U",
+        'relative standard uncertainty of the timer, such as "50 ppm" (default 0.29 %%: a '
         "ceramic resonator)",
     )
-    imported.add_argument(
-        "--simulated", action="store_true", help="the edges come from a simulation"
-    )
+    imported.flag("--simulated", "the edges come from a simulation")
 
     analyze = command("analyze", "compute the results of a session, or of several together")
     _session(analyze)
     _together(analyze, "*")
-    analyze.add_argument(
-        "--budget", type=_count, metavar="RUN", help="uncertainty budget of this run"
-    )
-    analyze.add_argument(
+    analyze.value("--budget", "RUN", "uncertainty budget of this run", type=_count)
+    analyze.value(
         "--trials",
-        type=_trials,
-        metavar="M",
-        help="Monte Carlo trials for the budget (default: until they tell whether both agree, at "
+        "M",
+        "Monte Carlo trials for the budget (default: until they tell whether both agree, at "
         "most 1600); adaptive: until u has one stable digit",
+        type=_trials,
     )
-    analyze.add_argument(
-        "--session-trials", type=_count, metavar="M", help="Monte Carlo trials of the joint fit"
-    )
-    analyze.add_argument(
-        "--scatter", action="store_true", help="SD, SE and U of each mean, and half-SD bars"
-    )
-    analyze.add_argument(
-        "--video", metavar="FILE", help="compare with t, x, y of a tracked video of the same drop"
-    )
-    analyze.add_argument(
-        "--priors",
-        action="store_true",
-        help="show how each prior changes the results; takes longer",
-    )
+    analyze.value("--session-trials", "M", "Monte Carlo trials of the joint fit", type=_count)
+    analyze.flag("--scatter", "SD, SE and U of each mean, and half-SD bars")
+    analyze.value("--video", "FILE", "compare with t, x, y of a tracked video of the same drop")
+    analyze.flag("--priors", "show how each prior changes the results; takes longer")
     _fresh(analyze)
     _json(analyze)
 
     compare = command("compare", "compare the means of sessions with those of the first one")
     _session(compare)
     _together(compare, "+")
-    compare.add_argument(
-        "-o",
-        "--output",
+    compare.value(
+        "-o --output",
+        "FILE",
+        "write the comparison as a page (.html), or its figure (.svg, .png, .pdf)",
         type=_place("comparison.html"),
-        metavar="FILE",
-        help="write the comparison as a page (.html), or its figure (.svg, .png, .pdf)",
     )
     _json(compare)
 
     estimated = command("estimate", "estimate restitution, friction and impulses from a session")
     _session(estimated)
-    estimated.add_argument("-o", "--output", metavar="DIR", help="folder for pictures as SVG files")
+    estimated.value("-o --output", "DIR", "folder for pictures as SVG files")
     _fresh(estimated)
     _json(estimated)
 
     report = command("report", "write the results of a session as one HTML page")
     _session(report)
+    report.value("-o --output", "FILE", "the page", required=True, type=_place("report.html"))
+    report.value("--figures", "DIR", "folder for the figures as SVG files too")
     report.add_argument(
-        "-o", "--output", required=True, type=_place("report.html"), metavar="FILE", help="the page"
-    )
-    report.add_argument("--figures", metavar="DIR", help="folder for the figures as SVG files too")
-    report.add_argument(
-        "--bars", choices=["U95", "u", "SE", "SD", "half-SD"], default="U95",
+        "--bars",
+        choices=["U95", "u", "SE", "SD", "half-SD"],
+        default="U95",
         help="meaning of the error bars; half-SD is that of the paper",
-    )  # fmt: skip
+    )
     _fresh(report)
 
     export = command("export", "write a session as CSV files, or as a bundle that can be verified")
@@ -392,36 +320,31 @@ def _parser() -> Parser:
         metavar="FILE.eln",
         help="RO-Crate with session, report, tables, figures, versions and hashes",
     )
-    export.add_argument(
-        "--sign", metavar="KEY", help="sign the bundle with this secret key (minisign)"
-    )
+    export.value("--sign", "KEY", "sign the bundle with this secret key (minisign)")
     _fresh(export)
 
     notes = command("notes", "add a note to a recorded run")
     _session(notes)
-    notes.add_argument("text", metavar="TEXT", help="the note")
-    notes.add_argument("--run", type=_count, required=True, metavar="N", help="number of the run")
+    notes.value("text", "TEXT", "the note")
+    notes.value("--run", "N", "number of the run", type=_count, required=True)
 
     attach = command("attach", "add a file, such as a photograph, to a session")
     _session(attach)
-    attach.add_argument("file", metavar="FILE", help="the file")
+    attach.value("file", "FILE", "the file")
 
     verify = command("verify", "check a bundle, and derive its numbers again from the raw edges")
-    verify.add_argument("file", metavar="FILE", help="bundle, its unpacked folder, or session file")
-    verify.add_argument("--key", metavar="KEY.pub", help="public key of who signed it (minisign)")
+    verify.value("file", "FILE", "bundle, its unpacked folder, or session file")
+    verify.value("--key", "KEY.pub", "public key of who signed it (minisign)")
 
     recover = command("recover", "list what can be read of a damaged session file, and save it")
     _session(recover)
-    recover.add_argument(
-        "-o",
-        "--output",
+    recover.value(
+        "-o --output",
+        "NEW",
+        "save all that can be read in a new file",
         type=_place("recovered.session"),
-        metavar="NEW",
-        help="save all that can be read in a new file",
     )
-    recover.add_argument(
-        "--protocol", metavar="FILE", help="the protocol file, if the session has lost it"
-    )
+    recover.value("--protocol", "FILE", "the protocol file, if the session has lost it")
 
     _session(command("unblind", "show the results of a blind session; the session records it"))
 
@@ -434,55 +357,43 @@ def _parser() -> Parser:
         choices=tuple(FLASHED),
         help="its kind; nano-old: a Nano whose boot loader listens at 57,600 baud only",
     )
-    flash.add_argument(
-        "--port",
-        type=_port,
-        metavar="PATH",
-        help="its device, such as /dev/ttyACM0; not wanted of a Pico",
+    flash.value(
+        "--port", "PATH", "its device, such as /dev/ttyACM0; not wanted of a Pico", type=_port
     )
-    flash.add_argument(
-        "--drive",
-        metavar="DIR",
-        help="of a Pico: where its drive is mounted, if not found by itself",
+    flash.value("--drive", "DIR", "of a Pico: where its drive is mounted, if not found by itself")
+    flash.value(
+        "--hex", "FILE", "the firmware, if not the one that comes with this program; UF2 for a Pico"
     )
-    flash.add_argument(
-        "--hex", metavar="FILE",
-        help="the firmware, if not the one that comes with this program; UF2 for a Pico",
-    )  # fmt: skip
-    flash.add_argument("--avrdude", metavar="PATH", help="where avrdude is, if not found by itself")
+    flash.value("--avrdude", "PATH", "where avrdude is, if not found by itself")
 
     ports = command("ports", "list the ports where a board may be; opens none by itself")
-    ports.add_argument(
+    ports.value(
         "--identify",
-        nargs="*",
-        metavar="PORT",
-        help="ask who is there: at these ports, or else at every candidate; opening a port "
+        "PORT",
+        "ask who is there: at these ports, or else at every candidate; opening a port "
         "restarts the board behind it",
+        nargs="*",
     )
     _json(ports)
 
     doctor = command("doctor", "look for what is wrong with this computer, a board or a session")
     doctor.add_argument("--port", type=_port, help="also this board: device path or URL")
-    doctor.add_argument("--session", metavar="FILE", help="also this session, and its disk")
-    doctor.add_argument("--clear-cache", action="store_true", help="forget all kept results")
+    doctor.value("--session", "FILE", "also this session, and its disk")
+    doctor.flag("--clear-cache", "forget all kept results")
     _json(doctor)
 
     selftest = command("selftest", "have a board prove that it does what it must")
     selftest.add_argument("--port", type=_port, required=True, help="device path or URL")
-    selftest.add_argument(
+    selftest.value(
         "--loopback",
+        "GATE",
+        "a wire joins the sync output to this gate: measure how exactly FIRE is stamped",
         type=int,
         choices=range(16),
-        metavar="GATE",
-        help="a wire joins the sync output to this gate: measure how exactly FIRE is stamped",
     )
-    selftest.add_argument(
-        "--drops", type=_count, default=20, metavar="N", help="for that measurement (default 20)"
-    )
-    selftest.add_argument(
-        "--release",
-        action="store_true",
-        help="allow release 0 to be driven, once for 50 ms; without it no release ever is",
+    selftest.value("--drops", "N", "for that measurement (default 20)", type=_count, default=20)
+    selftest.flag(
+        "--release", "allow release 0 to be driven, once for 50 ms; without it no release ever is"
     )
     _json(selftest)
 
@@ -493,28 +404,18 @@ def _parser() -> Parser:
     benches = bench.add_subparsers(required=True, metavar="BENCH")
     stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
     stability.set_defaults(module="bench_stability")
-    stability.add_argument("-o", "--output", metavar="DIR", help="folder for page, CSV and JSON")
+    stability.value("-o --output", "DIR", "folder for page, CSV and JSON")
     _json(stability)
     precision = benches.add_parser("precision", help="error against run time of every method")
     precision.set_defaults(module="bench_precision")
-    precision.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        metavar="DIR",
-        help="folder for page, CSV, JSON and pictures",
-    )
-    precision.add_argument("--quick", action="store_true", help="a small subset, in seconds")
+    precision.value("-o --output", "DIR", "folder for page, CSV, JSON and pictures", required=True)
+    precision.flag("--quick", "a small subset, in seconds")
     _json(precision)
     scenes = benches.add_parser("scenes", help="what each scene loads, takes and evaluates")
     scenes.set_defaults(module="bench_scenes")
-    scenes.add_argument(
-        "--protocols", default="protocols", metavar="DIR", help="ready protocols to be measured too"
-    )
-    scenes.add_argument("--rounds", type=_count, default=9, metavar="N", help="of timing")
-    scenes.add_argument(
-        "-o", "--output", metavar="DIR", help="folder for page, CSV, JSON and picture"
-    )
+    scenes.value("--protocols", "DIR", "ready protocols to be measured too", default="protocols")
+    scenes.value("--rounds", "N", "of timing", type=_count, default=9)
+    scenes.value("-o --output", "DIR", "folder for page, CSV, JSON and picture")
     _json(scenes)
     parser.epilog = (
         f"{overview(texts)}\n\nExit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a "
@@ -523,53 +424,43 @@ def _parser() -> Parser:
     return parser
 
 
-def _tui(tui: argparse.ArgumentParser) -> None:
-    tui.add_argument(
-        "protocol",
-        nargs="?",
-        metavar="PROTOCOL",
-        help="protocol file (default: choose it on the screen)",
-    )
+def _tui(tui: Parser) -> None:
+    tui.value("protocol", "PROTOCOL", "protocol file (default: choose it on the screen)", nargs="?")
     tui.add_argument(
         "--port",
         type=_port,
         help="device path or URL, such as sim://?pace=1; starts a daemon if none runs. "
         "Without --port: watch the running daemon",
     )
-    tui.add_argument(
-        "--session",
-        metavar="FILE",
-        help="a new file, or a session to continue; alone: show it without a daemon",
+    tui.value(
+        "--session", "FILE", "a new file, or a session to continue; alone: show it without a daemon"
     )
-    tui.add_argument("--seed", type=_seed, metavar="N", help="of a simulation (default 0)")
-    tui.add_argument(
-        "--socket", metavar="PATH", help="socket of the daemon (default: the usual place)"
-    )
-    tui.add_argument("--keys", metavar="FILE", help="your own keys (TOML)")
-    tui.add_argument("--bell", action="store_true", help="ring the bell at every verdict")
-    tui.add_argument("--ascii", action="store_true", help="use ASCII characters only")
+    tui.value("--seed", "N", "of a simulation (default 0)", type=_seed)
+    tui.value("--socket", "PATH", "socket of the daemon (default: the usual place)")
+    tui.value("--keys", "FILE", "your own keys (TOML)")
+    tui.flag("--bell", "ring the bell at every verdict")
+    tui.flag("--ascii", "use ASCII characters only")
 
 
-def _sweep(sweep: argparse.ArgumentParser) -> None:
+def _sweep(sweep: Parser) -> None:
     _protocol(sweep)
-    sweep.add_argument(
+    sweep.value(
         "--vary",
-        action="append",
-        required=True,
-        metavar="NAME=LOW..HIGH:COUNT",
-        help="an axis, as in restitution=-0.4..0.9:200 or drop=100mm..300mm:50; once for each "
+        "NAME=LOW..HIGH:COUNT",
+        "an axis, as in restitution=-0.4..0.9:200 or drop=100mm..300mm:50; once for each "
         "axis. NAME=VALUE, as in incline=40deg, holds a parameter at another value than the "
         "protocol's. Where the plan has several inclines and none is given here, each is a layer: "
         "an axis of its own",
+        action="append",
+        required=True,
     )
-    sweep.add_argument(
-        "-o",
-        "--output",
+    sweep.value(
+        "-o --output",
+        "FILE",
+        "its ending chooses the kind: .csv a row a point; .npz arrays; .svg, .png or .pdf "
+        "curves or two maps, of one or two axes at one incline",
         required=True,
         type=_place("sweep.csv"),
-        metavar="FILE",
-        help="its ending chooses the kind: .csv a row a point; .npz arrays; .svg, .png or .pdf "
-        "curves or two maps, of one or two axes at one incline",
     )
     who = sweep.add_mutually_exclusive_group()
     who.add_argument(
@@ -635,37 +526,31 @@ def _place(name: str) -> Callable[[str], str]:
     return place
 
 
-def _protocol(parser: argparse.ArgumentParser, nargs: str | None = None) -> None:
-    parser.add_argument(
-        "protocol", metavar="PROTOCOL", nargs=nargs, help="the protocol file (YAML)"
-    )
+def _protocol(parser: Parser, nargs: str | None = None) -> None:
+    parser.value("protocol", "PROTOCOL", "the protocol file (YAML)", nargs=nargs)
 
 
-def _session(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("session", metavar="SESSION", help="the session file")
+def _session(parser: Parser) -> None:
+    parser.value("session", "SESSION", "the session file")
 
 
-def _fresh(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--fresh", action="store_true", help="compute everything again, use no kept results"
-    )
+def _fresh(parser: Parser) -> None:
+    parser.flag("--fresh", "compute everything again, use no kept results")
 
 
-def _together(parser: argparse.ArgumentParser, nargs: str) -> None:
-    parser.add_argument("others", metavar="SESSION", nargs=nargs, help="further sessions")
+def _together(parser: Parser, nargs: str) -> None:
+    parser.value("others", "SESSION", "further sessions", nargs=nargs)
     parser.add_argument(
         "--same-rig",
         action=argparse.BooleanOptionalAction,
         help="whether several sessions have the same posts, gates and chains (default: those with "
         "the same title and board, as far as their protocols agree)",
     )
-    parser.add_argument(
-        "--unfinished", action="store_true", help="add sessions whose plan is not finished too"
-    )
+    parser.flag("--unfinished", "add sessions whose plan is not finished too")
 
 
-def _json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+def _json(parser: Parser) -> None:
+    parser.flag("--json", "print JSON instead of a table")
 
 
 if __name__ == "__main__":

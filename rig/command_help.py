@@ -139,6 +139,14 @@ class Parser(argparse.ArgumentParser):
         if examples:
             self.epilog = "\n  ".join(["examples:", *examples])
 
+    def flag(self, name: str, text: str) -> None:
+        """Accept an option that is there or not."""
+        self.add_argument(name, action="store_true", help=text)
+
+    def value(self, names: str, metavar: str, text: str, **kind: Any) -> None:
+        """Accept an option or an argument with a value; `kind` is as argparse takes it."""
+        self.add_argument(*names.split(), metavar=metavar, help=text, **kind)
+
     def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
         """Parse; what is left over is the mistake of the sub-command that was named."""
         words = _join_pairs(sys.argv[1:] if args is None else args)
