@@ -385,7 +385,7 @@ WORDINGS: dict[str, Wording] = {
         "the file has a single input, with the edges of all gates",
         "if the gates are on a single wire, say so: {option}"),
     "at_once": _doubt(
-        "run {run}: two inputs change at the same time, {time_s:.6f} s from its first second",
+        "two inputs change at the same time in line {line}",
         "is a row missing? otherwise take the file as it is with --as-read"),
     "rows_unused": _doubt(
         "{unused} of {rows:row} unused: lines {lines}",

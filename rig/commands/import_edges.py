@@ -57,8 +57,6 @@ _COMPARED = 3
 _EXCESS = 4
 """Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
 that flickers makes a few more than two."""
-_EXACT_S = 1e-5
-"""Of times: two gates never change within the same one, but for one drop in thousands."""
 
 
 def main(arguments: Namespace) -> int:
@@ -168,11 +166,11 @@ def _account(file: TimerFile, reading: FileReading, bars: int, arguments: Namesp
             if count > _EXCESS * bars and not arguments.as_read:
                 excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
                 raise refusal(arguments.events, "more_edges", **excess)
-        ticks = Counter(edge.tick for edge in drop.edges)
-        together = next((tick for tick, count in ticks.items() if count > 1), None)
-        exact = (file.period_s or 0.0) < _EXACT_S
-        if together is not None and exact and not arguments.as_read:
-            raise refusal(arguments.events, "at_once", run=drop.run, time_s=together / drop.tick_hz)
+    # Of changes alone, two in a row mean that the row of the first is missing.
+    changes = Counter((p.line, p.tick) for group in file.groups for p in group.passages)
+    together = next((line for (line, _), count in changes.items() if count > 1), 0)
+    if together and not file.period_s and not arguments.as_read:
+        raise refusal(arguments.events, "at_once", line=together)
     unused = sorted(set(file.rows) - reading.lines - file.silent)
     edges = sum(len(drop.edges) for drop in reading.drops)
     counts = {"runs": len(reading.drops), "rows": len(file.rows), "edges": edges}

@@ -242,31 +242,30 @@ def _take_rows_beside_settings(block: RowBlock, table: Table) -> None:
 
 def _strip_names(lines: Sequence[str]) -> tuple[Sequence[str], list[str]]:
     """Take the names out of lines such as ``gate=1 t=402345`` where most have the same."""
-    pairs = [_KEYED.findall(line) if len(line) <= LONGEST else [] for line in lines]
-    filled = sum(bool(line.strip()) for line in lines)
-    named = [[name.strip() for name, _ in row] for row in pairs if len(row) > 1]
+    sample = [line[:LONGEST] for line in lines[:_SAMPLE] if line.strip()]
+    named = [[name.strip() for name, _ in _KEYED.findall(line)] for line in sample]
     names = max(named, key=len, default=[])
-    if sum(len(set(names) & set(row)) > 1 for row in named) * 2 <= filled:
-        return _strip_sentences(lines, filled)
-    rows = [{name.strip(): value for name, value in row} for row in pairs]
-    return [
-        "\t".join(row.get(name, "") for name in names) if set(row) & set(names) else line
-        for line, row in zip(lines, rows, strict=True)
-    ], names
+    if sum(len(set(names) & set(row)) > 1 for row in named) * 2 > len(sample):
+        return [_take_values(line, names) for line in lines], names
+    matches = [match for line in sample if (match := _SENTENCE.search(line))]
+    units = {match[5] for match in matches}
+    if len(units) == 1 and len(matches) * 2 > len(sample):
+        return [_take_sentence(line) for line in lines], ["gate", f"time ({units.pop()})", "state"]
+    return lines, []
 
 
-def _strip_sentences(lines: Sequence[str], filled: int) -> tuple[Sequence[str], list[str]]:
-    """Take gate, state and time out of sentences where most lines are such, with one unit."""
-    matches = [_SENTENCE.search(line) if len(line) <= LONGEST else None for line in lines]
-    units = {match[5] for match in matches if match}
-    if len(units) != 1 or sum(map(bool, matches)) * 2 <= filled:
-        return lines, []
-    return [
-        (f"0\t{line}\t" if len(re.findall("[0-9]+", line[:LONGEST])) > 1 else line)
-        if match is None
-        else f"{match[1]}\t{match[4]}\t{int((match[3].lower() != 'clear') is not bool(match[2]))}"
-        for line, match in zip(lines, matches, strict=True)
-    ], ["gate", f"time ({units.pop()})", "state"]
+def _take_values(line: str, names: Sequence[str]) -> str:
+    row = {name.strip(): value for name, value in _KEYED.findall(line[:LONGEST])}
+    return "\t".join(row.get(name, "") for name in names) if set(row) & set(names) else line
+
+
+def _take_sentence(line: str) -> str:
+    """Take gate, time and state out of a sentence; a line that is none stays, as a faulty row."""
+    match = _SENTENCE.search(line[:LONGEST])
+    if match is None:
+        return f"0\t{line}\t" if len(re.findall("[0-9]+", line[:LONGEST])) > 1 else line
+    blocked = (match[3].lower() != "clear") is not bool(match[2])
+    return f"{match[1]}\t{match[4]}\t{int(blocked)}"
 
 
 def is_number(text: str) -> bool:

@@ -44,7 +44,7 @@ def read_vcd(
         problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
     elif scale is None:
         problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
-    unit, time = int(scale[1]) * _PS[scale[2]] if scale else 0, 0
+    unit, time, stamp = int(scale[1]) * _PS[scale[2]] if scale else 0, 0, 0
     first: dict[str, bool] = {}
     current: dict[str, tuple[bool, int]] = {}
     passages: list[Passage] = []
@@ -54,7 +54,7 @@ def read_vcd(
                 if len(word) > LONGEST:
                     problems.reject(number, 1, "time", word, "a time that a drop can have")
                     continue
-                last, time = time, int(word[1:]) * unit
+                last, time, stamp = time, int(word[1:]) * unit, number
                 if time < last:
                     problems.add(number, 1, "time", "backwards", text=word)
             elif word[0] in "01" and word[1:] in names:
@@ -64,7 +64,7 @@ def read_vcd(
                     accepted = "a change: this wire has another value at this time already"
                     problems.reject(number, 1, name, word, accepted)
                 if before is not high:
-                    passages.append(Passage(time, name, None, high, number))
+                    passages.append(Passage(time, name, None, high, stamp))
                 first.setdefault(name, high)
                 current[name] = high, time
     return passages, first, unit
