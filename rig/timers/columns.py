@@ -195,6 +195,7 @@ def _role(name: str, unit: str, gate: str, texts: Sequence[str], table: Table) -
         timed and normal(name).strip("()[] ") in words()[f"unit {unit}"]
     )
     rules = (
+        ("index", has_role(name, "index") and counts(texts)),
         ("time", timed and not levels and (darkens or has_role(name, "moment"))),
         ("state", has_role(name, "state") and not timed),
         ("duration", has_role(name, "duration")),

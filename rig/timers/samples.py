@@ -37,7 +37,12 @@ _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
 LEVELS = {"high": 1.0, "one": 1.0, "low": 0.0, "zero": 0.0}
 _UNKNOWN = {"x", "z", ""}
-_ACCEPTED = {"time": "a time", "level": "a level: 0 or 1", "volts": "a number of volts"}
+_ACCEPTED = {
+    "time": "a time",
+    "index": "a number of the sample",
+    "level": "a level: 0 or 1",
+    "volts": "a number of volts",
+}
 _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
 
@@ -108,6 +113,7 @@ class SampleReader:
         self._block, self._table, self._problems = block, table, problems
         inputs = [column for column in columns if column.role in {"level", "volts"}]
         self._time = next((column for column in columns if column.role == "time"), None)
+        self._index = next((column for column in columns if column.role == "index"), None)
         self._times = self._read_times()
         steps = np.diff(self._times) if len(block.rows) > 1 else np.zeros(1)
         middle = float(np.median(steps))
@@ -125,7 +131,10 @@ class SampleReader:
         if self._time is not None:
             times = self._read_cells([self._time])[:, 0]
         elif base is not None:
-            return base[0] + base[1] * np.arange(len(block.rows), dtype=np.float64)
+            numbers = np.arange(len(block.rows), dtype=np.float64)
+            if self._index is not None:  # a row may be missing
+                numbers = self._read_cells([self._index])[:, 0]
+            return base[0] + base[1] * (numbers - numbers[0])
         else:
             self._problems.refuse(block.rows[0], 1, "no_rate", lacks="a column of times or a rate")
         for n in np.flatnonzero(np.diff(times) < 0.0)[:50].tolist():

@@ -40,7 +40,7 @@ def _span(edges) -> float:
 
 def differs(runs, shape: Shape, deleted: int = 0) -> str:
     """Say in what runs are not the truth, of which some edges may be left out with their rows."""
-    within = max(2e-6, 2 * shape.sampled)
+    within = max(2e-6, (2 + shape.bare * deleted) * shape.sampled)
     missing = 0
     if not 0 <= len(shape.truth) - len(runs) <= bool(deleted) * 2:
         return f"{len(runs)} runs"
