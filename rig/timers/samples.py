@@ -134,7 +134,7 @@ class SampleReader:
             numbers = np.arange(len(block.rows), dtype=np.float64)
             if self._index is not None:  # a row may be missing
                 numbers = self._read_cells([self._index])[:, 0]
-            return base[0] + base[1] * (numbers - numbers[0])
+            return np.asarray(base[0] + base[1] * (numbers - numbers[0]), dtype=np.float64)
         else:
             self._problems.refuse(block.rows[0], 1, "no_rate", lacks="a column of times or a rate")
         for n in np.flatnonzero(np.diff(times) < 0.0)[:50].tolist():
