@@ -338,12 +338,11 @@ class Session(Reader):
             (run, attempt, str(state), encodable(text), host_ns),
         )
 
-    def attach(self, name: str, data: bytes) -> None:
-        """Add a file, such as a photograph of the rig."""
-        now = datetime.now(UTC).isoformat(timespec="seconds")
+    def attach(self, added: str, name: str, data: bytes) -> None:
+        """Add a file, such as a photograph of the rig, with the time (UTC) of that."""
         self._add(
             "INSERT INTO attachment (added, name, data) VALUES (?, ?, ?)",
-            (now, encodable(name), data),
+            (added, encodable(name), data),
         )
 
     def unblind(self) -> None:
