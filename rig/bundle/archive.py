@@ -26,6 +26,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The first date that the format knows."""
 _LOCAL_HEADER = 30
 """Bytes before a member's name (APPNOTE.TXT, 4.3.7)."""
+_MAGIC = b"PK"
 _LARGEST = 1 << 31
 
 
@@ -67,9 +68,12 @@ def read_bundle(path: str | os.PathLike[str]) -> BundleContents:
 
 
 def is_archive(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is meant to be a bundle: by its beginning, its end or its name."""
+    """Whether a file is meant to be a bundle: by its name or its first bytes."""
     place = Path(path)
-    return place.suffix == ".eln" or (place.is_file() and zipfile.is_zipfile(place))
+    if place.suffix == ".eln" or not place.is_file():
+        return place.suffix == ".eln"
+    with place.open("rb") as stream:
+        return stream.read(len(_MAGIC)) == _MAGIC
 
 
 def _members(place: Path, data: bytes) -> dict[str, bytes]:

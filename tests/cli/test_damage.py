@@ -30,6 +30,7 @@ COMMANDS = {
     "replay": (),
     "export": ("--csv", "tables"),
     "report": ("-o", "page.html"),
+    "verify": (),
 }
 
 
