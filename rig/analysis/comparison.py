@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.distributions import chi2_tail, coverage_factor
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Deviation, Measured
 from rig.measurands import averaged
 from rig.predictions import coefficient_slopes, predicted_run
@@ -72,15 +73,8 @@ class Difference:
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        return {
-            **self.condition.json(),
-            "n": self.n,
-            "difference": self.value,
-            "u": self.u,
-            "normalized_error": self.normalized_error,
-            "chi2": self.chi2,
-            "p": self.p,
-        }
+        names = ("n", "u", "normalized_error", "chi2", "p")
+        return {**self.condition.json(), "difference": self.value, **attributes(self, *names)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,13 +105,8 @@ class Comparison:
 
     def json(self) -> dict[str, Any]:
         """One of ``comparison``."""
-        return {
-            "quantity": self.quantity,
-            "chi2": self.chi2,
-            "degrees": self.degrees,
-            "p": self.p,
-            "inclines": [one.json() for one in self.differences],
-        }
+        said = attributes(self, "quantity", "chi2", "degrees", "p")
+        return said | {"inclines": plain(self.differences)}
 
 
 def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[Comparison, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 from rig.analysis.annealing import MISSED, STRAYS, split
 from rig.analysis.chain_records import QUICK
 from rig.analysis.later_passages import later_passages
+from rig.analysis.plain_data import attributes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -78,7 +79,7 @@ class UnmatchedEdge:
 
     def json(self) -> dict[str, Any]:
         """One member of ``causes``."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        return attributes(self, *self.__slots__)
 
 
 def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:

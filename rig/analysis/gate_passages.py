@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.dual import Dual
+from rig.analysis.plain_data import attributes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,11 +41,8 @@ class GatePassage:
 
     def json(self) -> dict[str, Any]:
         """One member of ``gates`` of a run."""
-        found: dict[str, Any] = {"channel": self.channel, "height_m": self.height_m}
-        found["speed_m_s"] = self.speed.json()
-        if self.interval is not None:
-            found["interval_s"] = self.interval.json()
-        return found
+        found = attributes(self, "channel", "height_m") | {"speed_m_s": self.speed.json()}
+        return found if self.interval is None else found | {"interval_s": self.interval.json()}
 
 
 def gate_passages(

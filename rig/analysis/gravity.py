@@ -22,6 +22,7 @@ from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import Expected
 from rig.analysis.evidence import STATED_WEIGHT
+from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
 from rig.analysis.result import GOOD, Measured, average
 from rig.analysis.trajectory import free_trajectory
@@ -75,13 +76,8 @@ class GravityCheck:
 
     def json(self) -> dict[str, Any]:
         """A member of ``calibration``."""
-        return {
-            "gravity_m_s2": self.measured.json(),
-            "stated_m_s2": self.stated.value,
-            "drops": self.drops,
-            "normalized_error": self.normalized_error,
-            "agrees": self.agrees,
-        }
+        said = {"gravity_m_s2": self.measured.json(), "stated_m_s2": self.stated.value}
+        return said | attributes(self, "drops", "normalized_error", "agrees")
 
 
 @one_thread

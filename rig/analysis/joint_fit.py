@@ -22,6 +22,7 @@ from rig.analysis.evidence import Evidence
 from rig.analysis.fit import Matched, match, without_strays
 from rig.analysis.joint_step import DropState, joint_step, take
 from rig.analysis.likeness import likeness
+from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.analysis.unknowns import SharedUnknowns
 from rig.protocol.protocol import GUESSED
@@ -151,26 +152,24 @@ class JointFit:
             marked as not identified.
         """
         variance = np.diag(self.covariance)
-        beforehand = stated(self.drops[0].model.protocol)
+        beforehand = attributes(stated(self.drops[0].model.protocol), *self.degrees)
+        scatter = attributes(self.components, *self.degrees)
+        columns = {
+            "value": self.x,
+            "u": np.sqrt(variance) * self.sd,
+            "prior_u": self.sd,
+            "identified": variance <= 1.0 - IDENTIFIED,
+        }
         return {
             "runs": len(self.drops),
             "scatter": [
-                {
-                    "name": name,
-                    "stated": getattr(beforehand, name),
-                    "found": getattr(self.components, name),
-                    "degrees": degrees,
-                }
-                for name, degrees in self.degrees.items()
+                {"name": name, "stated": known, "found": scatter[name], "degrees": degrees}
+                for (name, degrees), known in zip(
+                    self.degrees.items(), beforehand.values(), strict=True
+                )
             ],
             "unknowns": [
-                {
-                    "name": name,
-                    "value": self.x[block].tolist(),
-                    "u": (np.sqrt(variance[block]) * self.sd[block]).tolist(),
-                    "prior_u": self.sd[block].tolist(),
-                    "identified": (variance[block] <= 1.0 - IDENTIFIED).tolist(),
-                }
+                {"name": name} | {key: values[block].tolist() for key, values in columns.items()}
                 for name, block in self.shared.blocks.items()
                 if self.sd[block].any()
             ],
@@ -179,30 +178,13 @@ class JointFit:
 
 def by_itself(fit: Fit) -> JointFit:
     """Take a drop that was adjusted by itself for a session that has nothing in common."""
-    estimate, none = fit.estimate, np.zeros(0, dtype=np.intp)
-    size = estimate.x.size
-    drop = JointDrop(
-        fit.model,
-        fit.matches,
-        estimate.x,
-        np.arange(size),
-        none,
-        none,
-        estimate.inverse,
-        np.zeros((size, 0)),
-    )
-    nothing = np.zeros(0)
+    estimate, model = fit.estimate, fit.model
+    nothing, all_own = np.zeros(0, dtype=np.intp), np.arange(fit.x.size)
+    gain = np.zeros((fit.x.size, 0))
+    drop = JointDrop(model, fit.matches, fit.x, all_own, nothing, nothing, estimate.inverse, gain)
     degrees = {"jitter": estimate.degrees, "impulse": GUESSED}
-    return JointFit(
-        SharedUnknowns(()),
-        nothing,
-        nothing,
-        np.zeros((0, 0)),
-        fit.model.components,
-        degrees,
-        (drop,),
-        estimate.settled,
-    )
+    shared, x = SharedUnknowns(()), np.zeros(0)
+    return JointFit(shared, x, x, gain[:0], model.components, degrees, (drop,), estimate.settled)
 
 
 @one_thread

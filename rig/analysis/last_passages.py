@@ -16,6 +16,7 @@ from rig.analysis.dual import Dual
 from rig.analysis.quantities import Adjusted
 from rig.analysis.result import Measured
 from rig.analysis.square_root import EquationRows, eliminate
+from rig.measurands import MEASURANDS
 from rig.reasons import Reason, make_reason
 
 if TYPE_CHECKING:
@@ -100,21 +101,16 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
 def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) -> list[Reason]:
     """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
     reasons = []
-    for name, code, unit in (
-        ("speed_m_s", "last_speed_differs", "m_s"),
-        ("separation_raw_m", "last_separation_differs", "m"),
-    ):
+    codes = {"speed_m_s": "last_speed_differs", "separation_raw_m": "last_separation_differs"}
+    for name, code in codes.items():
         if name not in found or name not in alone:
             continue
-        one, other = found[name], alone[name]
+        whole, last = found[name], alone[name]
         # They share their last edges and so the errors of these: they are nearer than that.
-        if abs(one.value - other.value) > _APART * math.hypot(one.u, other.u):
-            values = {
-                f"alone_{unit}": other.value,
-                "alone_U95": other.expanded,
-                f"whole_{unit}": one.value,
-                "whole_U95": one.expanded,
-            }
+        if abs(whole.value - last.value) > _APART * math.hypot(whole.u, last.u):
+            unit = name.removeprefix(MEASURANDS[name].stem)
+            values = {f"alone{unit}": last.value, f"whole{unit}": whole.value}
+            values |= {"alone_U95": last.expanded, "whole_U95": whole.expanded}
             reasons.append(make_reason(code, **values))
     return reasons
 

@@ -6,6 +6,8 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rig.analysis.plain_data import attributes
+
 if TYPE_CHECKING:
     from rig.analysis.joint_fit import JointFit
 
@@ -53,8 +55,8 @@ class Likeness(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """``{"like_model", "departure_m", "impulses", "sentence"}``."""
-        return {"like_model": self.like, "departure_m": self.departure, "impulses": self.impulses,
-                "sentence": self.sentence}  # fmt: skip
+        said = {"like_model": self.like, "departure_m": self.departure}
+        return said | attributes(self, "impulses", "sentence")
 
 
 def likeness(joint: JointFit) -> Likeness | None:

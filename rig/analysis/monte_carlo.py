@@ -12,15 +12,17 @@ import numpy as np
 from rig.analysis.adjust import adjust
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.joint_step import DropState, joint_step, take
+from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import measurands
 from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointDrop, JointFit
     from rig.analysis.result import Measured
@@ -63,17 +65,17 @@ class Propagated:
         return cls(float(values.mean()), float(values.std(ddof=1)), float(low), float(high))
 
     @classmethod
-    def all(cls, drawn: Iterator[Mapping[str, float]], trials: int) -> dict[str, Propagated]:
-        """Sum up so many trials of several quantities by name."""
+    def all(cls, drawn: Iterable[Mapping[str, float]]) -> dict[str, Propagated]:
+        """Sum up trials of several quantities by name."""
         values: dict[str, list[float]] = {}
-        for one in islice(drawn, trials):
+        for one in drawn:
             for name, value in one.items():
                 values.setdefault(name, []).append(value)
         return {name: cls.of(np.array(each)) for name, each in values.items()}
 
     def json(self) -> dict[str, float]:
         """``{"mean", "u", "low", "high"}``."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        return attributes(self, *self.__slots__)
 
 
 @one_thread
@@ -92,7 +94,7 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
     seed
         Of the generator; the same seed gives the same trials.
     """
-    return Propagated.all(_drawn(fit, seed), trials)
+    return Propagated.all(islice(_drawn(fit, seed), trials))
 
 
 @one_thread
@@ -116,7 +118,7 @@ def until_decided(
     every: list[Mapping[str, float]] = []
     while True:
         every += islice(drawn, min(max(first, len(every)), most - len(every)))
-        found = Propagated.all(iter(every), len(every))
+        found = Propagated.all(every)
         if len(every) >= most or all(
             agreement(measured[name].value, measured[name].u, one, len(every)).decided
             for name, one in found.items()
@@ -142,39 +144,36 @@ def adaptive(
     found, trials
         M, a multiple of `block`.
     """
-    one = _drawn(fit, seed)
-    return until_stable(lambda: [next(one) for _ in range(block)], digits)
+    return until_stable(_drawn(fit, seed), block, digits)
 
 
 def until_stable(
-    draw: Callable[[], Sequence[Mapping[str, float]]], digits: int = 1
+    drawn: Iterator[Mapping[str, float]], block: int, digits: int = 1
 ) -> tuple[dict[str, Propagated], int]:
     """Draw blocks of trials until all results are stable to so many digits of u.
 
     That is: until twice the standard errors of mean, u and both ends of the interval, from block to
     block, are within the tolerance δ.
-
-    Parameters
-    ----------
-    draw
-        Makes one block.
     """
     every: list[Mapping[str, float]] = []
-    blocks: dict[str, list[Array]] = {}
+    blocks: list[dict[str, Propagated]] = []
     while True:
-        new = draw()
+        new = list(islice(drawn, block))
         every += new
-        for name, one in Propagated.all(iter(new), len(new)).items():
-            blocks.setdefault(name, []).append(np.array(list(one.json().values())))
-        found = Propagated.all(iter(every), len(every))
-        if all(_stable(blocks[name], tolerance(one.u, digits)) for name, one in found.items()):
+        blocks.append(Propagated.all(new))
+        found = Propagated.all(every)
+        if all(
+            _stable([one[name] for one in blocks if name in one], tolerance(whole.u, digits))
+            for name, whole in found.items()
+        ):
             return found, len(every)
 
 
-def _stable(blocks: Sequence[Array], within: float) -> bool:
+def _stable(blocks: Sequence[Propagated], within: float) -> bool:
     if len(blocks) < 2:
         return False
-    errors = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
+    ends = [list(one.json().values()) for one in blocks]
+    errors = np.std(ends, axis=0, ddof=1) / math.sqrt(len(blocks))
     return bool(2.0 * errors.max() <= within)
 
 
@@ -190,7 +189,7 @@ def _drawn(fit: Fit, seed: int) -> Iterator[dict[str, float]]:
         centre = _stated(sd) * rng.normal(size=sd.size)
         shaken = model.shaken(moved)
         estimate = adjust(shaken, fit.matches, at, centre)
-        yield {name: one.value for name, one in measurands(shaken, estimate.x).items()}
+        yield _values(shaken, estimate.x)
 
 
 @one_thread
@@ -207,7 +206,7 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
     """
     rng = np.random.default_rng(seed)
     scatters = [_scatters(drop) for drop in joint.drops]
-    found: list[dict[str, list[float]]] = [{} for _ in joint.drops]
+    found: list[list[dict[str, float]]] = [[] for _ in joint.drops]
     for _ in range(trials):
         centre = _stated(joint.sd) * rng.normal(size=joint.sd.size)
         states, x = [], joint.x
@@ -222,11 +221,12 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
             step = joint_step(states, x, joint.sd, centre).step()
             x = take(states, x, joint.sd, step)
         for one, values in zip(states, found, strict=True):
-            for name, result in measurands(one.model, one.x).items():
-                values.setdefault(name, []).append(result.value)
-    return [
-        {name: Propagated.of(np.array(values)) for name, values in drop.items()} for drop in found
-    ]
+            values.append(_values(one.model, one.x))
+    return [Propagated.all(values) for values in found]
+
+
+def _values(model: DropModel, x: Array) -> dict[str, float]:
+    return {name: one.value for name, one in measurands(model, x).items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,8 +260,7 @@ class Agreement:
 
     def json(self) -> dict[str, Any]:
         """``{"d_low", "d_high", "tolerance", "error", "agrees", "decided"}``."""
-        found: dict[str, Any] = {name: getattr(self, name) for name in self.__slots__}
-        return found | {"agrees": self.agrees, "decided": self.decided}
+        return attributes(self, *self.__slots__, "agrees", "decided")
 
 
 def tolerance(u: float, digits: int = 1) -> float:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD, Measured, average
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs as planned_runs
@@ -61,13 +62,8 @@ class Effects:
 
     def json(self) -> dict[str, Any]:
         """One member of ``effects``."""
-        return {
-            "incline_deg": self.incline_deg,
-            "chains": [self.first, self.second],
-            "blocks": self.blocks,
-            "chain": {name: found.json() for name, found in self.chain.items()},
-            "side": {name: found.json() for name, found in self.side.items()},
-        }
+        said = attributes(self, "incline_deg", "blocks", "chain", "side")
+        return said | {"chains": [self.first, self.second]}
 
 
 def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -122,9 +122,14 @@ class Adjusted:
     x: Array
 
     @property
+    def strikes(self) -> bool:
+        """Whether a chain strikes anything."""
+        return "impact" in self.model.records
+
+    @property
     def both(self) -> bool:
-        """Whether a free chain falls beside one that strikes."""
-        return {"impact", "free"} <= set(self.model.records)
+        """Whether a free chain falls beside it."""
+        return self.strikes and "free" in self.model.records
 
     def linear(self, name: str, share: Array | float = 1.0) -> Dual:
         """Return a sum of a block's members, nothing where the scene has none.
@@ -229,7 +234,7 @@ class Adjusted:
         `None` where nothing is struck, or so high that the chain never falls from there to the
         level.
         """
-        if "impact" not in self.model.records:
+        if not self.strikes:
             return None
         speed, contact = self.speed, self.model.protocol.contact
         above = contact.strike.value + self.linear("contact") + self.linear("strike")
@@ -246,70 +251,27 @@ class Adjusted:
         return self.top("free", self.levels("free", moment))[0]
 
 
-def _gravity(drop: Adjusted) -> Dual | None:
-    """The acceleration of what falls and strikes nothing."""
-    return None if drop.model.protocol.track is not None else _acceleration(drop)
-
-
-def _track_acceleration(drop: Adjusted) -> Dual | None:
-    """The acceleration of what goes down a track."""
-    return None if drop.model.protocol.track is None else _acceleration(drop)
-
-
-def _acceleration(drop: Adjusted) -> Dual | None:
-    return None if "impact" in drop.model.records else drop.gravity
-
-
-def _speed(drop: Adjusted) -> Dual | None:
-    """V just before the top rod strikes."""
-    return drop.speed if "impact" in drop.model.records else None
-
-
-def _fall_time(drop: Adjusted) -> Dual | None:
-    """How long it takes until the top rod strikes."""
-    return drop.hit - drop.release("impact") if "impact" in drop.model.records else None
-
-
-def _release_skew(drop: Adjusted) -> Dual | None:
-    """The free chain's release less the impact chain's."""
-    return drop.skew if drop.both else None
-
-
-def _separation_raw(drop: Adjusted) -> Dual | None:
-    """Δz at the instant of the top rod's strike."""
-    return drop.apart(drop.hit) if drop.both else None
-
-
-def _separation(drop: Adjusted) -> Dual | None:
-    """Δz had both chains been let go together: the free one that much later, or earlier.
-
-    The free chain is read off where it was as long after its own release: no model of what it would
-    have done comes in.
-    """
-    return drop.apart(drop.hit + drop.skew) if drop.both else None
-
-
-def _speed_strike(drop: Adjusted) -> Dual | None:
-    """V as the top rod really strikes, on the board or on the rods that lie there."""
-    return None if drop.strike is None else drop.strike.speed
-
-
-def _separation_strike(drop: Adjusted) -> Dual | None:
-    """Δz as the top rod really strikes, had both chains been let go together."""
-    if not drop.both or drop.strike is None:
-        return None
-    return drop.apart(drop.strike.when + drop.skew) - drop.strike.above
+def _acceleration(drop: Adjusted, *, track: bool) -> Dual | None:
+    """Return the acceleration of what strikes nothing, of a free fall or down a track."""
+    down = drop.model.protocol.track is not None
+    return drop.gravity if down == track and not drop.strikes else None
 
 
 COMPUTED: dict[str, Callable[[Adjusted], Dual | None]] = {
-    "separation_m": _separation,
-    "separation_raw_m": _separation_raw,
-    "separation_strike_m": _separation_strike,
-    "release_skew_s": _release_skew,
-    "speed_m_s": _speed,
-    "speed_strike_m_s": _speed_strike,
-    "fall_time_s": _fall_time,
-    "gravity_m_s2": _gravity,
-    "acceleration_m_s2": _track_acceleration,
+    # The free chain is read off as long after its own release as the other one takes to strike: no
+    # model of what it would have done comes in.
+    "separation_m": lambda drop: drop.apart(drop.hit + drop.skew) if drop.both else None,
+    "separation_raw_m": lambda drop: drop.apart(drop.hit) if drop.both else None,
+    "separation_strike_m": lambda drop: (
+        drop.apart(drop.strike.when + drop.skew) - drop.strike.above
+        if drop.both and drop.strike
+        else None
+    ),
+    "release_skew_s": lambda drop: drop.skew if drop.both else None,
+    "speed_m_s": lambda drop: drop.speed if drop.strikes else None,
+    "speed_strike_m_s": lambda drop: drop.strike.speed if drop.strike else None,
+    "fall_time_s": lambda drop: drop.hit - drop.release("impact") if drop.strikes else None,
+    "gravity_m_s2": partial(_acceleration, track=False),
+    "acceleration_m_s2": partial(_acceleration, track=True),
 }
 """How each row of `rig.measurands` follows from the unknowns; `None` where the scene has none."""

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
+from rig.analysis.plain_data import attributes, plain
 from rig.errors import InputError
 from rig.reasons import make_error, reasons_json
 
@@ -188,8 +189,7 @@ class Audit:
 
     def json(self) -> dict[str, int]:
         """``edges`` of a run as `rig analyze --json` prints it."""
-        names = ("received", "matched", "missed", "spurious", "lost")
-        return {name: getattr(self, name) for name in names}
+        return attributes(self, "received", "matched", "missed", "spurious", "lost")
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,33 +240,17 @@ class DropResult:
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
-        found: dict[str, Any] = {
-            "run": self.run.number,
-            "attempt": self.attempt,
-            "incline_deg": self.run.incline_deg,
-            "impact_chain": self.run.impact,
-        }
+        found: dict[str, Any] = {"run": self.run.number, "attempt": self.attempt}
+        found |= {"incline_deg": self.run.incline_deg, "impact_chain": self.run.impact}
         found |= {"damaged": True} if self.damaged else {}
-        found |= {name: value.json() for name, value in self.quantities.items()}
-        if self.gates:
-            found["gates"] = [one.json() for one in self.gates]
-        found["edges"] = self.audit.json()
+        found |= plain(self.quantities)
+        found |= {"edges": self.audit.json(), "unexplained_edges": self.audit.unexplained}
         if self.matches:
-            found["causes"] = [edge.json() for edge in self.unmatched]
-        found["unexplained_edges"] = self.audit.unexplained
-        if self.scatter is not None:
-            found["scatter"] = self.scatter
-        if self.last_passages:
-            found["last_passages"] = {n: one.json() for n, one in self.last_passages.items()}
-        found["learned"] = self.learned
-        if self.learned:
-            found["alone"] = {name: value.json() for name, value in self.alone.items()}
-        found["verdict"] = self.verdict
-        found |= reasons_json(self.reasons)
-        found["degrees"] = {
-            name: value.degrees if math.isfinite(value.degrees) else None
-            for name, value in self.quantities.items()
-        }
+            found["causes"] = plain(self.unmatched)
+        names = ("gates", "scatter", "last_passages", "alone")
+        found |= attributes(self, *(name for name in names if getattr(self, name)))
+        found |= attributes(self, "learned", "verdict") | reasons_json(self.reasons)
+        found["degrees"] = plain({name: one.degrees for name, one in self.quantities.items()})
         found["budget"] = [
             {"name": source, "quantity": name, "u": u}
             for name, value in self.quantities.items()

@@ -6,8 +6,8 @@ was stated is one member among many, and no linear formula knows how little that
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.adjust import adjust
@@ -19,11 +19,9 @@ from rig.protocol.protocol import Priors
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
-    from rig.protocol.protocol import Gates, Protocol
+    from rig.protocol.protocol import Protocol
 
 FACTOR = 3.0
 
@@ -44,8 +42,9 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     protocol = protocol.stated or protocol
     here = _again(protocol, analysis)
     rows = []
-    for name, scaled in _priors(protocol):
-        wider, narrower = (_again(scaled(by), analysis) for by in (FACTOR, 1.0 / FACTOR))
+    for name, place in _priors(protocol).items():
+        changed = (_widened(protocol, place, by) for by in (FACTOR, 1.0 / FACTOR))
+        wider, narrower = (_again(other, analysis) for other in changed)
         # Without one of these a prior's line is left out: its joint fit did not converge.
         for line, wide, narrow in zip(here or (), wider or (), narrower or (), strict=False):
             for quantity, mean in line.means.items():
@@ -83,37 +82,21 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
     )
 
 
-def _priors(protocol: Protocol) -> Iterator[tuple[str, Callable[[float], Protocol]]]:
-    """Each prior by its key, and the protocol with that one times a factor."""
-    gates = protocol.gates
-    assert gates is not None
-    for one in fields(Priors):
-        yield one.name, partial(_with_prior, protocol, one.name)
-    yield "height_uncertainty", lambda by: _with_gates(protocol, gates, height=by)
-    yield "datum_uncertainty", lambda by: _with_gates(protocol, gates, datum=by)
-    for key in ("position_u", "width_u"):
-        yield f"{key}ncertainty", partial(_with_chains, protocol, key)
-    yield "drop", lambda by: replace(protocol, drop=replace(protocol.drop, u=by * protocol.drop.u))
-    if protocol.surface is not None:
-        wider = protocol.gravity
-        yield "gravity", lambda by: replace(protocol, gravity=replace(wider, u=by * wider.u))
+def _priors(protocol: Protocol) -> dict[str, tuple[str, ...]]:
+    """Return where a protocol has each prior, by its key."""
+    places: dict[str, tuple[str, ...]] = {one.name: ("priors", one.name) for one in fields(Priors)}
+    places["height_uncertainty"] = ("gates", "height_u")
+    places["datum_uncertainty"] = ("gates", "datum_u")
+    places["position_uncertainty"] = ("chains", "position_u")
+    places["width_uncertainty"] = ("chains", "width_u")
+    places["drop"] = ("drop", "u")
+    return places if protocol.surface is None else places | {"gravity": ("gravity", "u")}
 
 
-def _with_prior(protocol: Protocol, name: str, by: float) -> Protocol:
-    priors = protocol.priors
-    return replace(protocol, priors=replace(priors, **{name: by * getattr(priors, name)}))
-
-
-def _with_gates(
-    protocol: Protocol, gates: Gates, height: float = 1.0, datum: float = 1.0
-) -> Protocol:
-    height_u, datum_u = height * gates.height_u, datum * gates.datum_u
-    return replace(protocol, gates=replace(gates, height_u=height_u, datum_u=datum_u))
-
-
-def _with_chains(protocol: Protocol, name: str, by: float) -> Protocol:
-    chains = {
-        key: replace(rods, **{name: by * getattr(rods, name)})
-        for key, rods in protocol.chains.items()
-    }
-    return replace(protocol, chains=chains)
+def _widened(value: Any, place: tuple[str, ...], by: float) -> Any:
+    """Return something with the number at a place multiplied; of several things that of each."""
+    if isinstance(value, Mapping):
+        return {name: _widened(member, place, by) for name, member in value.items()}
+    if not place:
+        return by * value
+    return replace(value, **{place[0]: _widened(getattr(value, place[0]), place[1:], by)})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from rig.analysis.comparison import compare
+from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import COMMON
 from rig.analysis.result import GOOD, Measured, average
 from rig.measurands import MEASURANDS, averaged
@@ -49,9 +50,8 @@ class GateMeans:
 
     def json(self) -> dict[str, Any]:
         """One member of ``gates`` of the summary."""
-        found: dict[str, Any] = {**self.mean.json(), "n": self.n}
-        more = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd}
-        return found | {name: sd for name, sd in more.items() if sd is not None}
+        found = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd, "n": self.n}
+        return self.mean.json() | {name: sd for name, sd in found.items() if sd is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,17 +106,13 @@ class Incline:
             for name, causes in self.causes.items()
             for cause, u in causes.items()
         ]
-        if self.gates:
-            found["gates"] = [one.json() for one in self.gates]
+        found |= attributes(self, "gates") if self.gates else {}
         found["predicted"] = {name: model.value for name, model in self.predicted.items()}
         found["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
         main, *others = self.means
-        found["normalized_error"] = self.normalized_error(main)
-        found |= {
-            f"normalized_error_{MEASURANDS[name].stem}": self.normalized_error(name)
-            for name in others
-        }
-        return found
+        stems = {main: ""} | {name: f"_{MEASURANDS[name].stem}" for name in others}
+        errors = {f"normalized_error{stem}": name for name, stem in stems.items()}
+        return found | {key: self.normalized_error(name) for key, name in errors.items()}
 
 
 def summarize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.estimate import coefficients as of
 from rig.estimate.hypotheses import one_alpha
@@ -39,7 +40,7 @@ class ConditionAlpha:
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        said = {**self.condition.json(), "n": self.n, "alpha": self.alpha.json()}
+        said = self.condition.json() | attributes(self, "n", "alpha")
         return said if self.model is None else said | {"model": self.model}
 
 
@@ -58,12 +59,8 @@ class RunAlpha:
 
     def json(self) -> dict[str, Any]:
         """One of ``runs``."""
-        said = {
-            "run": self.run.number,
-            "incline_deg": self.run.incline_deg,
-            "impact_chain": self.run.impact,
-            "alpha": self.alpha.json(),
-        }
+        said: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
+        said |= {"impact_chain": self.run.impact, "alpha": self.alpha.json()}
         return said if self.residual is None else said | {"residual": self.residual}
 
 
@@ -90,13 +87,8 @@ class SingleAlphas:
     def json(self) -> dict[str, Any]:
         """``alpha`` and ``tests``."""
         tests = {"runs_share_alpha": self.runs_share_alpha, "model": self.by_model}
-        return {
-            "alpha": {
-                "inclines": [one.json() for one in self.inclines],
-                "runs": [one.json() for one in self.runs],
-            },
-            "tests": {name: one.json() for name, one in tests.items() if one is not None},
-        }
+        made = {name: plain(one) for name, one in tests.items() if one is not None}
+        return {"alpha": attributes(self, "inclines", "runs"), "tests": made}
 
 
 def single_alphas(

@@ -12,6 +12,7 @@ from rig.analysis.distributions import coverage_factor
 from rig.analysis.dual import Dual
 from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import by_itself
+from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
 from rig.measurands import SEPARATION
 from rig.model.fall import hits, kicks
@@ -49,11 +50,8 @@ class Curve:
 
     def json(self, name: str) -> dict[str, list[float]]:
         """``{name, name_U95, name_model}``."""
-        return {
-            name: self.measured.tolist(),
-            f"{name}_U95": self.u95.tolist(),
-            f"{name}_model": self.model.tolist(),
-        }
+        ends = {name: self.measured, f"{name}_U95": self.u95, f"{name}_model": self.model}
+        return {key: values.tolist() for key, values in ends.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,15 +78,11 @@ class DropCurves:
 
     def json(self) -> dict[str, Any]:
         """One of ``curves``."""
-        said: dict[str, Any] = {
-            "run": self.run.number,
-            "incline_deg": self.run.incline_deg,
-            "impact_chain": self.run.impact,
-            "height_m": self.height_m.tolist(),
-            **self.squared_speed.json("speed2_m2_s2"),
-        }
+        said: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
+        said |= {"impact_chain": self.run.impact} | attributes(self, "height_m")
+        said |= self.squared_speed.json("speed2_m2_s2")
         if self.separation is not None:
-            said |= {"time_s": self.time_s.tolist(), **self.separation.json(SEPARATION.name)}
+            said |= attributes(self, "time_s") | self.separation.json(SEPARATION.name)
         return said
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.distributions import chi2_tail
+from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.estimate.coefficients import nuisances
 from rig.estimate.hypotheses import END, ended, one_alpha
@@ -104,8 +105,8 @@ class EndCorrection:
             "p_eq10": self._p("eq10"),
         }
         if self.gamma is not None:
-            said |= {"gamma_eq10": self.gamma_eq10, "gamma": self.gamma.json()}
-        return said | {"needed": self.needed, "sentence": self.sentence}
+            said |= attributes(self, "gamma_eq10", "gamma")
+        return said | attributes(self, "needed", "sentence")
 
 
 def _above_least(values: Mapping[str, float]) -> dict[str, float]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rig.model.surface import Surface
 
     Array = NDArray[np.float64]
+    Index = NDArray[np.intp]
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 END, AIR = "end_correction", "drag"
@@ -100,36 +101,35 @@ def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
 
 def one_alpha(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
     """Suppose one α for all drops that share a key: an incline, or a run."""
-    keys = list(dict.fromkeys(map(key, forms)))
-    starts = [float(np.mean([f.alphas.mean() for f in forms if key(f) == one])) for one in keys]
-
-    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        n = keys.index(key(form))
-        slopes = np.zeros((form.alphas.size, values.size))
-        slopes[:, n] = 1.0
-        return _padded(np.full(form.alphas.size, values[n]), slopes)
-
-    parameters = (Parameter(f"α {one}", start) for one, start in zip(keys, starts, strict=True))
-    return Hypothesis(tuple(parameters), targets)
+    return _open(forms, key, lambda rods: {"": np.arange(rods)})
 
 
 def each_rod(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
     """Suppose an α for each rod but the top one, whose impact pulls on nothing."""
-    keys = list(dict.fromkeys(map(key, forms)))
-    starts, first, at = [], {}, 0
-    for one in keys:
-        alphas = np.mean([f.alphas for f in forms if key(f) == one], axis=0)[:-1]
-        first[one] = at
-        at += alphas.size
-        starts += [Parameter(f"α {one}, rod {k}", float(x)) for k, x in enumerate(alphas)]
+    return _open(forms, key, lambda rods: {f", rod {k}": np.array([k]) for k in range(rods - 1)})
+
+
+def _open(
+    forms: Sequence[QuadraticForm],
+    key: Callable[[QuadraticForm], object],
+    split: Callable[[int], Mapping[str, Index]],
+) -> Hypothesis:
+    """Suppose an α for each of some sets of rods of all drops that share a key."""
+    parameters: list[Parameter] = []
+    sets: dict[object, list[tuple[int, Index]]] = {}
+    for one in dict.fromkeys(map(key, forms)):
+        alphas = np.array([form.alphas for form in forms if key(form) == one])
+        for name, rods in split(alphas.shape[1]).items():
+            sets.setdefault(one, []).append((len(parameters), rods))
+            parameters.append(Parameter(f"α {one}{name}", float(alphas[:, rods].mean())))
 
     def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        rods, begin = form.alphas.size, first[key(form)]
-        slopes = np.zeros((rods, values.size))
-        slopes[np.arange(rods - 1), begin + np.arange(rods - 1)] = 1.0
-        return _padded(np.append(values[begin : begin + rods - 1], 0.0), slopes)
+        slopes = np.zeros((form.alphas.size, values.size))
+        for place, rods in sets[key(form)]:
+            slopes[rods, place] = 1.0
+        return _padded(slopes @ values, slopes)
 
-    return Hypothesis(tuple(starts), targets)
+    return Hypothesis(tuple(parameters), targets)
 
 
 def ended(

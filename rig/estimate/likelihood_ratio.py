@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rig.analysis.distributions import chi2_tail
+from rig.analysis.plain_data import attributes
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,4 +36,4 @@ class LikelihoodRatio:
 
     def json(self) -> dict[str, Any]:
         """``{"chi2", "degrees", "p"}``."""
-        return {"chi2": self.chi2, "degrees": self.degrees, "p": self.p}
+        return attributes(self, "chi2", "degrees", "p")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.plain_data import attributes
 from rig.estimate.coefficients import model, nuisances
 from rig.estimate.hypotheses import MU
 from rig.estimate.hypothesis_fit import Parameter, fit
@@ -52,13 +53,8 @@ class Posterior:
 
     def json(self) -> dict[str, Any]:
         """``posterior``."""
-        return {
-            "nodes": self.weights.size,
-            "names": list(self.names),
-            "weights": self.weights.tolist(),
-            "means": self.means.tolist(),
-            "sds": self.sds.tolist(),
-        }
+        said = attributes(self, "names", "weights", "means", "sds")
+        return said | {"nodes": self.weights.size}
 
     def moments(self, name: str) -> tuple[float, float]:
         """Mean and standard deviation."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
@@ -59,12 +60,8 @@ class Gain:
 
     def json(self) -> dict[str, Any]:
         """One of ``groups``."""
-        return {
-            "rods": [self.first, self.last],
-            "gain_m_s": self.measured.json(),
-            "eq9_m_s": self.eq9_m_s,
-            "normalized_error": self.normalized_error,
-        }
+        said = {"rods": [self.first, self.last], "gain_m_s": self.measured.json()}
+        return said | attributes(self, "eq9_m_s", "normalized_error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +93,8 @@ class Impulses:
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        return {
-            **self.condition.json(),
-            "rods": self.rods,
-            "resolved": self.resolved,
-            "alpha": self.alpha.json(),
-            **self.eq9.json(),
-            "groups": [one.json() for one in self.gains],
-        }
+        said = self.condition.json() | attributes(self, "rods", "resolved", "alpha")
+        return said | self.eq9.json() | {"groups": plain(self.gains)}
 
 
 def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impulses, ...]:

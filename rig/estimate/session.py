@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.comparison import compare
 from rig.analysis.drop_model import prior_air
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.summary import good_cases
 from rig.analysis.unknowns import SharedUnknowns
@@ -72,13 +73,10 @@ class Coefficient:
 
     def json(self) -> dict[str, Any]:
         """One of ``parameters``."""
-        return {
-            "name": self.name,
-            "identified": self.identified,
-            "least_squares": self.least_squares.json(),
-            "posterior": {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high},
-            "stated": {"value": self.stated.value, "u": self.stated.u},
-        }
+        said = attributes(self, "name", "identified", "least_squares")
+        said["stated"] = {"value": self.stated.value, "u": self.stated.u}
+        known = {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high}
+        return said | {"posterior": known}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +93,7 @@ class ContactPoint:
 
     def json(self) -> dict[str, Any]:
         """One of ``contact``."""
-        return {
-            "incline_deg": self.incline_deg,
-            "height_m": self.height.json(),
-            "identified": self.identified,
-        }
+        return attributes(self, "incline_deg", "identified") | {"height_m": self.height.json()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,18 +125,12 @@ class Coefficients:
 
     def json(self) -> dict[str, Any]:
         """``parameters`` to ``edges_chi2``."""
-        said: dict[str, Any] = {"parameters": [one.json() for one in self.parameters]}
+        said = attributes(self, "parameters", "contact")
         if self.posterior is not None:
             names = [one.name for one in self.parameters]
-            said |= {
-                "correlation": {"names": names, "matrix": self.correlation.tolist()},
-                "posterior": self.posterior.json(),
-            }
-        return said | {
-            "contact": [one.json() for one in self.contact],
-            "drag_per_m": None if self.drag is None else self.drag.json(),
-            "edges_chi2": self.chi2,
-        }
+            said["correlation"] = {"names": names, "matrix": self.correlation.tolist()}
+            said["posterior"] = self.posterior.json()
+        return said | {"drag_per_m": plain(self.drag), "edges_chi2": self.chi2}
 
 
 @dataclass(slots=True)
@@ -180,26 +168,17 @@ class SessionEstimate:
 
     def json(self) -> dict[str, Any]:
         """As `rig estimate --json` prints it."""
-        said: dict[str, Any] = {"drops": self.drops, "edges": self.edges}
-        if self.left_out is not None:
-            said["left_out"] = list(self.left_out)
+        said = attributes(self, "drops", "edges")
         if self.coefficients is not None:
-            end = self.end_correction
-            said |= self.coefficients.json()
-            said["end_correction"] = None if end is None else end.json()
+            said |= self.coefficients.json() | attributes(self, "end_correction")
         if self.alphas is not None:
             said |= self.alphas.json()
         if self.impulses is not None:
-            said["impulses"] = {
-                "inclines": [one.json() for one in self.impulses],
-                "sentence": resolution(self.impulses),
-            }
-        for name, lines in (("comparison", self.comparison), ("curves", self.curves)):
-            if lines is not None:
-                said[name] = [one.json() for one in lines]
-        if self.failed:
-            said["failed"] = list(self.failed)
-        return said
+            sentence = resolution(self.impulses)
+            said["impulses"] = {"inclines": plain(self.impulses), "sentence": sentence}
+        whole = ("left_out", "comparison", "curves")
+        said |= attributes(self, *(name for name in whole if getattr(self, name) is not None))
+        return said | (attributes(self, "failed") if self.failed else {})
 
 
 @one_thread

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import count
 
 import numpy as np
 import pytest
@@ -193,10 +194,11 @@ def test_gauge_block_of_jcgm_101():
     seen = []
 
     def draw():
-        seen.append(gauge_block(rng, 10 * BLOCK))
-        return [{"length": value} for value in seen[-1].tolist()]
+        while True:
+            seen.append(gauge_block(rng, 10 * BLOCK))
+            yield from ({"length": value} for value in seen[-1].tolist())
 
-    found, trials = until_stable(draw, digits=2)
+    found, trials = until_stable(draw(), 10 * BLOCK, digits=2)
     assert trials == 10 * BLOCK * len(seen)
     length = found["length"]
     assert length.mean == pytest.approx(838.0, abs=0.5 + tolerance(36.0, 2))
@@ -212,7 +214,7 @@ def test_gauge_block_of_jcgm_101():
 def test_trials_go_on_until_the_digits_that_count_stand(digits, least, most):
     """Each digit more takes a hundred times as many."""
     rng = np.random.default_rng(9)
-    found, trials = until_stable(lambda: [{"y": y} for y in rng.normal(size=100).tolist()], digits)
+    found, trials = until_stable(({"y": rng.normal()} for _ in count()), 100, digits)
     assert least <= trials / 100 <= most
     assert found["y"].high == pytest.approx(1.96, abs=2.0 * tolerance(1.0, digits))
 

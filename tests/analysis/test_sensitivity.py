@@ -17,9 +17,8 @@ from tests.analysis.sessions import MILD, analysis, cases
 def test_a_prior_moves_results_as_a_protocol_that_states_it_so(count, monkeypatch):
     if count == 4:  # of two drops every prior is tried; joint fits of further ones take long
         priors = sensitivity._priors
-        monkeypatch.setattr(
-            sensitivity, "_priors", lambda p: [one for one in priors(p) if "datum" in one[0]]
-        )
+        name = "datum_uncertainty"
+        monkeypatch.setattr(sensitivity, "_priors", lambda p: {name: priors(p)[name]})
     drops = cases(tuple(range(1, count + 1)), MILD, 3)
     found = analysis(drops)
     rows = [row for row in prior_sensitivity(found) if row["prior"] == "datum_uncertainty"]
