@@ -128,15 +128,19 @@ class RecordedSession:
         """What was planned, as the session keeps it."""
         return protocol_of(self._file)
 
-    def analyze(self, progress: Callable[[int, int], None] | None = None) -> Results:
-        """Compute everything from the raw edges, as `rig analyze` does.
+    def analyze(
+        self, progress: Callable[[int, int], None] | None = None, *, fresh: bool = False
+    ) -> Results:
+        """Compute everything from the raw edges, as `rig analyze` does, or return what is kept.
 
         Parameters
         ----------
         progress
             Called with the number of drops done and the number of all.
+        fresh
+            Whether to compute it in any case.
         """
-        return Results(results(self._file, progress))
+        return Results(results(self._file, progress, fresh=fresh))
 
     def edges(self, run: int, attempt: int | None = None) -> Edges:
         """Return the recorded edges of a run, by default of its latest attempt.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from rig.analysis.chain_records import chain_records
 from rig.analysis.fit import Begun
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol, Run
+    from rig.protocol import protocol as scene
+    from rig.protocol.protocol import Run
     from rig.reasons import Reason
     from rig.records import Drop
 
@@ -49,8 +50,15 @@ class Identified:
     explained: tuple[Reason, ...] | None = None
 
 
+class IdentifiedByDrop(Protocol):
+    """Where it is kept what was found out of drops, such as a dictionary."""
+
+    def get(self, drop: Drop, /) -> Identified | None: ...  # noqa: D102
+    def __setitem__(self, drop: Drop, found: Identified, /) -> None: ...
+
+
 def identified(
-    protocol: Protocol, run: Run, drop: Drop, scale: TimeScale, components: Components
+    protocol: scene.Protocol, run: Run, drop: Drop, scale: TimeScale, components: Components
 ) -> Identified:
     """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.fit_drop`."""
     window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)

@@ -20,10 +20,10 @@ from rig.reasons import make_error, make_reason
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.fit import Fit
-    from rig.analysis.identified import Identified
+    from rig.analysis.identified import IdentifiedByDrop
     from rig.analysis.joint_fit import JointDrop, JointFit, RigEstimate
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
@@ -117,7 +117,7 @@ def analyze(
     scale: Callable[[Drop], TimeScale],
     rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
     progress: Progress | None = None,
-    known: MutableMapping[Drop, Identified] | None = None,
+    known: IdentifiedByDrop | None = None,
 ) -> Analysis:
     """Analyse every drop and sum up.
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from rig.cache.plain import from_text, to_text
 from rig.cache.store import CacheFile
@@ -16,14 +16,18 @@ from rig.cache.store import CacheFile
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+Kept = TypeVar("Kept")
+
 _NUMERICS = ("numpy", "scipy", "matplotlib")
 
 
-class CacheEntry:
+class CacheEntry(Generic[Kept]):
     """One kept result.
 
     Parameters
     ----------
+    kind
+        Its type: what else is found is no result.
     *content
         All that enters into it, besides this program; each has a `repr` that no other content has.
         Where any is `None`, nothing is kept.
@@ -31,20 +35,23 @@ class CacheEntry:
         Whether to forget what was kept.
     """
 
-    def __init__(self, *content: object, fresh: bool = False) -> None:
-        key = "" if None in content else hashlib.sha256(repr(content).encode()).hexdigest()
-        self._key = key and _program() and f"{_program()} {key}"
+    def __init__(self, kind: type[Kept], *content: object, fresh: bool = False) -> None:
+        self._kind = kind
+        parts = repr((kind.__qualname__, *content)).encode()
+        known = None not in content and _program()
+        self._key = f"{_program()} {hashlib.sha256(parts).hexdigest()}" if known else ""
         self._fresh = fresh
         self._file = CacheFile()
 
-    def find(self) -> Any | None:
+    def find(self) -> Kept | None:
         """Return a kept result; `None` where there is none."""
         text = self._file.get(self._key) if self._key and not self._fresh else None
         with suppress(ValueError):
-            return None if text is None else from_text(text)
+            found = None if text is None else from_text(text)
+            return found if isinstance(found, self._kind) else None
         return None
 
-    def keep(self, result: Any) -> Any:
+    def keep(self, result: Kept) -> Kept:
         """Keep a result, and return it as `find` will.
 
         Parameters
@@ -55,14 +62,17 @@ class CacheEntry:
         text = to_text(result)
         if self._key:
             self._file.put(self._key, text)
-        return from_text(text)
+        found: Kept = from_text(text)
+        return found
 
 
-def recall(make: Callable[[], Any], *content: object, fresh: bool = False) -> Any:
+def recall(
+    kind: type[Kept], make: Callable[[], Kept], *content: object, fresh: bool = False
+) -> Kept:
     """Return a kept result, or else make it; arguments as for `CacheEntry`."""
-    kept = CacheEntry(*content, fresh=fresh)
-    found = kept.find()
-    return kept.keep(make()) if found is None else found
+    entry = CacheEntry(kind, *content, fresh=fresh)
+    found = entry.find()
+    return entry.keep(make()) if found is None else found
 
 
 @cache

@@ -61,12 +61,14 @@ def main(arguments: Namespace) -> int:
 
 def _by_joint_fit(arguments: Namespace, session: Session, found: SessionResults) -> dict[str, Any]:
     """What takes the joint fit, and its time."""
-    trials, more = arguments.session_trials, {}
+    more: dict[str, Any] = {}
+    trials = arguments.session_trials
     analysis = cache(lambda: complete_analysis(session, found, progress("analysing run")))
     if trials is not None:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - only when it is asked for
 
         more["monte_carlo"] = recall(
+            dict,
             lambda: session_trials(analysis(), trials),
             *("session trials", found.digest, trials),
             fresh=arguments.fresh,
@@ -74,9 +76,8 @@ def _by_joint_fit(arguments: Namespace, session: Session, found: SessionResults)
     if arguments.priors:
         from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - likewise
 
-        more["prior_sensitivity"] = recall(
-            lambda: prior_sensitivity(analysis()), "priors", found.digest, fresh=arguments.fresh
-        )
+        make, fresh = lambda: prior_sensitivity(analysis()), arguments.fresh
+        more["prior_sensitivity"] = recall(list, make, "priors", found.digest, fresh=fresh)
     return more
 
 

@@ -52,7 +52,7 @@ def main(arguments: Namespace) -> int:
         asked, fresh = (arguments.budget, arguments.trials, SEED), arguments.fresh
         whole = results(session, fresh=fresh)
         make = partial(budget, session, whole, *asked)
-        found = recall(make, "budget", whole.digest, asked, fresh=fresh)
+        found = recall(dict, make, "budget", whole.digest, asked, fresh=fresh)
     print_found(found, lambda: "\n".join(_table(found)), as_json=arguments.json)
     return tell_damage(whole.analysis)
 

@@ -38,7 +38,7 @@ def main(arguments: Namespace) -> int:
     if folder is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
-        kept = CacheEntry("estimate pictures", whole.digest, fresh=fresh)
+        kept = CacheEntry(dict, "estimate pictures", whole.digest, fresh=fresh)
         drawn = kept.find()
         if drawn is None:
             drawn = estimate_pictures(found, sections, simulated=simulated)

@@ -28,7 +28,7 @@ def main(arguments: Namespace) -> int:
         folder = make_folder(arguments.csv)
         found = results(session, progress("analysing run"), fresh=arguments.fresh)
         make = partial(_tables, session, found)
-        tables = recall(make, "tables", found.digest, fresh=arguments.fresh)
+        tables = recall(dict, make, "tables", found.digest, fresh=arguments.fresh)
         for name, text in tables.items():
             write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")

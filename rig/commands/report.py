@@ -56,7 +56,7 @@ def main(arguments: Namespace) -> int:
         found = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=True)
         # The page has the file's name; how simulated chains moved lies beside the file.
         content = session.path.name, arguments.bars, film_digest(session.path)
-        kept = CacheEntry("report", found.digest, content, fresh=fresh)
+        kept = CacheEntry(_Page, found.digest, content, fresh=fresh)
         page = kept.find()
         if page is None:
             page = _page(session, found, arguments.bars, fresh=fresh)

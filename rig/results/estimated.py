@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.cache.entry import CacheEntry
-from rig.estimate.session import estimate
+from rig.estimate.session import SessionEstimate, estimate
 from rig.results.whole import complete_analysis, protocol_of
 
 if TYPE_CHECKING:
     from rig.analysis.session import Progress
-    from rig.estimate.session import SessionEstimate
     from rig.results.whole import SessionResults
     from rig.session.reading import Reader
 
@@ -36,7 +35,7 @@ def session_estimate(
     InputError, SessionError
         As `rig.estimate.session.estimate` raises it; the session is blind.
     """
-    kept = CacheEntry("estimate", found.digest, fresh=fresh)
+    kept = CacheEntry(SessionEstimate, found.digest, fresh=fresh)
     estimated = kept.find()
     if estimated is None:
         analysis = complete_analysis(session, found, progress)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping
+from dataclasses import replace
+from hashlib import sha256
+from itertools import chain
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from rig.analysis.identified import Identified
 from rig.cache.entry import CacheEntry
-from rig.records import Drop
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.analysis.identified import Identified
     from rig.protocol.protocol import Protocol
+    from rig.records import Drop
 
 
-class KnownDrops(MutableMapping[Drop, "Identified"]):
+class KnownDrops:
     """The `known` of `rig.analysis.drop.fit_drop`, kept beyond this process.
 
     Parameters
@@ -32,28 +34,29 @@ class KnownDrops(MutableMapping[Drop, "Identified"]):
         gates = () if protocol.gates is None else protocol.gates.gates
         self._content = None if blind else (protocol.text, [gate.channel for gate in gates])
         self._fresh = fresh
-        self._held: dict[Drop, Identified] = {}
+        self._held: dict[str, Identified] = {}
+        self._last: tuple[Drop | None, str] = (None, "")
 
-    def __getitem__(self, drop: Drop) -> Identified:
-        if drop not in self._held:
-            kept = self._entry(drop).find()
-            if kept is None:
-                raise KeyError(drop.run, drop.attempt)
-            self._held[drop] = kept
-        return self._held[drop]
+    def get(self, drop: Drop) -> Identified | None:
+        """Return what is known of a drop; `None` for nothing."""
+        digest = self._digest(drop)
+        identified = self._held.get(digest) or self._entry(digest).find()
+        if identified is not None:
+            self._held[digest] = identified
+        return identified
 
     def __setitem__(self, drop: Drop, identified: Identified) -> None:
-        self._held[drop] = identified
-        self._entry(drop).keep(identified)
+        digest = self._digest(drop)
+        self._held[digest] = identified
+        self._entry(digest).keep(identified)
 
-    def __delitem__(self, drop: Drop) -> None:
-        del self._held[drop]
+    def _entry(self, digest: str) -> CacheEntry[Identified]:
+        return CacheEntry(Identified, self._content, digest, fresh=self._fresh)
 
-    def __iter__(self) -> Iterator[Drop]:
-        return iter(self._held)
-
-    def __len__(self) -> int:
-        return len(self._held)
-
-    def _entry(self, drop: Drop) -> CacheEntry:
-        return CacheEntry("drop", self._content, drop, fresh=self._fresh)
+    def _digest(self, drop: Drop) -> str:
+        """SHA-256 of everything that a drop's record says."""
+        if self._last[0] is not drop:
+            head = repr(replace(drop, edges=())).encode()
+            edges = np.fromiter(chain.from_iterable(drop.edges), np.int64, 3 * len(drop.edges))
+            self._last = drop, sha256(head + edges.tobytes()).hexdigest()
+        return self._last[1]

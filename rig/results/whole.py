@@ -153,9 +153,9 @@ def results(
     complete = None
     with session.snapshot():
         digest, blind = session.digest(), kept_back(session, protocol)
-        kept = CacheEntry("results", digest, fresh=fresh)
+        kept = CacheEntry(Finished, digest, fresh=fresh)
         clock = Calibrator().look(session, protocol.reference_u)
-        finished: Finished | None = kept.find()
+        finished = kept.find()
         drops = [] if finished else list(session.drops())
         causes = rejected(session)
     if finished is None:
