@@ -6,7 +6,7 @@ Beside what each gate reported stands what it should see of the chain that hangs
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Literal
 
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 QUICK = 0.3e-3
 """Edges of one gate closer than this are no two sides of a rod: the receiver flickered, s."""
+LONGEST = 64
+"""Edges of one flicker from which on its middle says no more: a clean edge has 1, a rod in front of
+a receiver that flickers with the mains some ten. What is fitted takes time with each edge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,8 @@ class EdgeTrain:
     levels
         Height of the chain's reference point at each expected edge by the nominal geometry, m;
         falling.
+    thinned
+        How many edges more the gate reported, in the middle of flickers of more than `LONGEST`.
     """
 
     gate: int
@@ -68,15 +73,26 @@ class EdgeTrain:
     rods: Index
     blocks: Flags
     levels: Array
+    thinned: int = 0
 
 
 @dataclass(frozen=True)
 class EdgeArrays:
-    """A drop's edges as arrays, shape ``(edges,)`` each."""
+    """A drop's edges as arrays, shape ``(edges,)`` each.
+
+    Attributes
+    ----------
+    whole
+        Those of which these were left, see `thinned`; `None` where these are all.
+    numbers
+        Of each among all.
+    """
 
     times: Array
     channels: Index
     blocked: Flags
+    whole: EdgeArrays | None = None
+    numbers: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     @cached_property
     def darkening(self) -> bool:
@@ -98,23 +114,50 @@ class EdgeArrays:
         return self.channels[self.order]
 
     @cached_property
+    def _flickers(self) -> tuple[Index, Index]:
+        """First and last place of each flicker in `order`; a clean edge is one by itself."""
+        apart = (np.diff(self.times[self.order]) > QUICK) | (np.diff(self._ordered) != 0)
+        edge = np.ones(min(1, self.times.size), dtype=np.bool_)
+        begins, ends = np.concatenate([edge, apart]), np.concatenate([apart, edge])
+        return np.flatnonzero(begins), np.flatnonzero(ends)
+
+    @cached_property
     def burst(self) -> Array:
         """How long the flicker of its gate lasts that each edge is part of, s; 0 if clean."""
-        order, channels = self.order, self._ordered
-        times = self.times[order]
-        apart = (np.diff(times) > QUICK) | (np.diff(channels) != 0)
-        edge = np.ones(min(1, times.size), dtype=np.bool_)
-        begins, ends = np.concatenate([edge, apart]), np.concatenate([apart, edge])
+        if self.whole is not None:
+            return self.whole.burst[self.numbers]
+        first, last = self._flickers
+        times = self.times[self.order]
         found = np.empty_like(times)
-        found[order] = (times[ends] - times[begins])[np.cumsum(begins) - 1]
+        found[self.order] = np.repeat(times[last] - times[first], last - first + 1)
         return found
+
+    def thinned(self) -> EdgeArrays:
+        """Leave of each flicker of more than `LONGEST` edges as many, half at either end."""
+        first, last = self._flickers
+        size = last - first + 1
+        if not size.size or size.max() <= LONGEST:
+            return self
+        place = np.arange(self.times.size)
+        since, until = place - np.repeat(first, size), np.repeat(last, size) - place
+        ends = np.minimum(since, until) < LONGEST // 2
+        left = np.sort(self.order[ends])
+        parts = self.times[left], self.channels[left], self.blocked[left]
+        return EdgeArrays(*parts, self, left)
+
+    def count_thinned(self, channel: int) -> int:
+        """Count the edges of a channel that were left out."""
+        if self.whole is None:
+            return 0
+        return self.whole.of_channel(channel).size - self.of_channel(channel).size
 
     @classmethod
     def of(cls, drop: Drop, hz: float) -> EdgeArrays:
-        """Take them from a drop whose ticks come at a rate in Hz."""
+        """Take them from a drop whose ticks come at a rate in Hz, thinned."""
         flat = itertools.chain.from_iterable(drop.edges)  # much faster than an array of rows
         table = np.fromiter(flat, np.int64, 3 * len(drop.edges)).reshape(-1, 3)
-        return cls(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
+        times, channels, blocked = table[:, 0] / hz, table[:, 1], table[:, 2]
+        return cls(times, channels.astype(np.intp), blocked.astype(np.bool_)).thinned()
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,10 +237,11 @@ def edge_train(
         edges.times[mine],
         edges.blocked[mine],
         edges.burst[mine],
-        mine,
+        mine if edges.whole is None else edges.numbers[mine],
         rods,
         blocks,
         levels,
+        edges.count_thinned(gate.channel),
     )
 
 
@@ -225,6 +269,14 @@ def _passages(
     for one in found:
         one.flags.writeable = False
     return found
+
+
+def thinned(drop: Drop, hz: float) -> Drop:
+    """Return a drop without the middles of long flickers, for what reads it many times."""
+    edges = EdgeArrays.of(drop, hz)
+    if edges.whole is None:
+        return drop
+    return replace(drop, edges=tuple(drop.edges[n] for n in edges.numbers.tolist()))
 
 
 def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[ChainRecord]:

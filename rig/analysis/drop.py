@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.chain_records import chain_records
+from rig.analysis.chain_records import chain_records, thinned
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import FEW_GATES, silent
 from rig.analysis.drop_model import DropModel
@@ -15,7 +15,7 @@ from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
 from rig.analysis.fit import timed
-from rig.analysis.identified import Identified, identified
+from rig.analysis.identified import IdentifiedByDrop, identified
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
 from rig.analysis.result import Audit, DropResult
@@ -25,8 +25,6 @@ from rig.reasons import make_reason
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import MutableMapping
-
     from rig.analysis.fit import Fit
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
@@ -42,7 +40,7 @@ def fit_drop(
     components: Components | None = None,
     *,
     explain: bool = True,
-    known: MutableMapping[Drop, Identified] | None = None,
+    known: IdentifiedByDrop | None = None,
 ) -> tuple[DropResult, Fit | None]:
     """Find out what a drop says by itself; keep what a joint fit begins with, too.
 
@@ -72,10 +70,12 @@ def fit_drop(
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
-    received = sum(part.times.size for record in records for part in record.trains)
+    trains = [part for record in records for part in record.trains]
+    left_out = sum(part.thinned for part in trains)
+    received = sum(part.times.size for part in trains) + left_out
     expected = sum(record.expected for record in records)
     lost = 0 if drop.certificate is None else drop.certificate.overflows
-    blank = Audit(received, 0, expected, received, lost, received)
+    blank = Audit(received, 0, expected, received, lost, received - left_out, left_out)
     rough = scale.rounded()
     one = known.get(drop)
     if one is None or one.scale != rough:
@@ -92,7 +92,8 @@ def fit_drop(
                 if not strange and len(gates) <= FEW_GATES:
                     strange = [*range(len(gates))]  # each may see nearly what another should
                 premise = Premise(protocol, run, rough.hz)
-                weigh = Explainer(premise, drop, rough.u, components, strange)
+                short = thinned(drop, rough.hz)
+                weigh = Explainer(premise, short, rough.u, components, strange)
                 why = explained(weigh.explain(None), protocol.vocabulary)
                 one = replace(one, explained=tuple(why))
                 known[drop] = one
@@ -116,7 +117,8 @@ def fit_drop(
     reasons = end.reasons
     if not end.known and (explain or end.verdict != "void"):
         premise = Premise(protocol, run, scale.hz)
-        weigh = Explainer(premise, drop, scale.u, components, end.suspects)
+        short = thinned(drop, scale.hz)
+        weigh = Explainer(premise, short, scale.u, components, end.suspects)
         if end.odd or weigh.asked(fit):
             whole = [one for one in weigh.explain(fit) if one.whole]
             if why := explained(whole, protocol.vocabulary, end.accused):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
 """Verdicts that take part in a summary."""
+
+COUNTS = ("received", "matched", "missed", "spurious", "lost")
+"""Of edges, in the order in which tables have them."""
 
 
 def optional_package(name: str) -> Any:
@@ -168,6 +171,8 @@ class Audit:
         Edges the device saw and could not keep.
     unexplained
         Of the spurious ones, those that are not of a known kind either.
+    thinned
+        Of the spurious ones, those in the middle of long flickers, which nothing was fitted to.
     """
 
     received: int = 0
@@ -176,6 +181,7 @@ class Audit:
     spurious: int = 0
     lost: int = 0
     unexplained: int = 0
+    thinned: int = 0
 
     @property
     def expected(self) -> int:
@@ -185,11 +191,13 @@ class Audit:
     def count(self, matched: int, unexplained: int) -> Audit:
         """Count again, with other edges that belong to a rod."""
         missed, spurious = self.expected - matched, self.received - matched
-        return Audit(self.received, matched, missed, spurious, self.lost, unexplained)
+        changes = {"matched": matched, "missed": missed, "spurious": spurious}
+        return replace(self, **changes, unexplained=unexplained)
 
     def json(self) -> dict[str, int]:
         """``edges`` of a run as `rig analyze --json` prints it."""
-        return attributes(self, "received", "matched", "missed", "spurious", "lost")
+        counts = attributes(self, *COUNTS)
+        return counts | ({"thinned": self.thinned} if self.thinned else {})
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from rig.analysis.result import Audit, Measured
+from rig.analysis.result import COUNTS, Audit, Measured
 from rig.measurands import acceleration_in, averaged, listed
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
@@ -100,7 +100,7 @@ def run_columns() -> list[Column[DropResult]]:
         Column("incline (°)", run_incline),
         Column("impact chain", lambda one: one.run.impact or "", numeric=False),
         *(_measured(row) for row in listed()),
-        Column("edges", lambda one: " / ".join(map(str, one.audit.json().values()))),
+        Column("edges", lambda one: " / ".join(str(getattr(one.audit, name)) for name in COUNTS)),
     ]
 
 
