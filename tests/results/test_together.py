@@ -27,7 +27,7 @@ def record(folder, name, scene="picket-fence", seed=1, series=0, change=("", "")
 
     text = (PROTOCOLS / f"{scene}.yaml").read_text("utf-8")
     text = re.sub(r"repeats: \d+", "repeats: 4", text)
-    text = re.sub(r"incline: \[[^]]*\]", "incline: [40 deg]", text).replace(*change)
+    text = text.replace(*change)
     protocol, session = folder / f"{name}.yaml", folder / f"{name}.session"
     protocol.write_text(text, "utf-8")
     port = f"sim://?stated=1&missed=0&seed={seed}&series={series}"
