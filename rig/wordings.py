@@ -548,6 +548,9 @@ WORDINGS: dict[str, Wording] = {
     "package_absent": _void(
         "this needs {package}, which is not installed",
         "pip install 'chainrig[notebook]', or that package alone"),
+    "nothing_to_compare": _void(
+        "no session has runs at an incline of {path}",
+        "compare sessions that have at least one incline in common"),
     "option_for_one_session": _void(
         "{options}: for one session only", "name one session, or leave these options out"),
     "session_repeated": _void(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointDrop, JointFit
-    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.result import Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.protocol.protocol import Protocol
@@ -146,7 +146,13 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
     shared = same_owners(parts, same_rig=same_rig)
     drops = _own(parts, shared)
     joint, left_out = _fit(parts, drops)
-    results = [{(one.run.number, one.attempt): one for one in _all(part)} for part in parts]
+    results = [
+        {
+            (one.run.number, one.attempt): replace(one, quantities=_unshared(one.quantities))
+            for one in (*part.analysis.runs, *part.analysis.superseded)
+        }
+        for part in parts
+    ]
     if joint is not None:
         budgets = Budgets(joint)
         for (place, job), drop in zip(drops, joint.drops, strict=True):
@@ -155,7 +161,7 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
     for (place, job), (matched, alone) in left_out.items():
         result, words = results[place][job], parts[place].protocol.vocabulary
         why = make_reason("differs_from_session", words, matched=matched, alone=alone)
-        own = result.alone or _unshared(result.quantities)
+        own = result.alone or result.quantities
         results[place][job] = replace(result, reasons=(*result.reasons, why), quantities=own)
     fitted = tuple(
         replace(part, analysis=sum_up(part.protocol, found.values(), part.analysis.joint))
@@ -166,10 +172,6 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
         for owner, groups in shared.items()
     }
     return SessionsFit(fitted, joint, _pooled(fitted), names)
-
-
-def _all(part: SessionPart) -> tuple[DropResult, ...]:
-    return (*part.analysis.runs, *part.analysis.superseded)
 
 
 def _unshared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.measurands import averaged
-from rig.report.canvas import INK, MODEL, MUTED, canvas
+from rig.measurands import acceleration_in, averaged
+from rig.report.canvas import MODEL, MUTED, canvas
 from rig.report.chapters import Chapter
 from rig.report.columns import Column, aligned, summary_table, verdict_on
 from rig.report.embed import PageFigure, embedded
@@ -71,8 +71,8 @@ def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
     title = f"Comparison with {results.fit.parts[0].name}"
     drawing = draw_comparison(results)
-    caption = "Means of each session with U (95 %)."
-    figure = embedded(PageFigure(drawing.svg, "Means of each session", caption), 1)
+    caption = "Differences of means with U (95 %). Across zero, both sessions agree."
+    figure = embedded(PageFigure(drawing.svg, "Differences of means", caption), 1)
     lead = paragraphs([_less(results)], "lead") + bullets(shared_lines(results))
     tables = "".join(table(*one) for one in _tables(results))
     chapters = [Chapter("short", "Summary", lead), Chapter("results", "Results", figure + tables)]
@@ -80,29 +80,37 @@ def comparison_page(results: TogetherResults) -> str:
 
 
 def draw_comparison(results: TogetherResults) -> Canvas:
-    """Draw the means of all sessions, a panel for each measurand, a row for each mean."""
-    rows = [row for row in averaged() if _means(results, row)]
-    names = [part.name for part in results.fit.parts]
-    height = 0.6 + 0.28 * max(len(_means(results, row)) for row in rows)
-    with canvas((height,) * len(rows), simulated=results.simulated, sharex=False) as drawing:
-        for row, axes in zip(rows, drawing.axes, strict=True):
-            means = _means(results, row)
-            for place, (name, line) in enumerate(means):
-                value = line.means[row.name]
-                axes.errorbar(
-                    value.value * row.scale,
-                    -place,
-                    xerr=value.expanded * row.scale,
-                    fmt="o",
-                    color=MODEL if name == names[0] else INK,
-                    markersize=4.2,
-                )
-            axes.set_yticks([-n for n in range(len(means))], [_label(*one) for one in means])
-            axes.set_xlabel(row.axis)
-            axes.margins(y=0.5 / len(means))
-            axes.grid(visible=True, axis="x")
-            axes.tick_params(axis="y", labelcolor=MUTED)
+    """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
+    panels = [
+        (row, members)
+        for row in averaged()
+        if (members := [one for one in results.differences() if one.quantity == row.name])
+    ]
+    heights = tuple(0.7 + 0.25 * len(members) for _, members in panels)
+    with canvas(heights, simulated=results.simulated, sharex=False) as drawing:
+        for (row, members), axes in zip(panels, drawing.axes, strict=True):
+            axes.axvline(0.0, color=MUTED, linewidth=1.0)
+            axes.errorbar(
+                [one.value.value * row.fine_scale for one in members],
+                range(len(members)),
+                xerr=[one.value.expanded * row.fine_scale for one in members],
+                fmt="o",
+                color=MODEL,
+                markersize=4.2,
+            )
+            axes.set_yticks(range(len(members)), [_label(one) for one in members])
+            axes.set_ylim(len(members) - 0.5, -0.5)
+            axes.set_xlabel(f"difference of {row.title} {row.symbol} ± U ({row.fine})")
     return drawing
+
+
+def _label(difference: MeanDifference) -> str:
+    return ", ".join(filter(None, [difference.session, _runs(difference)]))
+
+
+def _runs(difference: MeanDifference) -> str:
+    """Say of which runs a difference is, where a session has several kinds."""
+    return "" if acceleration_in([difference.quantity]) else str(difference.condition)
 
 
 def _tables(
@@ -131,19 +139,15 @@ def _means(results: TogetherResults, row: Measurand) -> list[tuple[str, Incline]
     ]
 
 
-def _label(name: str, line: Incline) -> str:
-    return f"{name}{_where(line)}"
-
-
 def _where(line: Incline) -> str:
     """Say of which runs a mean is, where a session has several kinds."""
-    return "" if "gravity_m_s2" in line.means else f", {line.condition}"
+    return "" if acceleration_in(line.means) else str(line.condition)
 
 
 def _mean_columns(row: Measurand) -> list[Column[tuple[str, Incline]]]:
     return [
         Column("session", lambda one: one[0], numeric=False),
-        Column("runs", lambda one: _where(one[1]).removeprefix(", "), numeric=False),
+        Column("runs", lambda one: _where(one[1]), numeric=False),
         Column("n", lambda one: str(one[1].n)),
         Column(
             f"{row.symbol} ± U ({row.unit})",
@@ -156,7 +160,7 @@ def _difference_columns(row: Measurand) -> list[Column[MeanDifference]]:
     return [
         Column("session", lambda one: one.session, numeric=False),
         Column("less", lambda one: one.reference, numeric=False),
-        Column("runs", lambda one: str(one.condition), numeric=False),
+        Column("runs", _runs, numeric=False),
         Column(
             f"difference of {row.symbol} ± U ({row.fine})",
             lambda one: plus_minus(one.value, row.fine_scale, row.fine_decimals),

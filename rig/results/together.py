@@ -42,8 +42,8 @@ class MeanDifference:
         JSON name of the measurand.
     session, reference
         Names of the sessions.
-    condition, reference_condition
-        Of their runs.
+    condition
+        Of the session's runs.
     value
         Of the difference, with its uncertainty.
     """
@@ -52,7 +52,6 @@ class MeanDifference:
     session: str
     reference: str
     condition: Condition
-    reference_condition: Condition
     value: Measured
 
     def json(self) -> dict[str, Any]:
@@ -147,17 +146,25 @@ class TogetherResults:
     def differences(self) -> list[MeanDifference]:
         """Return each session's means less those of the first, where both have the condition.
 
-        Chains need not have the same names to be compared: where no condition is alike, means of
-        the same incline are, in their order.
+        Chains need not have the same names: where none that strikes is alike, a single mean at the
+        same incline is taken.
+
+        Raises
+        ------
+        InputError
+            No session has runs like those of the first.
         """
         first, *others = self.fit.parts
         reference = _cases(first)
-        return [
-            MeanDifference(name, part.name, first.name, condition, beside, value)
+        differences = [
+            MeanDifference(name, part.name, first.name, condition, value)
             for part in others
-            for condition, beside, runs, reference_runs in _paired(_cases(part), reference)
+            for condition, runs, reference_runs in _paired(_cases(part), reference)
             for name, value in _differences(runs, reference_runs)
         ]
+        if not differences:
+            raise make_error(InputError, "nothing_to_compare", path=first.name)
+        return differences
 
 
 def _cases(part: SessionPart) -> dict[Condition, list[DropResult]]:
@@ -168,13 +175,13 @@ def _cases(part: SessionPart) -> dict[Condition, list[DropResult]]:
 
 def _paired(
     cases: Mapping[Condition, list[DropResult]], reference: Mapping[Condition, list[DropResult]]
-) -> Iterator[tuple[Condition, Condition, list[DropResult], list[DropResult]]]:
+) -> Iterator[tuple[Condition, list[DropResult], list[DropResult]]]:
     """Pair runs of like conditions."""
     for condition, runs in cases.items():
         like = [one for one in reference if one.incline_deg == condition.incline_deg]
         same = [one for one in like if one.impact_chain == condition.impact_chain] or like
         if len(same) == 1:
-            yield condition, same[0], runs, reference[same[0]]
+            yield condition, runs, reference[same[0]]
 
 
 def _differences(

@@ -111,6 +111,7 @@ def test_every_scene_is_compared(tmp_path, call, scene):  # noqa: F811
     assert done.code == 0, done.err
     assert "SIMULATED DATA" in done.out
     assert "Differences of" in page.read_text("utf-8")
+    assert "<svg" in page.read_text("utf-8")
     assert call("compare", first, other, "-o", tmp_path / "c.png").code == 0
     assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
 
@@ -119,6 +120,19 @@ def refused(code, kind, *paths, **options):
     with pytest.raises(kind) as caught:
         together(*paths, **options)
     assert [reason.code for reason in caught.value.reasons] == [code]
+
+
+def test_what_has_no_incline_in_common_is_refused(tmp_path):
+    changes = (("", ""), ("incline: [40 deg]", "incline: [50 deg]"))
+    first, other = (
+        record(tmp_path, f"s{n}", "single-chain", series=n, change=change)
+        for n, change in enumerate(changes, 1)
+    )
+    found = together(first, other)
+    with pytest.raises(InputError) as caught:
+        found.differences()
+    assert [reason.code for reason in caught.value.reasons] == ["nothing_to_compare"]
+    assert [line.incline_deg for line in found.summary] == [40.0, 50.0]
 
 
 def test_a_session_and_its_copy_are_one(two, tmp_path):
