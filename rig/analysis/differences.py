@@ -10,7 +10,6 @@ import numpy as np
 
 from rig.analysis.result import Measured
 from rig.analysis.summary import common_part
-from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,8 +22,9 @@ def difference(runs: Sequence[Measured], reference: Sequence[Measured]) -> Measu
     their means m and m′ the common part of the difference is |m − m′|, so that errors of one rig
     cancel (GUM 5.2.2). Of runs by themselves nothing is known to cancel.
 
-    What runs do not share is foretold by each one's own uncertainty. How far they scatter is a
-    second opinion, beside which the first one counts as a guessed scale does.
+    What runs do not share is at least what each one's own uncertainty says. Falls differ besides:
+    where both sets together scatter more than that, their pooled scatter counts, as in Student's
+    test of two means.
     """
     sets = (runs, reference)
     commons, parts = zip(*map(common_part, sets), strict=True)
@@ -38,7 +38,10 @@ def difference(runs: Sequence[Measured], reference: Sequence[Measured]) -> Measu
         for members, alone in zip(sets, own, strict=True)
         if len(members) > 1 and alone > 0.0
     )
-    factor = (GUESSED + seen) / (GUESSED + count)
+    degrees = least = min(max(1.0, run.degrees) for run in (*runs, *reference))
+    factor = 1.0
+    if count and seen > count:
+        factor, degrees = seen / count, float(count)
     alone = factor * (own[0] / len(runs) + own[1] / len(reference))
     common = math.hypot(*commons) ** 2
     vectors = [[run.shared for run in members if run.shared is not None] for members in sets]
@@ -46,8 +49,7 @@ def difference(runs: Sequence[Measured], reference: Sequence[Measured]) -> Measu
         mean, reference_mean = (np.mean(known, axis=0) for known in vectors)
         common = float(np.sum((mean - reference_mean) ** 2))
     square = alone + common
-    degrees = min(max(1.0, run.degrees) for run in (*runs, *reference))
-    share = alone**2 / (GUESSED + count) + common**2 / degrees
+    share = alone**2 / degrees + common**2 / least
     return Measured(
         fmean(run.value for run in runs) - fmean(run.value for run in reference),
         math.sqrt(square),
