@@ -153,6 +153,15 @@ WORDINGS: dict[str, Wording] = {
         "rods pile up on the surface: {gates} miss rods that higher gates see, and the last rods "
         "strike those that lie there",
         "incline the surface more, or use fewer rods"),
+    "rods_lie": _doubt(
+        "rods strike others, which lie up to about {height_m:.0f mm} ± {U95_m:.0f mm} above the "
+        "contact point: lower beams see part of the fall, and V and Δz at level are extrapolated; "
+        "use V and Δz at strike",
+        "incline the surface more, or use fewer or thinner rods", label="rods lie there"),
+    "rods_hide_end": _void(
+        "rods strike others, which lie up to about {height_m:.0f mm} ± {U95_m:.0f mm} above the "
+        "contact point: no beam is high enough above them to see how the fall ends",
+        "put a gate of the impact side higher, or incline the surface more"),
     "low_gates_miss_rods": _void(
         "{gates} miss rods that higher gates see, though the last rods pass: rods before them "
         "strike too early, or the gate misses some",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rig.analysis.heap import strike_heights
 from rig.analysis.trajectory import ONE
 from rig.errors import DomainError
 from rig.model.fall import kicks
@@ -183,8 +184,11 @@ class ChainRecord:
     condition
         Under which it strikes, in words; drops of the same one have the contact in common.
     higher
-        How high above the contact point each rod's middle is as it strikes, m; not given where all
-        strike there.
+        How high above the contact point each rod's middle is as its impact pulls, m; not given
+        where nothing is struck. Results are at level: the top rod falls on as if nothing lay there.
+    clear
+        Above which height of its middle nothing lies in each rod's way, m; as `higher` where
+        nothing does.
     """
 
     role: Literal["impact", "free"]
@@ -195,12 +199,22 @@ class ChainRecord:
     air: Array = field(default_factory=lambda: ONE)
     condition: str = ""
     higher: tuple[float, ...] = ()
+    clear: tuple[float, ...] = ()
 
     @property
     def strikes(self) -> Array:
         """How high the reference point is below the contact point as each rod strikes, m."""
         places = np.array(self.chain.chain.heights)
         return places - self.higher if self.higher else places
+
+    @property
+    def is_on_heap(self) -> bool:
+        """Whether rods strike others that lie there."""
+        return self.clear != self.higher
+
+    def is_beside_rods(self, gate: Gate) -> bool:
+        """Whether others may lie in a gate's beam as one of the rods passes it."""
+        return self.is_on_heap and gate.height < max(self.clear) + 0.5 * max(self.chain.widths)
 
     @property
     def expected(self) -> int:
@@ -292,8 +306,8 @@ def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[C
             # Behind the last leg nothing falls any more, but edges are asked for all the same.
             air = np.append(air, air[-1]) if np.ptp(air) else air[:1]
             where = str(protocol.condition(run))
-            higher = higher_contacts(protocol, run.incline_deg, chain)
-            found.append(ChainRecord(role, chain, trains, ratios, alpha, air, where, higher))
+            higher, clear = _contacts(protocol, run, chain)
+            found.append(ChainRecord(role, chain, trains, ratios, alpha, air, where, higher, clear))
     return found
 
 
@@ -312,11 +326,22 @@ def edge_trains(
         if name is None or not gates:
             continue
         chain = protocol.chains[name]
-        higher = None
+        clear = None
         if role == "impact":
-            higher = higher_contacts(protocol, run.incline_deg, chain)
-        trains = (edge_train(n, gate, chain, edges, start, higher) for n, gate in gates)
+            clear = _contacts(protocol, run, chain)[1]
+        trains = (edge_train(n, gate, chain, edges, start, clear) for n, gate in gates)
         yield role, chain, tuple(trains)
+
+
+def _contacts(
+    protocol: Protocol, run: Run, chain: RodChain
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return `ChainRecord.higher` and `ChainRecord.clear`."""
+    if not protocol.contact.heaped or protocol.surface is None:
+        higher = higher_contacts(protocol, run.incline_deg, chain)
+        return higher, higher
+    heights = strike_heights(protocol.surface, run.incline_deg, chain)
+    return (*heights[:-1], 0.0), tuple(z + protocol.contact.strike.u for z in heights)
 
 
 def _ratios(protocol: Protocol, chain: Chain) -> Array:

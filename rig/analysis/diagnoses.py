@@ -73,6 +73,11 @@ def diagnose(fit: Fit) -> Diagnosis:
     model = fit.model
     gates, words = _gates(fit), model.protocol.vocabulary
     doubts = silent(model.protocol, model.records.values())
+    if model.protocol.contact.heaped:
+        strike, record = model.protocol.contact.strike, model.records["impact"]
+        seen = any(record.chain.chain.rods - 1 in train.rods for train in record.trains)
+        code = "rods_lie" if seen else "rods_hide_end"
+        doubts.append(make_reason(code, words, height_m=strike.value, U95_m=2.0 * strike.u))
     reasons: list[Reason] = []
     alive = [one for one in gates if one.train.times.size]
     under: list[_Seen] = []
@@ -206,13 +211,14 @@ class _Seen(NamedTuple):
 
 
 def _gates(fit: Fit) -> list[_Seen]:
-    beams = fit.model.unknowns["beams"]
+    beams, gates = fit.model.unknowns["beams"], fit.model.protocol.gates
+    assert gates is not None
     off = np.abs(scaled(fit.estimate.x[beams], fit.model.unknowns.sd[beams]))
     return [
         _Seen(role, train, match, int((match >= 0).sum()), float(off[train.gate]))
         for role, record in fit.model.records.items()
         for train, match in zip(record.trains, fit.matches[role], strict=True)
-        if match.size
+        if match.size and not record.is_beside_rods(gates.gates[train.gate])
     ]
 
 

@@ -96,7 +96,8 @@ class Discrepancy:
         if nominal.hits is None or strikes.size < 2:
             return cls(nominal, stretch, 0.0, 0.0)
         pull = abs(record.alpha) * float(nominal.hits.ratio[-2] * nominal.hits.arrival[-2])
-        lowest = min(protocol.gates.gates[train.gate].height for train in record.trains)
+        seeing = [train for train in record.trains if strikes.size - 1 in train.rods]
+        lowest = min((protocol.gates.gates[one.gate].height for one in seeing), default=np.inf)
         way = max(0.0, min(lowest, float(strikes[-1] - strikes[-2])))
         return cls(nominal, stretch, pull, way)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.analysis.budgets import Budgets
@@ -15,6 +16,7 @@ from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
 from rig.analysis.fit import timed
+from rig.analysis.heap import on_heap
 from rig.analysis.identified import IdentifiedByDrop, identified
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
@@ -23,6 +25,7 @@ from rig.analysis.verdict import judge, judge_record, verdict_of
 from rig.protocol.contact import at_contact
 from rig.reasons import make_reason
 from rig.threads import one_thread
+from rig.wordings import Severity
 
 if TYPE_CHECKING:
     from rig.analysis.fit import Fit
@@ -68,6 +71,40 @@ def fit_drop(
         return DropResult(run, drop.attempt, "void", damaged, Audit(), damaged=True), None
     known = {} if known is None else known
     protocol = at_contact(protocol, run.incline_deg, run.impact)
+    heaped = on_heap(protocol, run)
+    fit = partial(_fit_drop, run=run, drop=drop, scale=scale, components=components)
+    as_stated = fit(protocol, explain=explain and heaped is None, known=known)
+    wrong = _void_by(as_stated[0]) - {"release_skew"}
+    if heaped is None or not wrong:
+        return as_stated
+    held = known.get(drop)
+    assert held is not None  # the first fit found it out
+    on_rods = {} if held.on_heap is None else {drop: held.on_heap}
+    as_heaped = fit(heaped, explain=False, known=on_rods)
+    known[drop] = replace(held, on_heap=on_rods[drop])
+    # That no beam sees the end is why edges are strange, not why others are missed.
+    hidden = {"rods_hide_end"} if wrong != {"edges_missed"} else set()
+    if _void_by(as_heaped[0]) <= {"release_skew"} | hidden:
+        return as_heaped
+    return fit(protocol, explain=True, known=known) if explain else as_stated
+
+
+def _void_by(result: DropResult) -> set[str]:
+    """Return the codes of the reasons for which a drop is void."""
+    return {reason.code for reason in result.reasons if reason.severity is Severity.VOID}
+
+
+def _fit_drop(
+    protocol: Protocol,
+    run: Run,
+    drop: Drop,
+    scale: TimeScale,
+    components: Components | None,
+    *,
+    explain: bool,
+    known: IdentifiedByDrop,
+) -> tuple[DropResult, Fit | None]:
+    """Fit a drop whose rods strike where a protocol, counted from the contact point, has them."""
     components = components or stated(protocol)
     records = chain_records(protocol, run, drop, scale.hz)
     trains = [part for record in records for part in record.trains]
@@ -102,7 +139,7 @@ def fit_drop(
     model = DropModel(protocol, records, one.begun.guesses, scale.u, components)
     if one.begun.x.size != len(model.unknowns):  # it was found out where other things were unknown
         known[drop] = identified(protocol, run, drop, rough, components)
-        return fit_drop(protocol, run, drop, scale, components, explain=explain, known=known)
+        return _fit_drop(protocol, run, drop, scale, components, explain=explain, known=known)
     fit = timed(model, one.begun, scale.hz / rough.hz)
     unmatched = unmatched_edges(fit)
     audit = blank.count(fit.matched, count_unexplained(unmatched))

@@ -306,6 +306,7 @@ class DropModel:
         """Standard deviation of where each edge was seen, m."""
         known = self.components
         variance = known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2)
+        variance += (known.landed * np.where(seen.alone, 0.0, seen.landed)) ** 2
         found: Array = np.sqrt(variance + known.departures(loose))
         return found
 

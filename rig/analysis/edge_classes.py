@@ -103,8 +103,9 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
             if (match < 0).any():
                 found += _absent(gate.channel, train, match, path.times(levels) / clock)
             if train.times.size > (match >= 0).sum():
-                # Only the lowest beam is near enough to what bounces.
-                after = _first_hit(record, path) / clock if gate.height == lowest else np.inf
+                # Only the lowest beam is near enough to what bounces, and those beside what lies.
+                near = gate.height == lowest or record.is_beside_rods(gate)
+                after = _first_hit(record, path) / clock if near else np.inf
                 back = later_passages(record, train, match, path, model.protocol.gravity.value)
                 found += _surplus(gate.channel, train, match, after, back)
     return tuple(sorted(found, key=lambda edge: edge.time_s))

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.drop_model import DropModel
     from rig.protocol.protocol import Protocol
-    from rig.units import Quantity
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -96,6 +95,7 @@ class Seen(NamedTuple):
     times: Array
     burst: Array
     alone: Flags
+    landed: Array
     paired: Flags
 
 
@@ -148,6 +148,10 @@ class Expected(NamedTuple):
             -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
         )
         left = np.where(alone, levels + strikes[-1], np.inf)  # of the top rod's way
+        strike = np.full(rods.size, protocol.contact.strike.value)
+        if record.is_on_heap:
+            left = levels + np.array(record.chain.chain.heights)[rods]
+            strike = np.array(record.clear)[rods] - protocol.contact.strike.u
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
@@ -158,7 +162,7 @@ class Expected(NamedTuple):
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
-            _landed(protocol.contact.strike, left),
+            _landed(strike, protocol.contact.strike.u, left),
             np.cumsum(observed) - observed,
             np.cumsum(expected),
         )
@@ -176,19 +180,20 @@ class Expected(NamedTuple):
         paired = np.zeros(pick.size, dtype=np.bool_)
         rods, gate = self.rods[pick], self.gate[pick]
         paired[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
-        return Seen(pick, self.times[edge], self.burst[edge], self.alone[pick], paired)
+        alone, landed = self.alone[pick], self.landed[pick]
+        return Seen(pick, self.times[edge], self.burst[edge], alone, landed, paired)
 
 
-def _landed(strike: Quantity, left: Array) -> Array:
+def _landed(strike: Array, u: float, left: Array) -> Array:
     """See `Expected.landed`: normally distributed strikes, from which on a rod is slower."""
     found = np.zeros_like(left)
-    if strike.u <= 0.0:
+    if u <= 0.0:
         return found
     for place in np.flatnonzero(np.isfinite(left)):
-        z = (float(left[place]) - strike.value) / strike.u
+        z = float(left[place] - strike[place]) / u
         beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
         square = (1.0 + z * z) * beyond - z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-        found[place] = SLOWED * strike.u * math.sqrt(max(square, 0.0))
+        found[place] = SLOWED * u * math.sqrt(max(square, 0.0))
     return found
 
 

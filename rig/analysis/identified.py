@@ -41,6 +41,8 @@ class Identified:
         The fall, as it was adjusted; `None` where there is none.
     explained
         What else than the protocol would explain edges that are like no fall; `None` if not sought.
+    on_heap
+        The same where rods strike what lies there; `None` if not sought.
     """
 
     scale: TimeScale
@@ -48,6 +50,7 @@ class Identified:
     poor: tuple[str, ...] = ()
     begun: Begun | None = None
     explained: tuple[Reason, ...] | None = None
+    on_heap: Identified | None = None
 
 
 class IdentifiedByDrop(Protocol):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from rig.analysis.budgets import Budgets
 from rig.analysis.components import stated
 from rig.analysis.joint_fit import FEWEST, joint_fit
-from rig.analysis.refine import Budgets
 from rig.analysis.session import KEPT, joint_result, sum_up
 from rig.analysis.summary import summarize
 from rig.errors import InputError

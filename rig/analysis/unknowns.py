@@ -345,7 +345,7 @@ TABLE = (
         "landed",
         "contact",
         lambda side: side.model.components.landed,
-        level=lambda side: -side.edges.landed,
+        level=lambda side: -side.edges.landed * side.edges.alone,
     ),
     _struck(
         "strings",

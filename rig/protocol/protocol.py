@@ -141,11 +141,14 @@ class Contact:
     from_board
         Whether heights are measured from the board: where rods touch it follows from what they
         are like, and `level` is what that leaves out.
+    heaped
+        Whether rods strike others that lie there; no protocol says it, see `rig.analysis.heap`.
     """
 
     level: Quantity = DEFAULTS["contact.level"]
     strike: Quantity = DEFAULTS["contact.strike"]
     from_board: bool = False
+    heaped: bool = False
 
 
 @dataclass(frozen=True, slots=True)
