@@ -36,16 +36,16 @@ def on_heap(protocol: Protocol, run: Run) -> Protocol | None:
     Returns
     -------
     Protocol or None
-        With ``contact.heaped``, and the top rod's strike on it; `None` where by geometry all rods
-        strike the surface at the contact point.
+        With ``contact.heaped``, and the top rod's strike on it; `None` where by geometry nothing
+        lies there as the top rod strikes.
     """
     chain = None if run.impact is None else protocol.chains[run.impact]
     if protocol.surface is None or chain is None or "diameter" in lacking_geometry(chain):
         return None
-    heights = strike_heights(protocol.surface, run.incline_deg, chain)
-    if not any(heights):
+    top = strike_heights(protocol.surface, run.incline_deg, chain)[-1]
+    if not top > 0.0:
         return None
-    strike, top = protocol.contact.strike, heights[-1]
+    strike = protocol.contact.strike
     higher = Quantity(strike.value + top, math.hypot(strike.u, UNEVEN * top))
     return replace(protocol, contact=replace(protocol.contact, heaped=True, strike=higher))
 

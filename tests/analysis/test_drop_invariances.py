@@ -98,7 +98,10 @@ def test_the_name_of_a_chain():
     """Unlike chains with their names exchanged, and the run's with them."""
     b = UNIFORM.chains["B"]
     b = replace(
-        b, chain=Chain((1.0,) * 22, tuple(0.055 * k for k in range(22))), widths=b.widths[:22]
+        b,
+        chain=Chain((1.0,) * 22, tuple(0.055 * k for k in range(22))),
+        widths=b.widths[:22],
+        diameters=b.diameters[:22],
     )
     protocol = replace(UNIFORM, chains={"A": UNIFORM.chains["A"], "B": b})
     for number in (1, 2):
