@@ -22,6 +22,7 @@ from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import Expected
 from rig.analysis.evidence import STATED_WEIGHT
+from rig.analysis.fit import CLOSE
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
 from rig.analysis.result import GOOD, Measured, average
@@ -123,6 +124,8 @@ def free_gravity(
     """Fit the free chain's fall to one drop's matched edges, as in a scene without a surface."""
     if protocol.gates is None or result.run.free is None:
         return None
+    if protocol.surface is None:  # then this is what is measured
+        return result.quantities.get("gravity_m_s2")
     scene = replace(protocol, surface=None)
     (record,) = chain_records(scene, replace(result.run, impact=None), drop, scale.hz) or (None,)
     if record is None:
@@ -136,13 +139,13 @@ def free_gravity(
     release = float(np.median(expected.times[edge] - fall.times(expected.levels[pick])))
     guesses = {"free": Guess(release, scene.drop.value)}
     model = DropModel(scene, [record], guesses, scale.u)
-    estimate = adjust(model, {"free": matches}, model.first())
+    estimate = adjust(model, {"free": matches}, model.first(), done=CLOSE)
     # How much edges scatter is seen where they are many; what is stated of it counts as one more.
     if estimate.scatter == 1.0:
         scatter = (STATED_WEIGHT + estimate.chi2) / (STATED_WEIGHT + estimate.degrees)
         sizes, share = model.components, math.sqrt(scatter)
         model.components = replace(sizes, floor=sizes.floor * share, jitter=sizes.jitter * share)
-        estimate = adjust(model, {"free": matches}, estimate.x)
+        estimate = adjust(model, {"free": matches}, estimate.x, done=CLOSE)
     gravity = Adjusted(model, estimate.x).gravity
     return Measured(float(gravity.value), estimate.u(gravity.slopes))
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
 
     Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.intp]
 
 _NEAR = 0.02
 """How far from the moment that is asked for a passage of the free chain may be, s."""
@@ -47,19 +45,12 @@ class _Passages(NamedTuple):
         shape ``(edges, unknowns)``.
     sigma
         What each edge is off by itself, m.
-    rod
-        Of each edge.
     """
 
     times: Array
     heights: Array
     slopes: Array
     sigma: Array
-    rod: Index
-
-    def only(self, chosen: Flags) -> _Passages:
-        """Leave out the others."""
-        return _Passages(**{name: part[chosen] for name, part in self._asdict().items()})
 
 
 def last_passages(fit: Fit) -> dict[str, Measured]:
@@ -74,14 +65,9 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     model = fit.model
     if "impact" not in model.records or model.records["impact"].chain.chain.rods < 2:
         return {}
-    struck = _passages(fit, "impact")
-    places = model.records["impact"].chain.chain.heights
-    # Below here its nearest neighbour has struck.
-    before = places[-1] - model.records["impact"].strikes[-2]
-    alone = (struck.rod == len(places) - 1) & (struck.heights < before)
-    if np.count_nonzero(alone) < 2:
+    last = _passages(fit, "impact")
+    if last.times.size < 2:
         return {}
-    last = struck.only(alone)
     when = float(last.times[np.argmin(last.heights)])
     for _ in range(3):  # Newton's steps to the moment at which it is at the contact level
         (height, speed), covariance = _fall(fit, "impact", last, when)
@@ -89,8 +75,7 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     found = {"speed_m_s": Measured(speed, _u(covariance, 0.0, 1.0))}
     moment_u = _u(covariance, 1.0, 0.0) / speed
     if "free" in model.records:
-        free = _passages(fit, "free")
-        near = free.only(np.abs(free.times - when) < _NEAR)
+        near = _passages(fit, "free", when)
         if near.times.size >= 2 and np.ptp(near.times) > 0.0:
             (height, falling), covariance = _fall(fit, "free", near, when)
             u = math.hypot(_u(covariance, 1.0, 0.0), falling * moment_u)
@@ -115,17 +100,19 @@ def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) 
     return reasons
 
 
-def _passages(fit: Fit, role: str) -> _Passages:
-    """Collect a side's matched edges as passages of its top rod."""
+def _passages(fit: Fit, role: str, when: float | None = None) -> _Passages:
+    """Collect a side's matched edges about some time, or at last, as passages of its top rod."""
     model = fit.model
     expected, nominal = model.expected[role], Adjusted(model, np.zeros(fit.x.size))
     pick, edge = expected.chosen(fit.matches[role])
+    times = expected.times[edge] * model.rate(fit.x)
+    chosen = expected.alone[pick] if when is None else np.abs(times - when) < _NEAR
+    pick, times = pick[chosen], times[chosen]
     # The reference is at the level when the edge comes, and the top rod as much higher.
     levels = Dual(expected.levels[pick], model.slopes[role].levels[pick])
     top = nominal.top(role, levels)
-    sigma = model.residuals(role, fit.x, fit.matches[role]).sigma
-    times = expected.times[edge] * model.rate(fit.x)
-    return _Passages(times, top.value, top.slopes * model.unknowns.sd, sigma, expected.rods[pick])
+    sigma = model.residuals(role, fit.x, fit.matches[role]).sigma[chosen]
+    return _Passages(times, top.value, top.slopes * model.unknowns.sd, sigma)
 
 
 def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[float, float], Array]:
