@@ -154,6 +154,11 @@ class LiveAnalysis:
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
 
+    @property
+    def known(self) -> KnownDrops | None:
+        """Which rods the edges of its drops are; `None` before it was asked for any."""
+        return None if self._scene is None else self._scene.known
+
     def clock(self, session: Reader) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now."""
         return self._calibrator.look(session, self._planned(session).protocol.reference_u)

@@ -132,6 +132,7 @@ def calibration(session: Reader) -> Calibration:
 def results(
     session: Reader,
     progress: Progress | None = None,
+    known: KnownDrops | None = None,
     *,
     fresh: bool = False,
     with_joint_fit: bool = False,
@@ -144,6 +145,8 @@ def results(
         Open, for reading at least.
     progress
         Called with the number of drops done and the number of all.
+    known
+        Which rods its edges are, where a live analysis has found that out.
     fresh
         Whether to analyse it in any case.
     with_joint_fit
@@ -159,7 +162,7 @@ def results(
         drops = [] if finished else list(session.drops())
         causes = rejected(session)
     if finished is None:
-        known = KnownDrops(protocol, blind=blind, fresh=fresh)
+        known = known or KnownDrops(protocol, blind=blind, fresh=fresh)
         complete = analyze(protocol, drops, clock.scale, causes, progress, known)
         finished = kept.keep(_finished(protocol, complete, drops, clock, blind=blind))
     if blind or not with_joint_fit:
