@@ -36,14 +36,14 @@ def on_heap(protocol: Protocol, run: Run) -> Protocol | None:
     Returns
     -------
     Protocol or None
-        With ``contact.heaped``, and the top rod's strike on it; `None` where by geometry nothing
-        lies there as the top rod strikes.
+        With ``contact.heaped``, and the top rod's strike on it; `None` where by geometry less
+        than one rod lies there as the top rod strikes.
     """
     chain = None if run.impact is None else protocol.chains[run.impact]
     if protocol.surface is None or chain is None or "diameter" in lacking_geometry(chain):
         return None
     top = strike_heights(protocol.surface, run.incline_deg, chain)[-1]
-    if not top > 0.0:
+    if top < max(chain.diameters):  # what is lower than one of its rods is no heap
         return None
     strike = protocol.contact.strike
     higher = Quantity(strike.value + top, math.hypot(strike.u, UNEVEN * top))
