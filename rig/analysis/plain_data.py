@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
-
 
 def plain(value: Any) -> Any:
     """Return a value as JSON has it: results as they print themselves, no number that is none."""
@@ -15,7 +13,7 @@ def plain(value: Any) -> Any:
         return value.json()
     if isinstance(value, Mapping):
         return {name: plain(member) for name, member in value.items()}
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):  # an array: who asks for none need not load what makes them
         return value.tolist()
     if isinstance(value, Iterable) and not isinstance(value, str):
         return [plain(member) for member in value]

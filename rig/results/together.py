@@ -18,7 +18,7 @@ from rig.measurands import averaged
 from rig.protocol.plan import runs as planned_runs
 from rig.reasons import make_error
 from rig.results.blind import check_open
-from rig.results.whole import protocol_of, results
+from rig.results.whole import complete_analysis, protocol_of, results
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -225,10 +225,11 @@ def results_together(
     for name, session in zip(names, files, strict=True):
         protocol = protocol_of(session)
         check_open(session, protocol)
-        own[name] = found = results(session, progress)
+        own[name] = found = results(session, progress, with_joint_fit=True)
+        analysis = complete_analysis(session, found, progress)
         _check_whole(session, found, len(planned_runs(protocol)), unfinished=unfinished)
         boards = [identity.get("unique_id", "") for _, identity in session.identities()]
-        parts.append(SessionPart(name, protocol, found.analysis, str(boards[-1] if boards else "")))
+        parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
     return TogetherResults(own, fit_sessions(parts, same_rig=same_rig))
 
 

@@ -86,7 +86,7 @@ class SessionResults:
 
     @property
     def calibration(self) -> dict[str, Any]:
-        """``calibration`` of `json`: what is known of the clock, the free chain's word included."""
+        """``calibration`` of `json`: what is known of the clock, what free fall says included."""
         return self.clock.said | _checked(self.clock.said["notes"], self.gravity)
 
     @property
@@ -198,13 +198,13 @@ def complete_analysis(
 
 
 def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
-    """Add to a calibration what the free chain says of it."""
+    """Add to a calibration what free fall says of it."""
     if check is None:
         return {}
     if not check.agrees:
         notes = [
             *notes,
-            f"the free chain falls with {check.measured.value:.4f} ± {check.measured.expanded:.4f} "
+            f"free fall gives g = {check.measured.value:.4f} ± {check.measured.expanded:.4f} "
             f"m/s², the protocol says {check.stated.value:.4f} (Eₙ {check.normalized_error:.1f}): "
             "the clock, the beams' heights, the air or the protocol's gravity is not as stated",
         ]
