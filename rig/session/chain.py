@@ -56,10 +56,9 @@ class ChainCheck(NamedTuple):
 
     def __str__(self) -> str:
         if not self.links:
-            return "linked hashes: none; the session was recorded by an older program"
+            return "chain: none; the session was recorded by an older program"
         since = ", begun when this program continued the session" if OLDER in self.links else ""
-        agree = "not all agree" if self.faults else "all agree"
-        return f"linked hashes: {len(self.links)}, {agree}{since}"
+        return f"chain: {len(self.links)} links, {'not ' if self.faults else ''}whole{since}"
 
     @property
     def protocol_first(self) -> bool | None:
@@ -67,7 +66,7 @@ class ChainCheck(NamedTuple):
         if not self.links or OLDER in self.links:
             return None
         rows = self.links[: self.links.index("run_state")] if "run_state" in self.links else ()
-        broken = any(fault.startswith(("linked hashes", "table protocol")) for fault in self.faults)
+        broken = any(fault.startswith(("chain", "table protocol")) for fault in self.faults)
         return not broken and (not rows or ("protocol" in rows and "drop" not in rows))
 
 
@@ -112,7 +111,7 @@ def check_chain(connection: sqlite3.Connection) -> ChainCheck:
     check = ChainCheck([link[1] for link in links], faults)
     for number, (link, table, until, digest) in enumerate(links, 1):
         if link != number or table not in {OLDER, *_KEYS}:
-            faults.append(f"linked hashes: number {number} is missing, or of no table")
+            faults.append(f"chain: link {number} is missing, or of no table")
             return check
         since = last.get(table, 0)
         if table != OLDER and digest != _digest(

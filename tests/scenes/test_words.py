@@ -137,7 +137,6 @@ def test_what_goes_before_and_after_an_analysis_speaks_the_words_of_its_scene(
         ["replay", session],
         ["recover", session],
         ["doctor", "--session", session],
-        ["verify", session],
     ]
     for command in commands:
         capsys.readouterr()

@@ -108,11 +108,8 @@ def test_any_value_altered_is_named(session, tmp_path):
             "INSERT INTO ping (host_send_ns, host_recv_ns, tick) VALUES (1, 2, 3)",
             "table ping: rows after 2 are in no link",
         ),
-        ("DELETE FROM chain WHERE id = 4", "linked hashes: number 4 is missing, or of no table"),
-        (
-            "UPDATE chain SET name = 'x' WHERE id = 4",
-            "linked hashes: number 4 is missing, or of no table",
-        ),
+        ("DELETE FROM chain WHERE id = 4", "chain: link 4 is missing, or of no table"),
+        ("UPDATE chain SET name = 'x' WHERE id = 4", "chain: link 4 is missing, or of no table"),
         ("UPDATE chain SET digest = x'00' WHERE id = 1", "table meta, rows 1 to 6"),
         (
             "DELETE FROM chain WHERE id = (SELECT MAX(id) FROM chain)",
