@@ -26,7 +26,6 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The first date that the format knows."""
 _LOCAL_HEADER = 30
 """Bytes before a member's name (APPNOTE.TXT, 4.3.7)."""
-_MAGIC = b"PK"
 _LARGEST = 1 << 31
 
 
@@ -68,12 +67,9 @@ def read_bundle(path: str | os.PathLike[str]) -> BundleContents:
 
 
 def is_archive(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is meant to be a bundle: by its name or its first bytes."""
+    """Whether a file is meant to be a bundle: by its beginning, its end or its name."""
     place = Path(path)
-    if place.suffix == ".eln" or not place.is_file():
-        return place.suffix == ".eln"
-    with place.open("rb") as stream:
-        return stream.read(len(_MAGIC)) == _MAGIC
+    return place.suffix == ".eln" or (place.is_file() and zipfile.is_zipfile(place))
 
 
 def _members(place: Path, data: bytes) -> dict[str, bytes]:

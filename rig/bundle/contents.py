@@ -23,7 +23,6 @@ from rig.bundle.history import describe_history
 from rig.bundle.tables import data_package, mean_tables
 from rig.results import protocol_of, tick_rates
 from rig.session.export import csv_files
-from rig.session.faults import translated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,14 +42,8 @@ def session_copy(session: Reader) -> bytes:
     """Return a session's content as a file of its own; the same rows give the same bytes.
 
     What a log (``-wal``) beside the file adds is in it. The session stays as it is.
-
-    Raises
-    ------
-    SessionError
-        The file is damaged.
     """
-    memory = sqlite3.connect(":memory:", isolation_level=None)
-    with translated(session.path), closing(memory):
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
         session.connection.backup(memory)
         memory.execute("VACUUM")  # how often and by whom pages were written is gone
         return memory.serialize()

@@ -30,7 +30,6 @@ COMMANDS = {
     "replay": (),
     "export": ("--csv", "tables"),
     "report": ("-o", "page.html"),
-    "verify": (),
 }
 
 

@@ -33,8 +33,6 @@ COMMANDS = [
     ("estimate", "SESSION"),
     ("report", "SESSION", "-o", "OUT/page.html"),
     ("export", "SESSION", "--csv", "OUT/tables"),
-    ("export", "SESSION", "--bundle", "OUT/bundle.eln"),
-    ("verify", "SESSION"),
     ("replay", "SESSION"),
     ("recover", "SESSION"),
     ("recover", "SESSION", "-o", "OUT/saved"),
