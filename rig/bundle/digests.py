@@ -12,8 +12,7 @@ from rig.recover.rows import find_rows
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-_TABLES = ("meta", "identity", "bytes", "ping", "reference", "host_break", "run_state",
-           "attachment", "chain")  # fmt: skip
+_TABLES = ("meta", "identity", "bytes", "ping", "reference", "host_break", "run_state")
 
 
 def sha256(data: bytes) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +29,6 @@ def main(arguments: Namespace) -> int:
         text = f"it has {'no' if not data else f'more than {LARGEST}'} bytes"
         raise make_error(InputError, "attachment_unreadable", path=arguments.file, text=text)
     with Session.open(arguments.session) as session:
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        session.attach(now, Path(arguments.file).name, data)
+        session.attach(Path(arguments.file).name, data)
     print(f"attached to {arguments.session}: {arguments.file}, {len(data)} bytes")
     return 0

@@ -25,7 +25,6 @@ _NUMBERED = {
     "run_state": "run states",
     "identity": "identities of the device",
     "drop": "drops",
-    "attachment": "attached files",
 }
 _GOOD = (Fate.CONFIRMED, Fate.IMPORTED)
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)

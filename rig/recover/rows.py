@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
 Row: TypeAlias = "tuple[Value, ...]"
 
-_TABLES = ("bytes", "identity", "ping", "host_break", "reference", "run_state", "drop",
-           "attachment", "chain")  # fmt: skip
+_TABLES = ("bytes", "identity", "ping", "host_break", "reference", "run_state", "drop")
 _LENGTHS = {"drop": {14, 15, 20}}  # of each format
 _TRIP_NS = 60 * 10**9  # no answer takes longer
 
@@ -33,8 +32,6 @@ class Rows:
     drop: dict[int, Row] = field(default_factory=dict)
     edge: dict[int, dict[int, Row]] = field(default_factory=dict)
     run_state: dict[int, Row] = field(default_factory=dict)
-    attachment: dict[int, Row] = field(default_factory=dict)
-    chain: dict[int, Row] = field(default_factory=dict)
     bad: int = 0
 
     def any(self) -> bool:

@@ -63,8 +63,6 @@ def save(found: Examined, target: str | os.PathLike[str], protocol: str | None =
         for _, row in sorted(rows.bytes.items()):
             host_ns, direction, data = cast("Any", row)[1:]
             session.log_bytes(direction, host_ns, data)
-        for _, row in sorted(rows.attachment.items()):
-            session.attach(*cast("Any", row)[1:])
         notes += _drops(session, found)
         session.commit()
     return [*found.lost, *notes]

@@ -150,7 +150,6 @@ COLUMNS: Mapping[str, Sequence[ColumnRule]] = {
         _ns("host_ns"),
     ),
     "attachment": (_ID, _text("added"), _text("name"), _BYTES),
-    "chain": (_ID, _text("name"), _whole("last", 0, _INT64), _BYTES),
 }
 """By table, in the order of the schema; a row of an older format has fewer."""
 

@@ -338,11 +338,12 @@ class Session(Reader):
             (run, attempt, str(state), encodable(text), host_ns),
         )
 
-    def attach(self, added: str, name: str, data: bytes) -> None:
-        """Add a file, such as a photograph of the rig, with the time (UTC) of that."""
+    def attach(self, name: str, data: bytes) -> None:
+        """Add a file, such as a photograph of the rig."""
+        now = datetime.now(UTC).isoformat(timespec="seconds")
         self._add(
             "INSERT INTO attachment (added, name, data) VALUES (?, ?, ?)",
-            (added, encodable(name), data),
+            (now, encodable(name), data),
         )
 
     def unblind(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import random
 import shutil
 
 import pytest
@@ -51,21 +50,6 @@ def test_notes_and_files_travel_in_report_and_bundle(session, call, tmp_path):
     assert b"a draught" in files["experiment/tables/states.csv"]
     done = call("verify", bundle)
     assert (done.code, "a photo.jpg, 256 bytes" in done.out) == (0, True), done.out
-
-
-def test_a_file_of_many_pages_is_recovered(session, call, tmp_path):
-    photo, torn, saved = (tmp_path / name for name in ("large.jpg", "torn", "saved.session"))
-    photo.write_bytes(random.Random(4).randbytes(100_000))
-    assert call("attach", session, photo).code == 0
-    data = bytearray(session.read_bytes())
-    data[40:44] = b"\xff" * 4  # the schema's version: SQLite still reads its pages
-    data[105] ^= 0xFF  # and the root page is torn
-    torn.write_bytes(data)
-    done = call("recover", torn, "-o", saved)
-    assert done.code == 0, done
-    with Session.open(saved, readonly=True) as opened:
-        ((_, name, content),) = opened.attachments()
-    assert (name, content) == (photo.name, photo.read_bytes())
 
 
 def test_what_cannot_be_noted_or_attached_is_refused_in_words(session, call, tmp_path):

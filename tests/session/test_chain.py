@@ -42,7 +42,7 @@ def session(tmp_path):
         fill(opened)
         opened.commit()
         fill_again(opened)
-        opened.attach("2026-05-01", "photo.jpg", b"\xff\xd8")
+        opened.attach("photo.jpg", b"\xff\xd8")
     return path
 
 
