@@ -323,15 +323,6 @@ def _parser() -> Parser:
     export.value("--sign", "KEY", "sign the bundle with this secret key (minisign)")
     _fresh(export)
 
-    notes = command("notes", "add a note to a recorded run")
-    _session(notes)
-    notes.value("text", "TEXT", "the note")
-    notes.value("--run", "N", "number of the run", type=_count, required=True)
-
-    attach = command("attach", "add a file, such as a photograph, to a session")
-    _session(attach)
-    attach.value("file", "FILE", "the file")
-
     verify = command("verify", "check a bundle, and derive its numbers again from the raw edges")
     verify.value("file", "FILE", "bundle, its unpacked folder, or session file")
     verify.value("--key", "KEY.pub", "public key of who signed it (minisign)")

@@ -18,7 +18,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "The first minutes": ("demo", "new"),
     "Before a session": ("check", "predict", "design", "sweep"),
     "The board": ("ports", "flash", "selftest", "doctor"),
-    "A session": ("run", "tui", "daemon", "import", "notes", "attach"),
+    "A session": ("run", "tui", "daemon", "import"),
     "Results": (
         "analyze",
         "compare",
@@ -74,9 +74,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "estimate": ("rig estimate my.session", "rig estimate my.session -o my-pictures"),
     "export": ("rig export my.session --csv my-csv",
                "rig export my.session --bundle my.eln"),
-    "notes": ('rig notes my.session --run 3 "a draught"',
-              'rig notes my.session --run 7 "new string"'),
-    "attach": ("rig attach my.session rig.jpg", "rig attach my.session strings.pdf"),
     "verify": ("rig verify my.eln", "rig verify my.session"),
     "unblind": ("rig unblind my.session", "rig unblind my.session && rig analyze my.session"),
     "replay": ("rig replay my.session", "rig replay old.session"),

@@ -594,10 +594,6 @@ WORDINGS: dict[str, Wording] = {
         "{path} is no bundle made by rig: {text}",
         "name a file made by rig export SESSION --bundle FILE.eln, its unpacked folder, or a "
         "session file"),
-    "attachment_unreadable": _void(
-        "cannot attach {path}: {text}", "name a file of 1 byte to 32 MiB, such as a photograph"),
-    "run_unrecorded": _void(
-        "{path}: run {run} has no recorded drop", "rig analyze {path} --json lists the runs"),
     "key_unusable": _void("cannot use the key {path}: {text}", "name a key made by minisign -G"),
     "key_locked": _void(
         "the key {path} has a password, and there is no terminal to ask at",

@@ -147,10 +147,8 @@ def _version(package: str) -> str:
 
 
 def _noted(session: Session) -> list[str]:
-    """Tell what operators noted to drops, and which files they attached."""
-    noted = notes(session).items()
-    attached = [f"Attached: {file.name} ({file.added})" for file in session.attachments()]
-    return [*(f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in noted), *attached]
+    """Tell what operators noted to drops."""
+    return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
 
 
 def _estimated(session: Session, found: SessionResults, *, fresh: bool) -> SessionEstimate | None:

@@ -66,9 +66,4 @@ def _data(session: Reader, found: SessionResults) -> list[Attachment]:
         Attachment("data.zip", "application/zip", packed, words),
         Attachment("summary.csv", "text/csv", files["summary.csv"].encode(), "means only"),
         Attachment(METHOD, "text/markdown", method_page().encode(), "the whole method"),
-        *(
-            Attachment(file.name, "application/octet-stream", file.data, f"attached {file.added}")
-            for file in session.attachments()
-            if len(file.data) <= _DATA
-        ),
     ]

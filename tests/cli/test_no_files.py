@@ -21,8 +21,6 @@ from tests.waiting import PATIENCE_S
 COMMANDS = {
     ("analyze", "session"): "X",
     ("analyze", "video"): "SESSION --video X",
-    ("attach", "file"): "SESSION X",
-    ("attach", "session"): "X CSV",
     ("check", "protocol"): "X",
     ("design", "learned"): "FENCE --learned X",
     ("design", "protocol"): "X",
@@ -32,7 +30,6 @@ COMMANDS = {
     ("flash", "hex"): "--board mega --port /dev/null --avrdude /bin/true --hex X",
     ("import", "events"): "X --protocol FENCE --session OUT",
     ("import", "protocol"): "CSV --protocol X --session OUT",
-    ("notes", "session"): "X --run 1 text",
     ("predict", "protocol"): "X",
     ("recover", "protocol"): "SESSION -o OUT --protocol X",
     ("recover", "session"): "X",
@@ -44,8 +41,8 @@ COMMANDS = {
     ("tui", "keys"): "--keys X",
     ("unblind", "session"): "X",
 }
-WRITTEN = {("import", "session"), ("tui", "protocol"), ("tui", "session"), ("verify", "file")}
-"""A new file, those that are only read on a terminal, and one that may be a folder."""
+WRITTEN = {("import", "session"), ("tui", "protocol"), ("tui", "session")}
+"""A new file, and those that are only read on a terminal."""
 
 
 @pytest.fixture
@@ -92,7 +89,7 @@ def test_every_command_that_takes_a_file_is_tried():
     (commands,) = (
         action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction)
     )
-    files = {"protocol", "session", "events", "video", "learned", "hex", "keys", "file"}
+    files = {"protocol", "session", "events", "video", "learned", "hex", "keys"}
     taken = {
         (name, action.dest)
         for name, parser in commands.choices.items()
