@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import platform
-import re
 import sqlite3
 from contextlib import closing
 from importlib.metadata import version
@@ -17,7 +16,7 @@ import numpy as np
 
 from rig import __version__
 from rig.bundle.archive import SUMS
-from rig.bundle.crate import CRATE, PART, crate
+from rig.bundle.crate import CRATE, crate
 from rig.bundle.digests import hash_rows, sha256
 from rig.bundle.history import describe_history
 from rig.bundle.tables import data_package, mean_tables
@@ -30,12 +29,13 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
     from rig.session.reading import Reader
 
-SESSION = f"{PART}record.session"
-RESULTS = f"{PART}results.json"
-ENVIRONMENT = f"{PART}environment.json"
-ROWS = f"{PART}rows.json"
-PAGE = f"{PART}report.html"
-HISTORY = f"{PART}deviations.txt"
+FOLDER = "experiment/"
+SESSION = f"{FOLDER}record.session"
+RESULTS = f"{FOLDER}results.json"
+ENVIRONMENT = f"{FOLDER}environment.json"
+ROWS = f"{FOLDER}rows.json"
+PAGE = f"{FOLDER}report.html"
+HISTORY = f"{FOLDER}deviations.txt"
 
 
 def session_copy(session: Reader) -> bytes:
@@ -78,21 +78,18 @@ def bundle_files(
     texts = csv_files(session, results.json(), tick_rates(session))
     readme = texts.pop("README.txt")
     texts |= mean_tables(protocol, results.analysis)
-    texts = {f"{PART}tables/{name}": text for name, text in texts.items()}
+    texts = {f"{FOLDER}tables/{name}": text for name, text in texts.items()}
     texts |= {
-        f"{PART}tables/datapackage.json": data_package(texts),
-        f"{PART}README.txt": readme,
-        f"{PART}protocol.yaml": session.protocol_text,
+        f"{FOLDER}tables/datapackage.json": data_package(texts),
+        f"{FOLDER}README.txt": readme,
+        f"{FOLDER}protocol.yaml": session.protocol_text,
         HISTORY: "\n".join([*describe_history(session, protocol, results.analysis), ""]),
         RESULTS: _json(results.json()),
         ENVIRONMENT: _json(environment()),
         ROWS: _json(hash_rows(data)),
     }
     files = {name: text.encode() for name, text in texts.items()} | {**extra}
-    for number, attached in enumerate(session.attachments(), 1):
-        name = re.sub(r"[^\w.-]+", "_", attached.name)
-        files[f"{PART}attached/{number}-{name}"] = attached.data
-    files |= {f"{PART}{name}": content for name, content in drawn.items()}
+    files |= {f"{FOLDER}{name}": content for name, content in drawn.items()}
     files[SESSION] = data
     files[CRATE] = _json(crate(protocol.title, session.meta, files)).encode()
     sums = [f"{sha256(files[name])}  {name}\n" for name in sorted(files)]

@@ -15,27 +15,17 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 CRATE = "ro-crate-metadata.json"
-PART = "experiment/"
-"""The folder of all files but those on the bundle itself."""
-_STANDARD = "https://w3id.org/ro/crate/1.1"
+_PART = "./experiment/"
 _KINDS = {
     "csv": "text/csv",
     "html": "text/html",
-    "jpg": "image/jpeg",
     "json": "application/json",
-    "pdf": "application/pdf",
-    "png": "image/png",
     "session": "application/vnd.sqlite3",
     "svg": "image/svg+xml",
     "txt": "text/plain",
     "yaml": "application/yaml",
 }
 """Media types by ending: the system's own list differs between systems."""
-_LICENCE = (
-    "Whoever publishes the measurement chooses its licence; this bundle grants none. The program "
-    "that made it has the MIT licence. Letters in figures are outlines of DejaVu Sans (licence of "
-    "Bitstream Vera)."
-)
 
 
 def crate(title: str, meta: Mapping[str, str], files: Mapping[str, bytes]) -> dict[str, Any]:
@@ -51,42 +41,67 @@ def crate(title: str, meta: Mapping[str, str], files: Mapping[str, bytes]) -> di
         Contents by name below the crate's root.
     """
     simulated = meta["simulated"] == "true"
-    text = "Simulated drops: nothing fell." if simulated else "Drops past photogates."
-    about: dict[str, Any] = {
-        "name": title or "A session",
-        "description": text,
-        "datePublished": meta["created"],
-    }
-    about |= {"license": _to("#licence"), "citation": _to("#paper")}
-    tool = {"name": "chainrig", "version": __version__, "citation": SOFTWARE}
-    head = {"about": _to("./"), "conformsTo": _to(_STANDARD), "sdPublisher": _to("#chainrig")}
-    described = [_file(name, content) for name, content in sorted(files.items())]
-    graph = [
-        _entity(CRATE, "CreativeWork", **head),
-        _entity("./", "Dataset", **about, hasPart=[_to(f"./{PART}")]),
-        _entity(f"./{PART}", "Dataset", **about, hasPart=[_to(row["@id"]) for row in described]),
-        *described,
-        _entity("#chainrig", "SoftwareApplication", **tool),
-        _entity("#licence", "CreativeWork", name="Licences", description=_LICENCE),
-        _entity("#paper", "ScholarlyArticle", name=PAPER),
-    ]
-    return {"@context": f"{_STANDARD}/context", "@graph": graph}
-
-
-def _file(name: str, content: bytes) -> dict[str, Any]:
-    return _entity(
-        f"./{name}",
-        "File",
-        name=name.rpartition("/")[2],
-        encodingFormat=_KINDS.get(name.rpartition(".")[2], "application/octet-stream"),
-        contentSize=str(len(content)),
-        sha256=sha256(content),
+    about = "Simulated drops: nothing fell." if simulated else "Drops past photogates."
+    created = meta["created"]
+    licence = (
+        "Whoever publishes the measurement chooses its licence; this bundle grants none. The "
+        "program that made it has the MIT licence."
     )
-
-
-def _entity(identifier: str, kind: str, **members: Any) -> dict[str, Any]:
-    return {"@id": identifier, "@type": kind, **members}
-
-
-def _to(identifier: str) -> dict[str, str]:
-    return {"@id": identifier}
+    described = [
+        {
+            "@id": f"./{name}",
+            "@type": "File",
+            "name": name.rpartition("/")[2],
+            "encodingFormat": _KINDS.get(name.rpartition(".")[2], "application/octet-stream"),
+            "contentSize": str(len(content)),
+            "sha256": sha256(content),
+        }
+        for name, content in sorted(files.items())
+    ]
+    graph: list[dict[str, Any]] = [
+        {
+            "@id": CRATE,
+            "@type": "CreativeWork",
+            "about": {"@id": "./"},
+            "conformsTo": {"@id": "https://w3id.org/ro/crate/1.1"},
+            "sdPublisher": {"@id": "#chainrig"},
+        },
+        {
+            "@id": "./",
+            "@type": "Dataset",
+            "name": title or "A session",
+            "description": about,
+            "datePublished": created,
+            "license": {"@id": "#licence"},
+            "hasPart": [{"@id": _PART}],
+        },
+        {
+            "@id": _PART,
+            "@type": "Dataset",
+            "name": title or "A session",
+            "description": about,
+            "dateCreated": created,
+            "citation": [{"@id": "#paper"}],
+            "hasPart": [{"@id": row["@id"]} for row in described],
+        },
+        *described,
+        {
+            "@id": "#made",
+            "@type": "CreateAction",
+            "name": "rig export --bundle",
+            "instrument": {"@id": "#chainrig"},
+            "object": {"@id": "./experiment/record.session"},
+            "result": {"@id": _PART},
+        },
+        {
+            "@id": "#chainrig",
+            "@type": "SoftwareApplication",
+            "name": "chainrig",
+            "version": __version__,
+            "license": "https://spdx.org/licenses/MIT",
+            "citation": SOFTWARE,
+        },
+        {"@id": "#licence", "@type": "CreativeWork", "name": "No licence", "description": licence},
+        {"@id": "#paper", "@type": "ScholarlyArticle", "name": PAPER},
+    ]
+    return {"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from typing import TYPE_CHECKING
 
 from rig.recover.pages import read_pages
@@ -41,5 +40,4 @@ def hash_rows(data: bytes) -> dict[str, str]:
 
 
 def _hash(rows: Iterable[object]) -> str:
-    # JSON writes the same text with every version of Python.
-    return sha256("\n".join(sorted(json.dumps(row, default=bytes.hex) for row in rows)).encode())
+    return sha256("\n".join(sorted(map(repr, rows))).encode())

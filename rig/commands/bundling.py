@@ -21,8 +21,6 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rig.session.chain import ChainCheck
-
 
 def write_bundle(arguments: Namespace) -> int:
     """Write a session as a bundle; the same session gives the same bytes."""
@@ -31,7 +29,7 @@ def write_bundle(arguments: Namespace) -> int:
     extra = {} if key is None else {PUBLIC_KEY: public_key(key)}
     with Session.open(arguments.session, readonly=True) as session:
         data = session_copy(session)
-    files, found, _ = make_files(data, extra)
+    files, found = make_files(data, extra)
     if key is not None:
         files[SIGNATURE] = sign(files[SUMS], key)
     with replacing(arguments.bundle) as stream:
@@ -40,9 +38,7 @@ def write_bundle(arguments: Namespace) -> int:
     return tell_damage(found.analysis)
 
 
-def make_files(
-    data: bytes, extra: Mapping[str, bytes]
-) -> tuple[dict[str, bytes], SessionResults, ChainCheck]:
+def make_files(data: bytes, extra: Mapping[str, bytes]) -> tuple[dict[str, bytes], SessionResults]:
     """Derive all files of a bundle from its session file.
 
     Parameters
@@ -72,4 +68,4 @@ def make_files(
         }
         with Session.open(copy, readonly=True) as session:
             found = results(session, progress("analysing run"))
-            return bundle_files(session, data, found, drawn, extra), found, session.chain()
+            return bundle_files(session, data, found, drawn, extra), found

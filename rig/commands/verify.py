@@ -36,10 +36,8 @@ def _verify_session(arguments: Namespace) -> tuple[list[str], list[str]]:
     with Session.open(arguments.file, readonly=True) as session:
         found = results(session, progress("analysing run"))
         history = describe_history(session, protocol_of(session), found.analysis)
-        chain = session.chain()
     lines = ["numbers: a session file holds none; export a bundle to have them compared"]
-    lines = [*_drops(found.analysis), str(chain), *lines, *history]
-    return lines, [*chain.faults, *found.analysis.damage]
+    return [*_drops(found.analysis), *lines, *history], found.analysis.damage
 
 
 def _verify_bundle(arguments: Namespace) -> tuple[list[str], list[str]]:
@@ -56,20 +54,19 @@ def _verify_bundle(arguments: Namespace) -> tuple[list[str], list[str]]:
         return lines, faults
     extra = {name: stored[name] for name in (PUBLIC_KEY,) if name in stored}
     try:
-        derived, found, chain = make_files(stored[SESSION], extra)
+        derived, found = make_files(stored[SESSION], extra)
     except SessionError as error:
         return lines, [*faults, error.message]
     compared = compare(stored, derived)
     agree = "all digits agree" if compared.exact else f"{compared.digits} digits agree"
     lines += [
         *_drops(found.analysis),
-        str(chain),
         f"numbers: {compared.numbers} derived again from the raw edges; {agree}",
         f"made with: {_versions(stored.get(ENVIRONMENT, b''))}",
         f"verified with: {_versions(derived[ENVIRONMENT])}",
         *derived[HISTORY].decode().splitlines(),
     ]
-    return lines, [*faults, *chain.faults, *found.analysis.damage, *compared.differences]
+    return lines, [*faults, *found.analysis.damage, *compared.differences]
 
 
 def _drops(analysis: Analysis) -> list[str]:

@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from rig.errors import SessionError
 from rig.files import require_file, sync_directory
 from rig.reasons import make_error
-from rig.session.chain import extend, read_end
 from rig.session.faults import not_a_session, translated
 from rig.session.foreign import check_schema, guard
 from rig.session.lock import writer_of
@@ -47,7 +46,6 @@ def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text:
             connection.execute(
                 "INSERT INTO protocol VALUES (1, ?, ?)", (protocol_source, protocol_text)
             )
-            extend(connection, read_end(connection))
             connection.execute("COMMIT")
         temporary.replace(path)
     except SessionError:

@@ -9,14 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import SessionError
 from rig.reasons import make_error
-from rig.session.chain import extend, read_end
 from rig.session.faults import as_session_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
-
-    from rig.session.chain import ChainEnd
 
 
 class Statement(NamedTuple):
@@ -59,7 +56,6 @@ class Journal:
         self._applied = 0  # how many of the pending the open transaction holds
         self._failed = False
         self._begun_s: float | None = None
-        self._chain: ChainEnd | None = None  # as committed; read when it is needed first
 
     def __len__(self) -> int:
         """Count the records not yet on the disk."""
@@ -136,7 +132,6 @@ class Journal:
                         target.executemany(sql, rows)
                 except _BAD_ROW:
                     refused += 1
-            extend(target, read_end(target))
             target.execute("COMMIT")
         self._pending.clear()
         self._failed = False
@@ -152,9 +147,7 @@ class Journal:
             refusal = error
         try:
             if self._connection.in_transaction:
-                end = extend(self._connection, self._chain or read_end(self._connection))
                 self._connection.execute("COMMIT")
-                self._chain = end
         except sqlite3.Error as error:
             self._give_up()
             raise as_session_error(self._path, error) from error

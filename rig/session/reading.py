@@ -12,7 +12,6 @@ from rig.boards import GATES
 from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.records import ClockSample, Drop, HostBreak, Pulse
-from rig.session.chain import check_chain
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translated
 from rig.session.foreign import limit_steps
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
     from rig.reasons import Reason
     from rig.records import Job
-    from rig.session.chain import ChainCheck
 
 Direction = Literal["rx", "tx"]
 """``rx``: from the device to the host; ``tx``: from the host to the device."""
@@ -57,14 +55,6 @@ class ByteChunk(NamedTuple):
 
     host_ns: int
     direction: Direction
-    data: bytes
-
-
-class Attached(NamedTuple):
-    """A file attached to a session, and when that was (UTC)."""
-
-    added: str
-    name: str
     data: bytes
 
 
@@ -173,10 +163,6 @@ class Reader:
         """When the host slept or its clock was set, in order."""
         return [HostBreak(*row[1:]) for row in self._newer("host_break")]
 
-    def attachments(self) -> list[Attached]:
-        """All files that were attached, in order."""
-        return [Attached(*row[1:]) for row in self._newer("attachment")]
-
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording, compared with its bytes.
 
@@ -220,11 +206,6 @@ class Reader:
         rows = self._rows("run_state", "WHERE run = ? ORDER BY id DESC LIMIT 1", run)
         return next(map(_state, rows), None)
 
-    def chain(self) -> ChainCheck:
-        """Compare the chain of hashes with the rows that it covers."""
-        with translated(self.path):
-            return check_chain(self._opened())
-
     def check(self) -> None:
         """Read everything there is once.
 
@@ -237,7 +218,6 @@ class Reader:
         self.pings()
         self.pulses()
         self.host_breaks()
-        self.attachments()
         self.states()
         for drop in self.drops():  # and the bytes
             if drop.damage:

@@ -93,7 +93,6 @@ _IDENTITY: Mapping[str, Callable[[Any], bool]] = {
 }
 _ID = _whole("id", 1, _INT64)
 _RUN = _whole("run", 1, _INT64)
-_BYTES = ColumnRule("data", "bytes", lambda value: type(value) is bytes)
 _REASONS = _json("reasons", "a JSON list of reasons", read_reasons)
 COLUMNS: Mapping[str, Sequence[ColumnRule]] = {
     "meta": (_text("key"), _text("value")),
@@ -103,7 +102,7 @@ COLUMNS: Mapping[str, Sequence[ColumnRule]] = {
         _ID,
         _ns("host_ns"),
         _text("direction", "rx", "tx"),
-        _BYTES,
+        ColumnRule("data", "bytes", lambda value: type(value) is bytes),
     ),
     "ping": (_ID, _ns("host_send_ns"), _ns("host_recv_ns"), _whole("tick", 0, _U32)),
     "reference": (
@@ -149,7 +148,6 @@ COLUMNS: Mapping[str, Sequence[ColumnRule]] = {
         _REASONS,
         _ns("host_ns"),
     ),
-    "attachment": (_ID, _text("added"), _text("name"), _BYTES),
 }
 """By table, in the order of the schema; a row of an older format has fewer."""
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 4
 """In SQLite's ``user_version``; a program refuses files with a higher one."""
 
 
@@ -41,22 +41,6 @@ CREATE TABLE host_break (
     host_ns INTEGER NOT NULL,
     slept_ns INTEGER NOT NULL,
     stepped_ns INTEGER NOT NULL
-) STRICT;
-"""
-
-_CHAIN_TABLES = """
-CREATE TABLE chain (
-    id INTEGER PRIMARY KEY,
-    name TEXT NOT NULL,
-    last INTEGER NOT NULL,
-    digest BLOB NOT NULL
-) STRICT;
-
-CREATE TABLE attachment (
-    id INTEGER PRIMARY KEY,
-    added TEXT NOT NULL,
-    name TEXT NOT NULL,
-    data BLOB NOT NULL
 ) STRICT;
 """
 
@@ -158,8 +142,6 @@ _IDENTICAL = {
     "drop": "id = NEW.id OR (run = NEW.run AND attempt = NEW.attempt)",
     "edge": '"drop" = NEW."drop" AND idx = NEW.idx',
     "run_state": "id = NEW.id",
-    "chain": "id = NEW.id",
-    "attachment": "id = NEW.id",
 }
 """Tables that only grow, and what makes a new row collide with an old one."""
 
@@ -175,30 +157,19 @@ WHEN EXISTS (SELECT 1 FROM "{table}" WHERE {identical}) BEGIN {refuse} END;
 """  # noqa: S608 - all names are constants of this file
 
 
-_OLDER_ROWS = "INSERT INTO chain VALUES (1, 'older', 0, x'');"
-"""Says in the chain that rows before it had none."""
-
-
-def _added(tables: str, *names: str) -> str:
-    return tables + "".join(_guards(name, _IDENTICAL[name]) for name in names)
-
-
-_SINCE = {"reference": 3, "host_break": 3, "chain": 5, "attachment": 5}
-"""Tables that the first format did not have, and the one that brought them."""
-
 UPGRADES = {
     1: 'ALTER TABLE "drop" ADD COLUMN release_sense INTEGER',
-    2: _added(_CLOCK_TABLES, "reference", "host_break"),
+    2: _CLOCK_TABLES
+    + "".join(_guards(table, _IDENTICAL[table]) for table in ("reference", "host_break")),
     3: "; ".join(f'ALTER TABLE "drop" ADD COLUMN {column}' for column in _ACCOUNT),
-    4: _added(_CHAIN_TABLES, "chain", "attachment") + _OLDER_ROWS,
 }
 """What makes a file of one version one of the next."""
 
 LATER: dict[str, tuple[tuple[int, ...], int]] = {
     "drop": ((2, *(4 for _ in _ACCOUNT)), 1),
     **{
-        name: ((), since)
-        for table, since in _SINCE.items()
+        name: ((), 3)
+        for table in ("reference", "host_break")
         for name in (table, *(f"{table}_no_{what}" for what in ("update", "delete", "replace")))
     },
 }
@@ -207,7 +178,6 @@ LATER: dict[str, tuple[tuple[int, ...], int]] = {
 CREATE = (
     _TABLES
     + _CLOCK_TABLES
-    + _CHAIN_TABLES
     + "".join(_guards(table, identical) for table, identical in _IDENTICAL.items())
     + f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {SCHEMA_VERSION};\n"
 )

@@ -338,14 +338,6 @@ class Session(Reader):
             (run, attempt, str(state), encodable(text), host_ns),
         )
 
-    def attach(self, name: str, data: bytes) -> None:
-        """Add a file, such as a photograph of the rig."""
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        self._add(
-            "INSERT INTO attachment (added, name, data) VALUES (?, ?, ?)",
-            (now, encodable(name), data),
-        )
-
     def unblind(self) -> None:
         """Record, once and on the disk, that from now on the numbers may be seen.
 

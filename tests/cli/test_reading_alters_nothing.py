@@ -46,8 +46,8 @@ def fresh(session):
 
 def of_the_first_format(session):
     with closing(sqlite3.connect(session)) as connection:
-        for table in ("reference", "host_break", "chain", "attachment"):
-            connection.execute(f"DROP TABLE {table}")
+        connection.execute("DROP TABLE reference")
+        connection.execute("DROP TABLE host_break")
         for column in ("release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv"):
             connection.execute(f'ALTER TABLE "drop" DROP COLUMN {column}')
         connection.execute('ALTER TABLE "drop" DROP COLUMN lowest_mv')
