@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-OPTIONAL = {"distributed": "distributed", "minisign": "py-minisign", "mpmath": "mpmath"}
-"""Modules that few need, and the packages that bring them: for clusters, signatures, 50 digits."""
+OPTIONAL = ("distributed", "mpmath")
+"""Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
 
 
 class _ListFormats(argparse.Action):
@@ -90,8 +90,7 @@ def _run(argv: Sequence[str] | None) -> int:
             raise
         from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-        brings = OPTIONAL[package]
-        say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {brings}")
+        say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
         return BAD_INPUT
     except OSError as error:
         named = error.strerror and error.filename
@@ -310,22 +309,10 @@ def _parser() -> Parser:
     )
     _fresh(report)
 
-    export = command("export", "write a session as CSV files, or as a bundle that can be verified")
+    export = command("export", "write a session's results and edges as CSV files")
     _session(export)
-    form = export.add_mutually_exclusive_group(required=True)
-    form.add_argument("--csv", metavar="DIR", help="folder for the files")
-    form.add_argument(
-        "--bundle",
-        type=_place("record.eln"),
-        metavar="FILE.eln",
-        help="RO-Crate with session, report, tables, figures, versions and hashes",
-    )
-    export.value("--sign", "KEY", "sign the bundle with this secret key (minisign)")
+    export.value("--csv", "DIR", "folder for the files", required=True)
     _fresh(export)
-
-    verify = command("verify", "check a bundle, and derive its numbers again from the raw edges")
-    verify.value("file", "FILE", "bundle, its unpacked folder, or session file")
-    verify.value("--key", "KEY.pub", "public key of who signed it (minisign)")
 
     recover = command("recover", "list what can be read of a damaged session file, and save it")
     _session(recover)

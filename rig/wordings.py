@@ -589,15 +589,6 @@ WORDINGS: dict[str, Wording] = {
     "session_altered": _void("{path} was built or altered by another program: {text}", _RECOVER),
     "not_a_session": _void("{path} is not a session file: {text}", _SESSION_FILE),
     "session_wrong": _void("{path}: {text}", _RECOVER),
-    "bundle_unreadable": _void("cannot read {path}: {text}", "check its name and permissions"),
-    "bundle_foreign": _void(
-        "{path} is no bundle made by rig: {text}",
-        "name a file made by rig export SESSION --bundle FILE.eln, its unpacked folder, or a "
-        "session file"),
-    "key_unusable": _void("cannot use the key {path}: {text}", "name a key made by minisign -G"),
-    "key_locked": _void(
-        "the key {path} has a password, and there is no terminal to ask at",
-        "sign at a terminal"),
     "session_closed": _void("{path} is closed", "open it again"),
     "session_read_only": _void("{path} is open read-only", "open it for writing"),
     "session_unsaved": _void(

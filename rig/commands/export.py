@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Namespace) -> int:
-    """Write a session as CSV files, or as a bundle."""
-    if arguments.bundle is not None:
-        from rig.commands.bundling import write_bundle  # noqa: PLC0415 - it draws the report
-
-        return write_bundle(arguments)
+    """Write a session as CSV files."""
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
         found = results(session, progress("analysing run"), fresh=arguments.fresh)

@@ -183,15 +183,10 @@ def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]
     return "\n".join(lines) + "\n"
 
 
-def describe_column(table: str, column: str) -> tuple[str, str]:
-    """Return a column's unit and its meaning, each empty where there is none."""
-    meanings = _meanings()
-    return column_unit(column), meanings.get(f"{table}: {column}", meanings.get(column, ""))
-
-
 def _describe(table: str, column: str) -> str:
     if column.endswith(("_u", "_U95")):
         return ""
-    unit, meaning = describe_column(table, column)
+    unit, meanings = column_unit(column), _meanings()
+    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
     words = " ".join(filter(None, [unit and f"[{unit}]", meaning]))
     return words and f": {words}"
