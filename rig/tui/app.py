@@ -16,13 +16,11 @@ from textual.widgets import ContentSwitcher, Input, Label
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands, selectors
-from rig.tui.actions import ACTIONS, BY_NAME, OFFLINE, Action, hindrance, shown_key
+from rig.tui.actions import BY_NAME, OFFLINE, Action, hindrance
 from rig.tui.client import ReconnectingClient
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
-from rig.tui.screens.ask import Ask, AskReason, Confirm, Pick
-from rig.tui.screens.help import Help
-from rig.tui.screens.palette import Choice, Palette
+from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Dialog, Palette, Pick
 from rig.tui.stillness import Stillness
 from rig.tui.terminal import Terminal
 from rig.tui.widgets.status import StatusBar
@@ -32,13 +30,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 
     from textual.filter import LineFilter
-    from textual.screen import Screen
 
     from rig.results.live import SessionView
     from rig.tui.context import Options
     from rig.tui.indicators import Indicators
     from rig.tui.model import Model
-    from rig.tui.screens.dialog import Dialog
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.screens.protocol import ProtocolPage
@@ -46,6 +42,7 @@ if TYPE_CHECKING:
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # between ticks, when one was late
+_TYPED_IN = (Ask, AskReason, Palette)
 _COUNTED_S = 0.3
 """Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
 _TOLD_S = 15.0
@@ -64,54 +61,28 @@ _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
 
-THEMES = (
+_COLOURS: Mapping[str, Sequence[Any]] = {  # dark, light, and the two extremes only
+    "primary": ("#5aa9e6", "#0b5cad", "#00ffff"),
+    "secondary": ("#f2a65a", "#a8480c", "#ffff00"),
+    "accent": ("#c3a6ff", "#6a3fb5", "#ffffff"),
+    "success": ("#6fcf97", "#1b6e3c", "#00ff00"),
+    "warning": ("#f2c94c", "#7a5900", "#ffff00"),
+    "error": ("#ff6b6b", "#b3161d", "#ff9d9d"),
+    "foreground": ("#dfe6ee", "#1b232c", "#ffffff"),
+    "background": ("#10151c", "#fbfaf7", "#000000"),
+    "surface": ("#161d27", "#f3f1ec", "#000000"),
+    "panel": ("#1e2733", "#e6e3dc", "#000000"),
+}
+_BORDERS = ("#33465c", "#9aa5b1", "#ffffff")
+THEMES = tuple(
     Theme(
-        name="rig-dark",
-        primary="#5aa9e6",
-        secondary="#f2a65a",
-        accent="#c3a6ff",
-        success="#6fcf97",
-        warning="#f2c94c",
-        error="#ff6b6b",
-        foreground="#dfe6ee",
-        background="#10151c",
-        surface="#161d27",
-        panel="#1e2733",
-        dark=True,
-        variables={"border": "#33465c", "border-blurred": "#33465c"},
-    ),
-    Theme(
-        name="rig-light",
-        primary="#0b5cad",
-        secondary="#a8480c",
-        accent="#6a3fb5",
-        success="#1b6e3c",
-        warning="#7a5900",
-        error="#b3161d",
-        foreground="#1b232c",
-        background="#fbfaf7",
-        surface="#f3f1ec",
-        panel="#e6e3dc",
-        dark=False,
-        variables={"border": "#9aa5b1", "border-blurred": "#9aa5b1"},
-    ),
-    Theme(
-        name="rig-contrast",
-        primary="#00ffff",
-        secondary="#ffff00",
-        accent="#ffffff",
-        success="#00ff00",
-        warning="#ffff00",
-        error="#ff9d9d",
-        foreground="#ffffff",
-        background="#000000",
-        surface="#000000",
-        panel="#000000",
-        dark=True,
-        variables={"border": "#ffffff", "border-blurred": "#ffffff"},
-    ),
+        name=f"rig-{name}",
+        dark=name != "light",
+        variables={"border": _BORDERS[at], "border-blurred": _BORDERS[at]},
+        **{part: colours[at] for part, colours in _COLOURS.items()},
+    )
+    for at, name in enumerate(("dark", "light", "contrast"))
 )
-"""Colours: dark, light, and the two extremes only."""
 _PAGES = ("protocol", "device", "run", "result", "session", "history")
 
 
@@ -375,8 +346,13 @@ class RigApp(App[None], inherit_bindings=False):
         self.page = page
         self.draw()
 
-    def ask(self, question: Dialog[Any], answered: Callable[[Any], None] | None = None) -> None:
-        """Ask the operator, unless something may fall: nothing opens over that."""
+    def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
+        """Ask the operator, and act on the answer; nothing opens while something may fall."""
+
+        def answered(answer: Any) -> None:
+            if act is not None and answer is not None:
+                act(answer)
+
         if not self.model.hot:
             self.push_screen(question, answered)
             self.draw()
@@ -419,14 +395,15 @@ class RigApp(App[None], inherit_bindings=False):
         name, screen = self.action_of.get(key), self.screen
         if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
             self.action_do("stop")
-            if isinstance(screen, (Help, Confirm, Pick)):
+            if isinstance(screen, Dialog) and (
+                not isinstance(screen, _TYPED_IN)
+                or (key == "escape" and screen.is_mounted)  # a click has left its field
+            ):
                 screen.dismiss(None)
-            elif key == "escape" and len(self.screen_stack) > 1 and screen.is_mounted:
-                screen.dismiss(None)  # a click has left its field
             return True
         if self._ends_countdown():
             return True
-        if len(self.screen_stack) > 1:
+        if isinstance(screen, Dialog):
             return self._answers(screen, key, at_s)
         if key == "enter" and self.page == "run" and self.flow.stage is Stage.PREPARE:
             self._arm(at_s)
@@ -441,28 +418,21 @@ class RigApp(App[None], inherit_bindings=False):
         self.driver.take(Stopped())
         return True
 
-    def _answers(self, screen: Screen[Any], key: str, at_s: float) -> bool:
+    def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
         """Let a key answer a dialog; say whether it did."""
         by = {"up": -1, "down": 1}.get(key, 0)
-        match screen:
-            case Confirm() if key != "enter":
-                screen.dismiss(False)
-            case Confirm():
-                if self._stillness.meant(self._face, at_s):
-                    screen.dismiss(True)
-            case Help() | Palette() | AskReason() if by:
-                if screen.is_mounted:
-                    screen.move(by)
-            case Help():
-                screen.dismiss(None)
-            case Ask() | Palette() | AskReason() if key == "escape":
-                screen.dismiss(None)
-            case Ask() | Palette() | AskReason() if key == "enter":
-                return not self._stillness.read(self._face, at_s)  # pasted with what opened it
-            case Pick() if key == "backspace":
-                screen.dismiss(None)
-            case _:
-                return False
+        if by and not isinstance(dialog, (Confirm, Pick)):
+            if dialog.is_mounted:
+                dialog.move(by)
+        elif key == "enter" and isinstance(dialog, Confirm):
+            if self._stillness.meant(self._face, at_s):
+                dialog.dismiss(True)
+        elif key == "enter" and isinstance(dialog, _TYPED_IN):
+            return not self._stillness.read(self._face, at_s)  # pasted with what opened it
+        elif dialog.LEAVE in {"", key}:
+            dialog.dismiss(None)
+        else:
+            return False
         return True
 
     def _arm(self, at_s: float) -> None:
@@ -478,30 +448,23 @@ class RigApp(App[None], inherit_bindings=False):
         else:
             self.driver.take(Warned(_NOT_MEANT))
 
-    def action_do(self, name: str | None) -> None:
+    def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
-        if name is None or (self.client is None and name not in OFFLINE):
+        if self.client is None and name not in OFFLINE:
             return
         action = BY_NAME[name]
-        if not self._hindrance(action):
+        if not self.hindrance(action):
             commands.do(self, name)
         elif action.driving and not self.driving:
             self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
                                "press c to take control when it is free"))  # fmt: skip
 
-    def _hindrance(self, action: Action) -> str:
+    def hindrance(self, action: Action) -> str:
+        """Say why an action makes no sense now; empty where it does."""
         if self.client is None and action.name not in OFFLINE:
             return "no rig is connected"
         two = self.model.two_chains
         return hindrance(action, self.flow.stage, driving=self.driving, two_chains=two)
-
-    def choices(self) -> list[Choice]:
-        """Name every action, and what stands in its way now."""
-        return [
-            Choice(one.name, one.text, shown_key(self.keys[one.name]), self._hindrance(one))
-            for one in ACTIONS
-            if one.name != "palette"
-        ]
 
     def action_choose(self, page: str, at: int) -> None:
         """Choose a line of a page's list by mouse."""

@@ -10,9 +10,9 @@ from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
 from rig.tui import selectors
-from rig.tui.screens.ask import Ask, AskReason, Confirm
+from rig.tui.choosing import labels
+from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Palette
 from rig.tui.screens.help import Help
-from rig.tui.screens.palette import Palette
 from rig.tui.widgets.text import plain
 from rig.tui.writing import export_of, report_of, write
 
@@ -111,11 +111,7 @@ def _quit(app: CommandContext) -> None:
 def _confirm(
     app: CommandContext, title: str, question: str, yes: str, act: Callable[[], object]
 ) -> None:
-    def answered(meant: bool | None) -> None:
-        if meant:
-            act()
-
-    app.ask(Confirm(title, question, yes), answered)
+    app.ask(Confirm(title, question, yes), lambda _: act())
 
 
 def _try_release(app: CommandContext) -> None:
@@ -147,26 +143,17 @@ def _drops(app: CommandContext) -> None:
 
 
 def _note(app: CommandContext) -> None:
-    def given(text: str | None) -> None:
-        if text is not None:
-            app.driver.take(Note(text))
-
-    app.ask(Ask("Note on this drop:", " · ".join(notes_in(app.driver.flow.reasons))), given)
+    text = " · ".join(notes_in(app.driver.flow.reasons))
+    app.ask(Ask("Note on this drop:", text), lambda text: app.driver.take(Note(text)))
 
 
 def _filter(app: CommandContext) -> None:
     """Ask which drops are looked at."""
-    from rig.tui.choosing import labels  # noqa: PLC0415 - brings the analysis along
-
-    def given(words: str | None) -> None:
-        if words is not None:
-            app.history.sift(words.strip())
-
     app.turn("history")
     view = app.history.view
     words = dict.fromkeys(word for drop in labels(view).values() for word in drop) if view else ()
     question = f"Show drops with all of these words: {plain(' '.join(words))}"
-    app.ask(Ask(question, app.history.words), given)
+    app.ask(Ask(question, app.history.words), lambda words: app.history.sift(words.strip()))
 
 
 def _compare(app: CommandContext) -> None:
@@ -204,17 +191,13 @@ def _reject(app: CommandContext) -> None:
                  lambda: app.driver.take(Restore()))  # fmt: skip
         return
 
-    def given(reason: str | None) -> None:
-        if reason:
-            app.driver.take(Reject(reason))
-
     question = "Why is this drop rejected?"
     if model.replaced is not None:
         question += (
             f" Only the latest attempt of a run counts: attempt {model.replaced.attempt} was good, "
             "but the run will have no result until you repeat it."
         )
-    app.ask(AskReason(question, REASONS), given)
+    app.ask(AskReason(question, REASONS), lambda reason: app.driver.take(Reject(reason)))
 
 
 def _repeat(app: CommandContext) -> None:
@@ -267,7 +250,7 @@ _DO: dict[str, Callable[[CommandContext], object]] = {
     "next": lambda app: app.pages[app.page].move(1),
     "theme": lambda app: app.next_theme(),
     "help": lambda app: app.ask(Help(app.page, app.keys)),
-    "palette": lambda app: app.ask(Palette(app.choices()), app.action_do),
+    "palette": lambda app: app.ask(Palette(app.keys, app.hindrance), app.action_do),
     "quit": _quit,
     "go_on": _go_on,
     "control": _control,

@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Mapping
     from pathlib import Path
 
+    from rig.tui.actions import Action
     from rig.tui.client import ReconnectingClient
     from rig.tui.driver import Driver
     from rig.tui.follow import Follower
     from rig.tui.model import Model
-    from rig.tui.screens.dialog import Dialog
+    from rig.tui.screens.dialogs import Dialog
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
-    from rig.tui.screens.palette import Choice
     from rig.tui.screens.protocol import ProtocolPage
 
 
@@ -93,13 +93,11 @@ class CommandContext(Protocol):
 
     def begin(self, work: Coroutine[Any, Any, None]) -> object: ...
 
-    def ask(
-        self, question: Dialog[Any], answered: Callable[[Any], None] | None = None
-    ) -> object: ...
+    def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None: ...
 
-    def choices(self) -> list[Choice]: ...
+    def hindrance(self, action: Action) -> str: ...
 
-    def action_do(self, name: str | None) -> None: ...
+    def action_do(self, name: str) -> None: ...
 
     def tell(self, text: str) -> None: ...
 

@@ -16,7 +16,7 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.choosing import condition
 from rig.tui.replay import Player
-from rig.tui.screens.ask import Pick
+from rig.tui.screens.dialogs import Pick
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.text import plain
 
@@ -70,12 +70,9 @@ async def sessions(app: CommandContext) -> None:
     now = app.history.view.path if app.history.view else mine
     at = next((n for n, one in enumerate(entries) if now and _same(one.path, now)), 0)
 
-    def chosen(number: int | None) -> None:
-        if number is not None and entries:
-            app.begin(_open(app, entries[number]))
-
     title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
-    app.ask(Pick(title, [_line(one) for one in entries], at), chosen)
+    question = Pick(title, [_line(entry) for entry in entries], at)
+    app.ask(question, lambda number: app.begin(_open(app, entries[number])))
 
 
 def drops(app: CommandContext) -> None:
@@ -95,12 +92,8 @@ def drops(app: CommandContext) -> None:
                              (f"{symbol} {verdict:10}", color),
                              "counts" if job in counting else "")
         )  # fmt: skip
-
-    def chosen(number: int | None) -> None:
-        if number is not None:
-            history.choose(number)
-
-    app.ask(Pick("Drops of this session", lines, history.player.at % max(1, len(lines))), chosen)
+    at = history.player.at % max(1, len(lines))
+    app.ask(Pick("Drops of this session", lines, at), history.choose)
 
 
 async def _open(app: CommandContext, entry: SessionEntry) -> None:

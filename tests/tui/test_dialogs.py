@@ -9,7 +9,7 @@ from textual.widgets import Input
 
 from rig.campaign.events import Stage
 from rig.session.store import Session
-from rig.tui.screens.ask import Ask, Confirm, Pick
+from rig.tui.screens.dialogs import Ask, Confirm, Pick
 from rig.tui.screens.help import Help
 from tests.tui.lab import DAEMON, run
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rig.campaign.events import Stage
 from rig.tui.actions import OFFLINE
-from rig.tui.screens.ask import Ask, Confirm, Pick
+from rig.tui.screens.dialogs import Ask, Confirm, Pick
 from rig.tui.widgets.text import Words
 from tests.tui.lab import flat, run
 

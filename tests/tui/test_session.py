@@ -10,7 +10,7 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.commands import REASONS
 from rig.tui.screens import protocol as screen
-from rig.tui.screens.ask import AskReason
+from rig.tui.screens.dialogs import AskReason
 from tests.cli.lab import log_of, short
 from tests.tui.lab import flat, run
 from tests.tui.screen import text_of

@@ -21,7 +21,7 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from rig.tui.screens.palette import Palette
+from rig.tui.screens.dialogs import Palette
 from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.examples import examples

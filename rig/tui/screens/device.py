@@ -38,10 +38,10 @@ class DevicePage(Page):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.query_one("#facts", Words).say_content(_facts(model))
+        self.query_one("#facts", Words).say(_facts(model))
         self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
-        self.query_one("#check", Words).say_content(_gate_check(model))
-        self.query_one("#release", Words).say_content(_release(model))
+        self.query_one("#check", Words).say(_gate_check(model))
+        self.query_one("#release", Words).say(_release(model))
 
 
 def _facts(model: Model) -> Content:

@@ -8,12 +8,11 @@ from textual.containers import VerticalScroll
 from textual.content import Content
 
 from rig.tui.actions import BY_NAME, shown_key
-from rig.tui.screens.dialog import Dialog, said
+from rig.tui.screens.dialogs import Dialog
+from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from textual.app import ComposeResult
 
     from rig.tui.actions import Action
 
@@ -40,19 +39,15 @@ GROUPS = {
 """Every action under a heading."""
 
 
-class Help(Dialog[None]):
+class Help(Dialog):
     """The table of actions; any key but the arrows closes it."""
 
     DEFAULT_CSS = "Help > Vertical { width: 96; max-width: 98%; height: 90%; }"
 
     def __init__(self, page: str, keys: Mapping[str, str]) -> None:
-        super().__init__()
-        self._page = page
-        self._keys = keys
-
-    def contents(self) -> ComposeResult:
-        with VerticalScroll(can_focus=False):
-            yield said("table", table(self._page, self._keys, self.app.size.width >= 100))
+        lines = Words(id="table")
+        super().__init__(VerticalScroll(lines, can_focus=False))
+        lines.say(table(page, keys, self.app.size.width >= 100))
 
     def move(self, by: int) -> None:
         """Scroll."""

@@ -161,7 +161,7 @@ class HistoryPage(Page):
             self._blank()
             title.say(model.loading or "No drop recorded yet. Press o to choose another session.")
             return
-        title.say_content(_which(view, job, self))
+        title.say(_which(view, job, self))
         drop, hz = view.drops[job], view.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
         indicators = indicators_at(view.channels, drop, seen)
@@ -184,7 +184,7 @@ class HistoryPage(Page):
             self._told = told
             table = comparison(view, self.jobs) if self.comparing else number_table(
                 view, job, wide=False)  # fmt: skip
-            self.query_one("#numbers", Words).say_content(table)
+            self.query_one("#numbers", Words).say(table)
 
     def _draw_chains(self, view: SessionView, job: Job, indicators: Indicators) -> None:
         """Draw both chains at the moment of the tape, from all edges of the drop."""

@@ -86,7 +86,7 @@ class ProtocolPage(Page):
         self.query_one("#files", Words).display = not running
         if running:
             assert model.protocol is not None
-            self.query_one("#scene", Words).say_content(self._description(model.protocol))
+            self.query_one("#scene", Words).say(self._description(model.protocol))
             return
         if self.chosen < 0:
             self._choose_usable()
@@ -104,14 +104,14 @@ class ProtocolPage(Page):
             last = Content.assemble("\nlast session:\n", ("o ", "bold $primary"),
                                     plain(self.last.stem, 24))  # fmt: skip
             rows.append(last.stylize(press))
-        self.query_one("#files", Words).say_content(Content("\n").join(rows))
+        self.query_one("#files", Words).say(Content("\n").join(rows))
         if self._protocol is None or self._problem:
             name = plain(self.file) if self.file else "no experiment in this folder"
             self.query_one("#scene", Words).say((f"✗ {name}\n\n", "bold $error"), self._problem)
             return
         session = plain(self.session) if self.session else ""
         into = Content.assemble(("→ ", "$primary"), f"session file: {session}\n\n")
-        self.query_one("#scene", Words).say_content(
+        self.query_one("#scene", Words).say(
             Content.assemble(into if session else "", self._description(self._protocol))
         )
 

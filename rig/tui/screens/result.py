@@ -65,7 +65,7 @@ class ResultPage(Page):
             return
         if self._told != (view.path, view.reading, job):  # predicting takes its time
             self._told = view.path, view.reading, job
-            numbers.say_content(number_table(view, job))
+            numbers.say(number_table(view, job))
             self.query_one("#why", Words).say(why_words(view, job))
         key = (view.path, job, view.scales[job].hz)
         if z.wants(key):

@@ -79,13 +79,13 @@ class RunPage(Page):
         self.set_class(stage in _FALLING, "-live")
         counting = stage is Stage.COUNTDOWN and model.driving
         self.set_class(counting, "-count")
-        self.query_one("#card", Words).say_content(
+        self.query_one("#card", Words).say(
             _card(model, self._expected(model), low=self.screen.has_class("-low"))
         )
         if counting:
             self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
         checks = self.query_one("#checks", Words)
-        checks.say_content(_checks(model))
+        checks.say(_checks(model))
         self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
         self._plots(model)
 

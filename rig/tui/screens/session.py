@@ -69,8 +69,8 @@ class SessionPage(Page):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.query_one("#progress", Words).say_content(_progress(model))
-        self.query_one("#lines", Words).say_content(_plan(model))
+        self.query_one("#progress", Words).say(_progress(model))
+        self.query_one("#lines", Words).say(_plan(model))
         figures = [self.query_one(f"#{name}", Figure) for name in _FIGURES]
         view = model.view
         if view is None:

@@ -36,7 +36,7 @@ class Banner(Words):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.say_content(verdict_words(model))
+        self.say(verdict_words(model))
 
 
 def verdict_words(model: Model) -> Content:

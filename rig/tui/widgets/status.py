@@ -49,8 +49,8 @@ class StatusBar(Vertical):
         self, model: Model, page: str, keys: Mapping[str, str], size: Size, told: str = ""
     ) -> None:
         """Draw what holds now; what was `told` only while nothing is wrong."""
-        self.query_one("#headline", Words).say_content(headline(model, page, size.width - 2))
-        self.query_one("#tabs", Words).say_content(tabs(page, keys))
+        self.query_one("#headline", Words).say(headline(model, page, size.width - 2))
+        self.query_one("#tabs", Words).say(tabs(page, keys))
         wrong = alarm(model)
         box = self.query_one("#alarm", Words)
         box.display = wrong is not None or bool(told)

@@ -50,7 +50,7 @@ class StopLine(Words):
         """Draw what holds now."""
         self.set_class(model.hot, "-hot")
         press = Style.from_meta({"@click": "app.do('stop')"})
-        self.say_content(
+        self.say(
             Content.assemble(
                 (f" ■ STOP  {shown_key(keys['stop'])} or Esc ", press), f"  {_doing(model)}"
             )
@@ -71,7 +71,7 @@ class StopBar(Vertical):
 
     def show(self, model: Model, page: str, keys: Mapping[str, str], width: int) -> None:
         """Draw what holds now."""
-        self.query_one("#hints", Words).say_content(hints(model, page, keys, width - 2))
+        self.query_one("#hints", Words).say(hints(model, page, keys, width - 2))
 
 
 def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Content:

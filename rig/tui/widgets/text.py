@@ -54,22 +54,21 @@ Styled: TypeAlias = "str | tuple[str, str]"
 class Words(Static):
     """Text on a page."""
 
-    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002
-        super().__init__(markup=False, id=id, classes=classes)
+    def __init__(self, *parts: Styled | Content, id: str | None = None) -> None:  # noqa: A002
+        super().__init__(markup=False, id=id)
         self.auto_links = False  # what can be clicked keeps the colours that it was given
         self._said: Content | None = None
+        if parts:
+            self.say(*parts)
 
     @property
     def said(self) -> str:
         """What stands here."""
         return self._said.plain if self._said is not None else ""
 
-    def say(self, *parts: Styled) -> None:
-        """Show these parts, one after the other."""
-        self.say_content(Content.assemble(*parts))
-
-    def say_content(self, content: Content) -> None:
-        """Show content, unless it is there already; places everything anew only if it must."""
+    def say(self, *parts: Styled | Content) -> None:
+        """Show these parts, unless they are there already; places all anew only if it must."""
+        content = Content.assemble(*parts)
         if self._said is None or not self._said.is_same(content):
             same = self._said is not None and self._fits(self._said) and self._fits(content)
             same = same and _lines(self._said) == _lines(content)
