@@ -146,10 +146,6 @@ def shown_key(keys: str) -> str:
              "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space"}  # fmt: skip
     if first in names:
         return names[first]
-    return (
-        "Ctrl-" + first[5:].upper()
-        if first.startswith("ctrl+")
-        else first.upper()[:12]
-        if len(first) > 1
-        else first
-    )
+    if first.startswith("ctrl+"):
+        return "Ctrl-" + first[5:].upper()
+    return first.upper()[:12] if len(first) > 1 else first

@@ -23,7 +23,7 @@ from rig.tui.follow import Follower
 from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Dialog, Palette, Pick
 from rig.tui.stillness import Stillness
 from rig.tui.terminal import Terminal
-from rig.tui.widgets.status import StatusBar
+from rig.tui.widgets.status import PAGES, StatusBar
 from rig.tui.widgets.stopbar import StopBar, StopLine
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.screens.protocol import ProtocolPage
-    from rig.tui.state import DaemonState
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # between ticks, when one was late
@@ -83,7 +82,6 @@ THEMES = tuple(
     )
     for at, name in enumerate(("dark", "light", "contrast"))
 )
-_PAGES = ("protocol", "device", "run", "result", "session", "history")
 
 
 def _page(name: str) -> Callable[..., Page]:
@@ -246,11 +244,6 @@ class RigApp(App[None], inherit_bindings=False):
         return self.driver.flow
 
     @property
-    def state(self) -> DaemonState:
-        """What the daemon said last."""
-        return self.follower.state
-
-    @property
     def indicators(self) -> Indicators:
         """The gates."""
         return self.follower.indicators
@@ -282,23 +275,18 @@ class RigApp(App[None], inherit_bindings=False):
     def _follow(self) -> None:
         """Show the page of the stage when the stage has changed."""
         stage = self.model.stage
-        if (
-            stage is not self._rang_at
-            and stage in {Stage.RESULT, Stage.HALTED}
-            and self.options.bell
-        ):
+        ends = stage is not self._rang_at and stage in {Stage.RESULT, Stage.HALTED}
+        if ends and self.options.bell:
             self.bell()
         self._rang_at = stage
-        wanted = _PAGE_OF.get(stage, "run")
-        if self.options.offline:
-            wanted = "history"
+        wanted = "history" if self.options.offline else _PAGE_OF.get(stage, "run")
         if wanted != self._followed and stage is not Stage.TESTING:
             self._followed = wanted
             self.turn(wanted)
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""
-        for name in _PAGES:
+        for name in PAGES:
             await asyncio.to_thread(_page, name)
         await asyncio.to_thread(import_module, "rig.results.live")
         if self._loaded is not None:
@@ -450,12 +438,10 @@ class RigApp(App[None], inherit_bindings=False):
 
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
-        if self.client is None and name not in OFFLINE:
-            return
         action = BY_NAME[name]
         if not self.hindrance(action):
             commands.do(self, name)
-        elif action.driving and not self.driving:
+        elif self.client is not None and action.driving and not self.driving:
             self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
                                "press c to take control when it is free"))  # fmt: skip
 

@@ -18,7 +18,7 @@ from rig.reasons import make_error
 from rig.tui.state import DaemonState, typed
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Mapping
+    from collections.abc import Callable, Coroutine, Mapping
     from pathlib import Path
 
     from rig.daemon.client_protocol import Replica
@@ -58,7 +58,7 @@ class ReconnectingClient:
     """
 
     def __init__(
-        self, url: str, socket: Path | None, connected: Callable[[], Awaitable[None]]
+        self, url: str, socket: Path | None, connected: Callable[[], Coroutine[Any, Any, None]]
     ) -> None:
         self.url = url
         self.path = default_socket() if socket is None else socket
@@ -167,7 +167,7 @@ class ReconnectingClient:
                 with suppress(RigError):
                     await self.take_control()
             # Beside the signs of life: to open a session may take longer than control lasts.
-            reached = asyncio.get_running_loop().create_task(self._going_on())
+            reached = asyncio.get_running_loop().create_task(self._connected())
             while not client.lost.is_set():
                 await self._beat(client)
             self.silence = "it has ended\nan armed board has switched itself off"
@@ -202,9 +202,6 @@ class ReconnectingClient:
             self.disk_s = float(answer.result()["disk_s"])
             with suppress(TimeoutError):
                 await asyncio.wait_for(client.lost.wait(), _BEAT_S)
-
-    async def _going_on(self) -> None:
-        await self._connected()
 
     async def _check(self, client: AsyncClient) -> None:
         """See that it is the daemon of the port that was asked for."""

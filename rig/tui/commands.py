@@ -9,16 +9,15 @@ from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopp
 from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
-from rig.tui import selectors
+from rig.tui import picking, selectors
 from rig.tui.choosing import labels
 from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Palette
 from rig.tui.screens.help import Help
 from rig.tui.widgets.text import plain
-from rig.tui.writing import export_of, report_of, write
+from rig.tui.writing import write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
-    from pathlib import Path
 
     from rig.tui.client import ReconnectingClient
     from rig.tui.context import CommandContext
@@ -72,13 +71,13 @@ def _control(app: CommandContext) -> None:
         _confirm(app, "Give control back?", question, "give it back",
                  lambda: app.begin(_quietly(client.release_control())))  # fmt: skip
     else:
-        app.begin(_take_control(app))
+        app.begin(_tried(app, client.take_control()))
 
 
-async def _take_control(app: CommandContext) -> None:
-    assert app.client is not None
+async def _tried(app: CommandContext, work: Coroutine[Any, Any, Any]) -> None:
+    """Wait for what the daemon does, and say what is wrong when it fails."""
     try:
-        await app.client.take_control()
+        await work
     except RigError as error:
         app.driver.refuse(error)
 
@@ -128,20 +127,6 @@ def _try_release(app: CommandContext) -> None:
     _confirm(app, "Test the release?", question, "test", lambda: app.driver.take(Try()))
 
 
-def _sessions(app: CommandContext) -> None:
-    """Let another session be chosen."""
-    from rig.tui import picking  # noqa: PLC0415 - brings the analysis along
-
-    app.begin(picking.sessions(app))
-
-
-def _drops(app: CommandContext) -> None:
-    """Let another drop be chosen."""
-    from rig.tui import picking  # noqa: PLC0415 - brings the analysis along
-
-    picking.drops(app)
-
-
 def _note(app: CommandContext) -> None:
     text = " · ".join(notes_in(app.driver.flow.reasons))
     app.ask(Ask("Note on this drop:", text), lambda text: app.driver.take(Note(text)))
@@ -162,15 +147,15 @@ def _compare(app: CommandContext) -> None:
     app.history.compare()
 
 
-def _write(app: CommandContext, command: Callable[[Path], tuple[str, ...]]) -> None:
-    """Ask, then have files written of the session that is looked at."""
+def _write(app: CommandContext, command: str, option: str, suffix: str) -> None:
+    """Ask, then have a command write files of the session that is looked at, beside it."""
     view = (app.history.view if app.page == "history" else None) or app.model.view
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
-    words = command(view.path)
-    _confirm(app, "Write files?", f"{words[-1]} will be replaced if it exists.", "write",
-             lambda: app.begin(write(app, *words)))  # fmt: skip
+    target = str(view.path.with_suffix(suffix))
+    _confirm(app, "Write files?", f"{target} will be replaced if it exists.", "write",
+             lambda: app.begin(write(app, command, str(view.path), option, target)))  # fmt: skip
 
 
 def _step(app: CommandContext, by: int) -> None:
@@ -222,16 +207,12 @@ def _unblind(app: CommandContext) -> None:
         return
     question = "This shows all results. It is recorded and cannot be undone."
     _confirm(app, "Unblind the session?", question, "show results",
-             lambda: app.begin(_unblinded(app, client)))  # fmt: skip
+             lambda: app.begin(_tried(app, _unblinded(app, client))))  # fmt: skip
 
 
 async def _unblinded(app: CommandContext, client: ReconnectingClient) -> None:
-    try:
-        await client.call("unblind")
-    except RigError as error:
-        app.driver.refuse(error)
-    else:
-        await app.follower.read()
+    await client.call("unblind")
+    await app.follower.read()
 
 
 def _begin_check(app: CommandContext) -> None:
@@ -256,16 +237,16 @@ _DO: dict[str, Callable[[CommandContext], object]] = {
     "control": _control,
     "close": _close,
     "release_test": _try_release,
-    "sessions": _sessions,
-    "drops": _drops,
+    "sessions": lambda app: app.begin(picking.sessions(app)),
+    "drops": picking.drops,
     "play": lambda app: app.history.play(),
     "turn_round": lambda app: app.history.turn_round(),
     "earlier": lambda app: _step(app, -1),
     "later": lambda app: _step(app, 1),
     "filter": _filter,
     "compare": _compare,
-    "report": lambda app: _write(app, report_of),
-    "export": lambda app: _write(app, export_of),
+    "report": lambda app: _write(app, "report", "-o", ".html"),
+    "export": lambda app: _write(app, "export", "--csv", ".csv"),
     "slower": lambda app: app.history.pace(0.5),
     "faster": lambda app: app.history.pace(2.0),
 }

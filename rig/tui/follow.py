@@ -175,7 +175,7 @@ class Follower:
         self._reading = True
         try:
             if self._live is None:
-                self._live = await asyncio.to_thread(_opened, path)
+                self._live = await asyncio.to_thread(open_live, path)
             live = self._live
             found = await asyncio.to_thread(live.read)
         finally:
@@ -211,7 +211,8 @@ class Follower:
             await self._read_quietly()
 
 
-def _opened(path: Path) -> LiveAnalysis:
+def open_live(path: Path) -> LiveAnalysis:
+    """Open a session file to be analysed while it grows."""
     from rig.results.live import LiveAnalysis  # noqa: PLC0415 - the analysis is not needed to paint
 
     return LiveAnalysis(path)

@@ -8,13 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from textual.content import Content
 
-from rig.analysis.result import GOOD
 from rig.errors import RigError
-from rig.records import Job
-from rig.results import protocol_of
-from rig.results.live import LiveAnalysis
-from rig.session.store import Session
-from rig.tui.choosing import condition
+from rig.tui.choosing import condition, labels
+from rig.tui.follow import open_live
 from rig.tui.replay import Player
 from rig.tui.screens.dialogs import Pick
 from rig.tui.widgets.banner import LOOKS
@@ -51,6 +47,9 @@ def session_list(folder: Path) -> list[SessionEntry]:
 
 
 def _look(path: Path) -> SessionEntry:
+    from rig.results import protocol_of  # noqa: PLC0415 - not needed to paint
+    from rig.session.store import Session  # noqa: PLC0415 - nor is this
+
     try:
         with Session.open(path, readonly=True) as session:
             title = protocol_of(session).title
@@ -81,8 +80,7 @@ def drops(app: CommandContext) -> None:
     if found is None:
         return
     lines = []
-    counting = {Job(one.run.number, one.attempt) for one in found.analysis.runs
-                if one.verdict in GOOD}  # fmt: skip
+    drop_labels = labels(found)
     for job in history.jobs:
         verdict = found.results[job].verdict
         symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
@@ -90,7 +88,7 @@ def drops(app: CommandContext) -> None:
         lines.append(
             Content.assemble(f"run {job.run:3}, attempt {job.attempt}   {condition(run):28}",
                              (f"{symbol} {verdict:10}", color),
-                             "counts" if job in counting else "")
+                             "counts" if "counts" in drop_labels[job] else "")
         )  # fmt: skip
     at = history.player.at % max(1, len(lines))
     app.ask(Pick("Drops of this session", lines, at), history.choose)
@@ -102,7 +100,7 @@ async def _open(app: CommandContext, entry: SessionEntry) -> None:
         history.other = None
     else:
         try:
-            history.other = await asyncio.to_thread(LiveAnalysis(entry.path).read)
+            history.other = await asyncio.to_thread(open_live(entry.path).read)
         except RigError as error:
             app.driver.refuse(error)
             return

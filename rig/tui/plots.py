@@ -41,8 +41,9 @@ def chain_pictures(
     """
     if not found:
         return None, None
-    end = max((float(one.times[-1]) for one in found if one.times.size), default=0.0)
-    end = max(end, _expected_end(found)) + _BEFORE_S
+    measured = [float(fall.times[-1]) for fall in found if fall.times.size]
+    expected = [float(fall.model.time[-1]) for fall in found if fall.model is not None]
+    end = max(0.0, *measured, *expected) + _BEFORE_S
     series, left, pair = [], [], len(found) > 1
     for one in found:
         times, heights = one.curve(end)
@@ -142,19 +143,8 @@ def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | N
                    x_ticks=_whole(len(view.plan)))  # fmt: skip
 
 
-def _expected_end(found: Sequence[ChainFall]) -> float:
-    """When the model's last rod lands."""
-    ends = [float(one.model.time[-1]) for one in found if one.model is not None]
-    return max(ends, default=0.0)
-
-
-def incline_pictures(view: SessionView) -> list[Picture]:
-    """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing."""
-    return inclined(view.analysis, view.curves)
-
-
 def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
-    """Draw the same of any analysis.
+    """Draw Δz and V against inclination beside the model: the paper's Fig. 3, growing.
 
     Parameters
     ----------

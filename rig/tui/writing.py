@@ -7,19 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rig.tui.context import CommandContext
-
-
-def report_of(session: Path) -> tuple[str, ...]:
-    """Say what writes a session's page: the command's words."""
-    return "report", str(session), "-o", str(session.with_suffix(".html"))
-
-
-def export_of(session: Path) -> tuple[str, ...]:
-    """Say what writes a session's CSV files: the command's words."""
-    return "export", str(session), "--csv", str(session.with_suffix(".csv"))
 
 
 async def write(app: CommandContext, *command: str) -> None:

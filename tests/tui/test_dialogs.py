@@ -124,7 +124,7 @@ def test_stop_works_in_every_state_that_lasts(lab):
                 await stops(op, key)
                 await op.at(Stage.PREPARE)
                 await op.sees(said)
-            await op.until(lambda: op.app.state.phase == "idle")
+            await op.until(lambda: op.app.follower.state.phase == "idle")
             op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
             await op.arms(Stage.LIVE)
             await stops(op, "escape")
@@ -151,6 +151,6 @@ def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
             assert op.app.page == "device"
             await op.press("3")
             await op.sees("RUN 1 of 3", "Enter arms")
-            assert {line.state for line in op.app.state.runs} == {"planned"}
+            assert {line.state for line in op.app.follower.state.runs} == {"planned"}
 
     run(work())

@@ -35,8 +35,8 @@ def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_o
             finally:
                 os.kill(lab.daemons[0].pid, signal.SIGCONT)
             await op.sees("the daemon was lost before the release: nothing fell")
-            await op.until(lambda: op.app.state.line(1).state == "interrupted")
-            await op.until(lambda: op.app.state.phase == "idle")
+            await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
+            await op.until(lambda: op.app.follower.state.phase == "idle")
 
     run(work())
 
@@ -62,8 +62,8 @@ def test_a_daemon_killed_while_armed_is_said(lab):
             await asyncio.to_thread(lab.kill)
             await op.at(Stage.PREPARE)
             old = lab.daemons[0].pid
-            await op.until(lambda: op.app.state.section("daemon").get("pid") != old)
-            await op.until(lambda: op.app.state.section("session"))
+            await op.until(lambda: op.app.follower.state.section("daemon").get("pid") != old)
+            await op.until(lambda: op.app.follower.state.section("session"))
             await op.sees(f"RUN 1 of 3 · attempt {attempt + 1}")
 
     run(work())

@@ -31,12 +31,12 @@ def kill(processes, lab):
 
 
 async def mended(op):
-    await op.until(lambda: op.app.state.link == "up" and op.app.client.driving)
-    await op.until(lambda: op.app.state.section("session"))
+    await op.until(lambda: op.app.follower.state.link == "up" and op.app.client.driving)
+    await op.until(lambda: op.app.follower.state.section("session"))
 
 
 async def session_on(op):
-    await op.until(lambda: op.app.client.driving and op.app.state.link == "up")
+    await op.until(lambda: op.app.client.driving and op.app.follower.state.link == "up")
     await op.press("enter")
     await op.at(Stage.DEVICE)
     await op.until(lambda: op.app.view and op.app.indicators.known)
@@ -47,7 +47,7 @@ def test_a_pulled_cable_is_said_on_every_screen(cabled):
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
-            await op.until(lambda: op.app.state.link == "up")
+            await op.until(lambda: op.app.follower.state.link == "up")
             pull(processes, lab)  # before there is a session
             await op.sees(*PULLED, "PROTOCOL")
             plug(processes)

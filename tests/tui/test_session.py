@@ -46,7 +46,7 @@ def test_any_key_before_the_release_stops_and_nothing_falls(lab):
                     await op.at(Stage.PREPARE)
                     await op.sees(f"RUN 1 of 3 · attempt {attempt + 1}")
                     stopped = "stopped: nothing fell" in flat(op.app)
-                await op.until(lambda: op.app.state.line(1).state == "interrupted")
+                await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
 
     run(work())
     states = [state for entries in log_of(lab.session).values() for _, state in entries]
@@ -141,7 +141,7 @@ def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
         async with lab.ready() as op:
             await op.arms(Stage.RESULT)
             await op.sees("BLIND: results are hidden", "ACCEPTED")
-            assert op.app.state.edges == ()
+            assert op.app.follower.state.edges == ()
             for page in "4356":
                 await op.press(page)
                 await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
@@ -168,12 +168,12 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
             await other.sees("this screen only watches")
             assert op.app.flow.stage is Stage.COUNTDOWN
             await other.press("f9")
-            await op.until(lambda: op.app.state.line(1).state == "interrupted")
+            await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
             await op.at(Stage.PREPARE)  # only at rest is control given back
             await op.sees("stopped by the operator: nothing fell")
             await op.press("c")
             await op.means()
-            await other.until(lambda: other.app.state.holder is None)
+            await other.until(lambda: other.app.follower.state.holder is None)
             await other.press("c")
             await other.until(lambda: other.app.client.driving)
 
@@ -194,7 +194,7 @@ def test_leaving_does_not_stop_what_falls(lab):
             await again.until(lambda: again.app.flow.job == job)
             await again.at(Stage.RESULT)
             await again.sees("ACCEPTED")
-            await again.until(lambda: again.app.state.line(job.run).state == "accepted")
+            await again.until(lambda: again.app.follower.state.line(job.run).state == "accepted")
 
     run(work())
     assert log_of(lab.session)[1][-1][1] is RunState.ACCEPTED

@@ -15,7 +15,7 @@ from rig.measurands import averaged
 from rig.protocol.protocol import Condition
 from rig.report.columns import main_error
 from rig.report.numbers import fixed, plus_minus
-from rig.tui.plots import control_pictures, incline_pictures, meaning
+from rig.tui.plots import control_pictures, inclined, meaning
 from rig.tui.screens.page import Page
 from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.figure import Figure
@@ -61,10 +61,8 @@ class SessionPage(Page):
         with VerticalScroll(id="plan", can_focus=False):
             yield Words(id="lines")
         with Grid(id="figures"):
-            yield Figure(id="separation")
-            yield Figure(id="speed")
-            yield Figure(id="control")
-            yield Figure(id="second")
+            for name in _FIGURES:
+                yield Figure(id=name)
         yield Words(id="meaning")
 
     def show(self, model: Model) -> None:
@@ -81,7 +79,7 @@ class SessionPage(Page):
         key = (view.path, view.reading, self._chart, low, wide)
         if not any(figure.wants(key) for figure in figures):
             return
-        means, charts = incline_pictures(view), control_pictures(view)
+        means, charts = inclined(view.analysis, view.curves), control_pictures(view)
         turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
         shown = {
             "separation": means[:1],

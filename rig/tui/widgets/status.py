@@ -21,10 +21,7 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
 
 _LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
-_NAMES = {
-    "protocol": "PROTOCOL", "device": "DEVICE", "run": "RUN", "result": "RESULT",
-    "session": "SESSION", "history": "HISTORY",
-}  # fmt: skip
+PAGES = ("protocol", "device", "run", "result", "session", "history")
 
 
 class StatusBar(Vertical):
@@ -65,7 +62,7 @@ class StatusBar(Vertical):
 def tabs(page: str, keys: Mapping[str, str]) -> Content:
     """Name every page with its key; each can be clicked."""
     parts: list[Content] = []
-    for name in _NAMES:
+    for name in PAGES:
         press = Style.from_meta({"@click": f"app.do('page_{name}')"})
         text = f" {shown_key(keys[f'page_{name}'])} {name} "
         look = "bold $background on $primary" if name == page else "$foreground 80%"
@@ -82,7 +79,7 @@ def headline(model: Model, page: str, width: int) -> Content:
     stamp = " ▲ SIMULATED " if model.simulated else ""
     blind = " BLIND " if model.blind else ""
     taken = len(right[0]) + len(stamp) + len(blind) + 4
-    name = _NAMES.get(page, "")
+    name = page.upper()
     title = plain(model.state.section("session").get("title") or
                   (model.protocol.title if model.protocol else "chainrig"))  # fmt: skip
     room = max(0, width - taken - len(name))

@@ -9,7 +9,7 @@ from textual.content import Content
 from textual.style import Style
 
 from rig.campaign.events import Stage
-from rig.tui.actions import ACTIONS, OFFLINE, hindrance, shown_key
+from rig.tui.actions import BY_NAME, OFFLINE, hindrance, shown_key
 from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
@@ -81,9 +81,8 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
     names = dict.fromkeys((*first, *(("help",) if first else ()), *flow, *_ALWAYS))
     parts: list[Content] = []
     used = 0
-    by_name = {action.name: action for action in ACTIONS}
     for name in names:
-        action = by_name[name]
+        action = BY_NAME[name]
         if (model.offline and name not in OFFLINE) or (name == "unblind" and not model.blind):
             continue
         if hindrance(action, model.flow.stage, driving=model.driving, two_chains=model.two_chains):
