@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopped, Try, Warned
@@ -11,6 +12,7 @@ from rig.errors import RigError
 from rig.reasons import notes_in
 from rig.tui import picking, selectors
 from rig.tui.choosing import labels
+from rig.tui.replay import Player
 from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Palette
 from rig.tui.screens.help import Help
 from rig.tui.widgets.text import plain
@@ -161,7 +163,7 @@ def _write(app: CommandContext, command: str, option: str, suffix: str) -> None:
 def _step(app: CommandContext, by: int) -> None:
     """Go a step in time, or with the cursor where nothing is played."""
     if app.page == "history":
-        app.history.turn(by)
+        app.history.change(lambda tape, end_s: tape.moved(by, end_s))
     else:
         app.pages[app.page].point(by)
 
@@ -239,14 +241,14 @@ _DO: dict[str, Callable[[CommandContext], object]] = {
     "release_test": _try_release,
     "sessions": lambda app: app.begin(picking.sessions(app)),
     "drops": picking.drops,
-    "play": lambda app: app.history.play(),
-    "turn_round": lambda app: app.history.turn_round(),
+    "play": lambda app: app.history.change(Player.started),
+    "turn_round": lambda app: app.history.change(lambda tape, _: replace(tape, back=not tape.back)),
     "earlier": lambda app: _step(app, -1),
     "later": lambda app: _step(app, 1),
     "filter": _filter,
     "compare": _compare,
     "report": lambda app: _write(app, "report", "-o", ".html"),
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
-    "slower": lambda app: app.history.pace(0.5),
-    "faster": lambda app: app.history.pace(2.0),
+    "slower": lambda app: app.history.change(lambda tape, _: tape.turned(0.5)),
+    "faster": lambda app: app.history.change(lambda tape, _: tape.turned(2.0)),
 }

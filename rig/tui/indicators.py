@@ -60,10 +60,6 @@ class Indicators:
         """Channels that are not steady."""
         return tuple(gate.channel for gate in self.gates if not gate.steady(now_s))
 
-    def ready(self, now_s: float) -> bool:
-        """Whether every beam is clear and steady."""
-        return self.known and not self.blocked and not self.restless(now_s)
-
     def seen(self, mask: int | None, now_s: float) -> Indicators:
         """Look at the gates' mask; `None` means that nobody knows."""
         if mask is None:

@@ -126,21 +126,28 @@ def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | N
     row = next((row for row in averaged() if row.name in view.results[job].quantities), None)
     if row is None:
         return None
-    series = []
-    for color, label, some in (
-        ("secondary", "others ± U", [one for one in jobs if one != job]),
-        ("primary", f"run {job.run} ± U", [job]),
-    ):
-        found = [(one.run, view.results[one].quantities[row.name]) for one in some
-                 if row.name in view.results[one].quantities]  # fmt: skip
-        series.append(
-            Series("bars", [float(run) for run, _ in found],
-                   [one.value * row.scale for _, one in found], color, "●", label,
-                   [one.expanded * row.scale for _, one in found])
-        )  # fmt: skip
-    ends = (0.5, len(view.plan) + 0.5)
-    return Picture(f"{row.label} ({row.unit})", "run", tuple(series), ends,
-                   x_ticks=_whole(len(view.plan)))  # fmt: skip
+    points = {
+        one: (one.run, *point)
+        for one in jobs
+        if (point := _point(view.results[one].quantities.get(row.name), row.scale))
+    }
+    others = [point for one, point in points.items() if one != job]
+    mine = [point for one, point in points.items() if one == job]
+    series = (_bars(others, "secondary", "●", "others ± U"),
+              _bars(mine, "primary", "●", f"run {job.run} ± U"))  # fmt: skip
+    return _over_runs(f"{row.label} ({row.unit})", view, series)
+
+
+def _bars(points: Sequence[tuple[int, float, float]], color: str, mark: str, label: str) -> Series:
+    """Draw run, value and U95 of several runs."""
+    return Series("bars", [x for x, *_ in points], [y for _, y, _ in points], color, mark, label,
+                  [u for *_, u in points])  # fmt: skip
+
+
+def _over_runs(title: str, view: SessionView, series: Sequence[Series]) -> Picture:
+    """Draw series over all runs of the plan."""
+    count = len(view.plan)
+    return Picture(title, "run", tuple(series), (0.5, count + 0.5), x_ticks=_whole(count))
 
 
 def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
@@ -272,13 +279,11 @@ def _chart(
             for one, point in points
             if point and (one.verdict in GOOD) is counts
         ]
-        bars = len(points) <= _WITH_BARS
-        series.append(
-            Series("bars" if bars else "dots", [x for x, *_ in some], [y for _, y, _ in some],
-                   color, mark, label if bars else label.removesuffix(" ± U"),
-                   [u for *_, u in some] if bars else ())
-        )  # fmt: skip
-    return Picture(title, "run", tuple(series), ends, x_ticks=_whole(len(view.plan)))
+        drawn = _bars(some, color, mark, label)
+        if len(points) > _WITH_BARS:
+            drawn = drawn._replace(kind="dots", label=label.removesuffix(" ± U"), errors=())
+        series.append(drawn)
+    return _over_runs(title, view, series)
 
 
 def _whole(count: int) -> list[float]:

@@ -43,10 +43,6 @@ class Player:
         """Change the speed."""
         return replace(self, speed=min(FASTEST, max(SLOWEST, self.speed * factor)))
 
-    def turned_round(self) -> Player:
-        """Play in the other direction."""
-        return replace(self, back=not self.back)
-
     def moved(self, steps: int, end_s: float) -> Player:
         """Go back or on a little and stand still."""
         return replace(self, time_s=self._within(steps * _STEP_S, end_s), playing=False)

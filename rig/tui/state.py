@@ -41,11 +41,6 @@ class DaemonState:
     runs: tuple[RunLine, ...] = ()
     edges: tuple[Sequence[int], ...] = ()
 
-    @property
-    def known(self) -> bool:
-        """Whether there was a snapshot yet."""
-        return self.n >= 0
-
     def section(self, name: str) -> Mapping[str, Any]:
         """Return one section, empty where the daemon says null."""
         found = self.sections.get(name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -111,7 +113,7 @@ def test_the_tape_goes_forwards_and_back_at_any_speed():
     assert player.moved(-1, end).time_s == pytest.approx(0.14)
     assert Player().moved(-1, end).time_s == 0.0
     assert player.moved(99, end).time_s == end
-    back = player.turned_round()
+    back = replace(player, back=True)
     assert back.ticked(0.1, end).time_s == pytest.approx(0.1)
     assert back.ticked(9.0, end) == Player(0, 0.0, 0.5, playing=False, back=True)
     assert back.started(end).playing is False

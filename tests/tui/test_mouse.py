@@ -118,6 +118,8 @@ def test_every_key_that_is_shown_can_be_clicked(lab):
             assert {f"app.do('{name}')" for name in OFFLINE if name.startswith("page_")} <= shown
             x, y = spots(op.app)["app.do('help')"]
             words, region = op.app.screen.get_widget_at(x, y)
-            assert words.said[x - region.x - 1] == "?"  # the key itself, not only what it does
+            assert (
+                words.visual.plain[x - region.x - 1] == "?"
+            )  # the key itself, not only what it does
 
     run(work())

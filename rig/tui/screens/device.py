@@ -10,7 +10,7 @@ from rig.campaign.events import Stage
 from rig.report.numbers import decimals_for, fixed
 from rig.tui.screens.page import Page
 from rig.tui.widgets.gates import GateBoard, named
-from rig.tui.widgets.text import Words, plain
+from rig.tui.widgets.text import Words, checked, plain
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult
@@ -24,9 +24,8 @@ class DevicePage(Page):
     NAME = "device"
     SCOPED_CSS = False
     DEFAULT_CSS = """
-    DevicePage #facts { height: auto; padding: 0 1 1 1; }
-    DevicePage #check { height: auto; padding: 1 1 0 1; }
-    DevicePage #release { height: auto; padding: 0 1; }
+    DevicePage #facts { padding: 0 1 1 1; }
+    DevicePage #check { padding: 1 1 0 1; }
     .-low DevicePage #facts { padding: 0 1; }
     """
 
@@ -82,12 +81,10 @@ def _release(model: Model) -> Content:
     sensed = "no release sense" if sense is None else f"release sense after {sense * 1e3:.1f} ms"
     pulse = f"Release driven for {seen['pulse_s'] * 1e3:g} ms, {sensed}"
     if not seen["edges"]:
-        return Content.assemble(("✓ ", "bold $success"), f"{pulse}; no gate saw an edge.")
+        return checked(True, f"{pulse}; no gate saw an edge.")
     where = ", ".join(named(model, channel) for channel in seen["gates"][:2])
-    return Content.assemble(
-        ("✗ ", "bold $error"), f"{pulse}; {seen['edges']} edges at {where}. "
-        "Something fell, or the release disturbs the gates."
-    )  # fmt: skip
+    why = "Something fell, or the release disturbs the gates."
+    return checked(False, f"{pulse}; {seen['edges']} edges at {where}. {why}")
 
 
 def _clock(model: Model) -> str:
@@ -119,6 +116,6 @@ def _gate_check(model: Model) -> Content:
         )  # fmt: skip
     left = [gate.channel for gate in gates if gate.channel not in indicators.checked]
     if not left:
-        return Content.assemble(("✓ ", "bold $success"), "every gate works")
+        return checked(True, "every gate works")
     tested = f"{len(gates) - len(left)} of {len(gates)} gates tested"
     return Content(f"Wave a hand through each beam: {tested}.")

@@ -10,13 +10,12 @@ from textual.containers import Vertical
 from textual.content import Content
 from textual.fuzzy import Matcher
 from textual.screen import ModalScreen
-from textual.style import Style
 from textual.widgets import Input, OptionList
 from textual.widgets.option_list import Option
 
 from rig.tui.actions import ACTIONS, shown_key
 from rig.tui.widgets.stopbar import StopLine
-from rig.tui.widgets.text import Words
+from rig.tui.widgets.text import Words, pressed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -83,9 +82,7 @@ def how(*ways: tuple[str, str, str]) -> Content:
     parts: list[Content] = []
     for key, text, action in ways:
         label = Content.assemble((key, "bold $primary"), f" {text}")
-        if action:
-            label = label.stylize(Style.from_meta({"@click": action}))
-        parts += [label, Content("   ")]
+        parts += [pressed(label, action) if action else label, Content("   ")]
     return Content.assemble(*parts)
 
 

@@ -27,7 +27,7 @@ from rig.tui.widgets.gates import GateBoard
 from rig.tui.widgets.text import Words, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from textual.app import ComposeResult
 
@@ -45,10 +45,8 @@ class HistoryPage(Page):
     NAME = "history"
     SCOPED_CSS = False
     DEFAULT_CSS = """
-    HistoryPage #which { height: auto; padding: 0 1; }
-    HistoryPage #left { width: 1fr; }
-    HistoryPage #right { width: 1fr; }
-    HistoryPage #numbers { height: auto; padding: 1 1 0 1; }
+    HistoryPage #left, HistoryPage #right { width: 1fr; }
+    HistoryPage #numbers { padding: 1 1 0 1; }
     .-narrow HistoryPage #left { display: none; }
     .-low HistoryPage #numbers { display: none; }
     """
@@ -116,21 +114,9 @@ class HistoryPage(Page):
         if self.player.playing:
             self.player = self.player.ticked(seconds, self._end_s)
 
-    def play(self) -> None:
-        """Play, or stand still; at an end, from the other one."""
-        self.player = self.player.started(self._end_s)
-
-    def turn(self, steps: int) -> None:
-        """Go back or on a little."""
-        self.player = self.player.moved(steps, self._end_s)
-
-    def pace(self, factor: float) -> None:
-        """Change the speed."""
-        self.player = self.player.turned(factor)
-
-    def turn_round(self) -> None:
-        """Play in the other direction."""
-        self.player = self.player.turned_round()
+    def change(self, change: Callable[[Player, float], Player]) -> None:
+        """Change how the drop is played, knowing when it ends (s)."""
+        self.player = change(self.player, self._end_s)
 
     def move(self, by: int) -> None:
         """Take another drop."""

@@ -18,7 +18,11 @@ class Page(Vertical):
     Pages set `SCOPED_CSS` off where their rules ask how large the screen is.
     """
 
-    DEFAULT_CSS = "Page { height: 1fr; }"
+    DEFAULT_CSS = """
+    Page { height: 1fr; }
+    Page Words { padding: 0 1; }
+    Page VerticalScroll Words { padding: 0; }
+    """
     NAME = ""
 
     def show(self, model: Model) -> None:

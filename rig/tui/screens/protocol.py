@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
-from textual.style import Style
 
 from rig.campaign.events import Stage
 from rig.errors import InputError
@@ -15,7 +14,7 @@ from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.tui.screens.page import Page
-from rig.tui.widgets.text import Words, plain
+from rig.tui.widgets.text import Words, plain, pressed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,7 +35,7 @@ class ProtocolPage(Page):
     NAME = "protocol"
     SCOPED_CSS = False
     DEFAULT_CSS = """
-    ProtocolPage #files { width: 30; padding: 0 1; height: 1fr; border-right: solid $border; }
+    ProtocolPage #files { width: 30; height: 1fr; border-right: solid $border; }
     ProtocolPage VerticalScroll { width: 1fr; padding: 0 1; }
     ProtocolPage #scene { width: 1fr; }
     """
@@ -94,16 +93,15 @@ class ProtocolPage(Page):
         rows = []
         for at, file in enumerate(self.files):
             mark = "▸ " if at == self.chosen else "  "
-            press = Style.from_meta({"@click": f"app.choose('protocol', {at})"})
             style = "bold $primary" if at == self.chosen else "$foreground"
-            rows.append(Content.assemble((mark + plain(file.stem, 25), style)).stylize(press))
+            row = Content.styled(mark + plain(file.stem, 25), style)
+            rows.append(pressed(row, f"app.choose('protocol', {at})"))
         if not rows:
             rows = [Content("no experiment in this folder")]
         if self.last is not None:
-            press = Style.from_meta({"@click": "app.do('sessions')"})
             last = Content.assemble("\nlast session:\n", ("o ", "bold $primary"),
                                     plain(self.last.stem, 24))  # fmt: skip
-            rows.append(last.stylize(press))
+            rows.append(pressed(last, "app.do('sessions')"))
         self.query_one("#files", Words).say(Content("\n").join(rows))
         if self._protocol is None or self._problem:
             name = plain(self.file) if self.file else "no experiment in this folder"

@@ -14,7 +14,7 @@ from rig.report.numbers import fixed, plus_minus
 from rig.tui.plots import drop_pictures
 from rig.tui.screens.page import Page
 from rig.tui.why import speed_picture, stated, why_words
-from rig.tui.widgets.banner import Banner
+from rig.tui.widgets.banner import verdict_words
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.text import Words
 
@@ -32,8 +32,8 @@ class ResultPage(Page):
     NAME = "result"
     SCOPED_CSS = False
     DEFAULT_CSS = """
-    ResultPage #numbers { height: auto; padding: 0 1; }
-    ResultPage #why { height: auto; padding: 1 1 0 1; }
+    ResultPage #banner { margin: 0 0 1 0; }
+    ResultPage #why { padding: 1 1 0 1; }
     ResultPage.-unknown #why, .-low ResultPage #why { display: none; }
     ResultPage #figures { height: 1fr; }
     """
@@ -43,7 +43,7 @@ class ResultPage(Page):
         self._told: object = None
 
     def compose(self) -> ComposeResult:
-        yield Banner(id="banner")
+        yield Words(id="banner")
         yield Words(id="numbers")
         yield Words(id="why")
         with Horizontal(id="figures"):
@@ -52,7 +52,7 @@ class ResultPage(Page):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.query_one(Banner).show(model)
+        self.query_one("#banner", Words).say(verdict_words(model))
         view, job = model.view, model.job
         ready = view is not None and job in view.results
         numbers = self.query_one("#numbers", Words)

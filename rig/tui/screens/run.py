@@ -18,7 +18,7 @@ from rig.tui.why import expected_words
 from rig.tui.widgets.chains import ChainView
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.gates import GateBoard, named
-from rig.tui.widgets.text import Words, duration, plain
+from rig.tui.widgets.text import Words, checked, duration, plain
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -44,8 +44,7 @@ class RunPage(Page):
     RunPage #right { width: 1fr; display: none; }
     RunPage.-live #right, .-normal RunPage #right, .-wide RunPage #right { display: block; }
     .-narrow RunPage.-live #left { display: none; }
-    RunPage #card { height: auto; padding: 0 1; }
-    RunPage #checks { height: auto; padding: 1 1; }
+    RunPage #checks { padding: 1 1; }
     RunPage Digits { height: 3; padding: 0 2; color: $warning; display: none; }
     RunPage.-count Digits { display: block; }
     RunPage #indicators { margin: 1 0 0 0; }
@@ -180,14 +179,15 @@ def _checks(model: Model) -> Content:
     blocked, restless = indicators.blocked, indicators.restless(model.now_s)
     where = named(model, blocked[0]) if blocked else ""
     more = f" and {len(blocked) - 1} more" if len(blocked) > 1 else ""
+    known, linked = indicators.known, model.connected and model.state.link == "up"
+    no_beam = f"blocked: {where}{more}" if known else "waiting for the gates"
+    moving = f"A beam keeps changing. Let everything {rest}."
     lines = [
-        _check(model.connected and model.state.link == "up", "device connected", "no device"),
-        _check(indicators.known and not blocked, "every beam clear",
-               f"blocked: {where}{more}" if indicators.known else "waiting for the gates"),
-        _check(indicators.known and not restless, "gates steady",
-               f"A beam keeps changing. Let everything {rest}."),
+        checked(linked, "device connected" if linked else "no device"),
+        checked(known and not blocked, no_beam if blocked or not known else "every beam clear"),
+        checked(known and not restless, moving if restless or not known else "gates steady"),
         Content.assemble(("○ ", "bold"), "set up as above, at rest, hands away"),
-    ]  # fmt: skip
+    ]
     settle = duration(model.settle_s)
     end = (
         f"\nEnter arms: {settle} of rest, 3 s of countdown, release."
@@ -195,9 +195,3 @@ def _checks(model: Model) -> Content:
         else "\nWatching. Press c to take control when it is free."
     )
     return Content.assemble(Content("\n").join(lines), end)
-
-
-def _check(good: bool, yes: str, no: str) -> Content:
-    if good:
-        return Content.assemble(("✓ ", "bold $success"), yes)
-    return Content.assemble(("✗ ", "bold $error"), no)

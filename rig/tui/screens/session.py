@@ -40,11 +40,10 @@ class SessionPage(Page):
     NAME = "session"
     SCOPED_CSS = False
     DEFAULT_CSS = """
-    SessionPage #progress { height: auto; padding: 0 1; }
     SessionPage #plan { height: auto; max-height: 8; padding: 0 1; }
     .-wide SessionPage #plan { max-height: 24; }
     SessionPage #figures { height: 1fr; grid-size: 2 2; grid-rows: 3fr 2fr; }
-    SessionPage #meaning { height: auto; padding: 0 1; color: $foreground 80%; }
+    SessionPage #meaning { color: $foreground 80%; }
     SessionPage #control { column-span: 2; }
     .-low SessionPage #figures { grid-size: 2 1; grid-rows: 1fr; }
     .-low SessionPage #control, .-wide SessionPage #control { column-span: 1; }

@@ -8,7 +8,7 @@ from textual.content import Content
 
 from rig.analysis.result import GOOD
 from rig.reasons import remedies
-from rig.tui.widgets.text import Words, plain
+from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
     from rig.tui.model import Model
@@ -27,16 +27,6 @@ LOOKS = {
 """Symbol and colour of every state of a run."""
 _REMEDIES = 2
 """Things to do that are shown: what else is wrong shows when these are mended."""
-
-
-class Banner(Words):
-    """Verdict and reasons of the latest drop."""
-
-    DEFAULT_CSS = "Banner { height: auto; padding: 0 1; margin: 0 0 1 0; }"
-
-    def show(self, model: Model) -> None:
-        """Draw what holds now."""
-        self.say(verdict_words(model))
 
 
 def verdict_words(model: Model) -> Content:

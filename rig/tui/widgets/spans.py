@@ -36,11 +36,6 @@ class SpanView(Widget):
         elif other := [y for y, row in enumerate(rows) if row != before[y]]:
             self.refresh(*(Region(0, y, self.size.width, 1) for y in other))
 
-    @property
-    def said(self) -> str:
-        """What stands here."""
-        return "\n".join("".join(span.text for span in row) for row in self._rows)
-
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         """As many lines as there are."""
         del container, viewport, width

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 from textual.containers import Vertical
 from textual.content import Content
-from textual.style import Style
 
 from rig.tui.actions import shown_key
 from rig.tui.model import alarm
-from rig.tui.widgets.text import Words, plain
+from rig.tui.widgets.text import Words, plain, pressed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -63,10 +62,9 @@ def tabs(page: str, keys: Mapping[str, str]) -> Content:
     """Name every page with its key; each can be clicked."""
     parts: list[Content] = []
     for name in PAGES:
-        press = Style.from_meta({"@click": f"app.do('page_{name}')"})
         text = f" {shown_key(keys[f'page_{name}'])} {name} "
         look = "bold $background on $primary" if name == page else "$foreground 80%"
-        parts += [Content.styled(text, look).stylize(press), Content(" ")]
+        parts += [pressed(Content.styled(text, look), f"app.do('page_{name}')"), Content(" ")]
     return Content.assemble(*parts)
 
 

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 from textual.containers import Vertical
 from textual.content import Content
-from textual.style import Style
 
 from rig.campaign.events import Stage
 from rig.tui.actions import BY_NAME, OFFLINE, hindrance, shown_key
-from rig.tui.widgets.text import Words
+from rig.tui.widgets.text import Words, pressed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,12 +48,8 @@ class StopLine(Words):
     def show(self, model: Model, keys: Mapping[str, str]) -> None:
         """Draw what holds now."""
         self.set_class(model.hot, "-hot")
-        press = Style.from_meta({"@click": "app.do('stop')"})
-        self.say(
-            Content.assemble(
-                (f" ■ STOP  {shown_key(keys['stop'])} or Esc ", press), f"  {_doing(model)}"
-            )
-        )
+        stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
+        self.say(pressed(stop, "app.do('stop')"), f"  {_doing(model)}")
 
 
 class StopBar(Vertical):
@@ -92,11 +87,8 @@ def hints(model: Model, page: str, keys: Mapping[str, str], width: int) -> Conte
         if used + len(text) + 2 > width:
             break
         used += len(text) + 2
-        press = Style.from_meta({"@click": f"app.do('{name}')"})
-        key, _, said = text.partition(" ")
-        parts += [
-            Content.assemble((key, "bold $primary"), f" {said}").stylize(press), Content("  ")
-        ]  # fmt: skip
+        hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {label}")
+        parts += [pressed(hint, f"app.do('{name}')"), Content("  ")]
     return Content.assemble(*parts)
 
 

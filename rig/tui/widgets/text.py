@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 from textual.content import Content
+from textual.style import Style
 from textual.widgets import Static
 
 from rig.printable import is_hidden
@@ -47,6 +48,17 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
 
 
+def pressed(content: Content, action: str) -> Content:
+    """Have a click on content do an action."""
+    return content.stylize(Style.from_meta({"@click": action}))
+
+
+def checked(good: bool, text: str) -> Content:
+    """Write text behind a sign for good or bad."""
+    sign = ("✓ ", "bold $success") if good else ("✗ ", "bold $error")
+    return Content.assemble(sign, text)
+
+
 Styled: TypeAlias = "str | tuple[str, str]"
 """Text, or text with its style."""
 
@@ -60,11 +72,6 @@ class Words(Static):
         self._said: Content | None = None
         if parts:
             self.say(*parts)
-
-    @property
-    def said(self) -> str:
-        """What stands here."""
-        return self._said.plain if self._said is not None else ""
 
     def say(self, *parts: Styled | Content) -> None:
         """Show these parts, unless they are there already; places all anew only if it must."""
