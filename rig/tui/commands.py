@@ -146,7 +146,7 @@ def _filter(app: CommandContext) -> None:
 def _compare(app: CommandContext) -> None:
     """Lay drops over each other, or show one alone."""
     app.turn("history")
-    app.history.compare()
+    app.history.comparing = not app.history.comparing
 
 
 def _write(app: CommandContext, command: str, option: str, suffix: str) -> None:

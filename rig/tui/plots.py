@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rig.analysis.result import GOOD
 from rig.measurands import RELEASE_SKEW, acceleration_in, averaged
 from rig.records import Job
@@ -205,7 +207,7 @@ def _model_lines(curves: Mapping[str, Any], name: str, scale: float) -> Iterator
         yield Series(
             "line",
             [curves["incline_deg"][n] for n in at],
-            _scaled([curves[name][n] for n in at], scale),
+            np.array([curves[name][n] for n in at], dtype=np.float64) * scale,  # none is nan
             "accent",
             label=f"model, {chain}" if chain else "model",
         )
@@ -290,7 +292,3 @@ def _whole(count: int) -> list[float]:
     """At most about eight whole numbers up to a count."""
     step = next(step for step in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**9) if count <= 8 * step)
     return [float(number) for number in range(max(1, step), count + 1, step)]
-
-
-def _scaled(values: Sequence[float | None], scale: float) -> list[float]:
-    return [float("nan") if value is None else value * scale for value in values]

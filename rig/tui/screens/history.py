@@ -59,6 +59,7 @@ class HistoryPage(Page):
         self.words = ""
         """Which drops are looked at, as `rig.tui.choosing` reads them."""
         self.comparing = False
+        """Whether all drops that are looked at lie over each other."""
         self._sifted: tuple[object, tuple[Job, ...]] = None, ()
         self._view: SessionView | None = None
         self._of: object = None
@@ -105,10 +106,6 @@ class HistoryPage(Page):
         self.words = words
         self.player = replace(self.player, at=0, time_s=0.0)
 
-    def compare(self) -> None:
-        """Lay all drops that are looked at over each other, or show one alone."""
-        self.comparing = not self.comparing
-
     def tick(self, seconds: float) -> None:
         """Let time pass while playing."""
         if self.player.playing:
@@ -139,13 +136,12 @@ class HistoryPage(Page):
         self._view = self.other or model.view
         view, job = self.view, self.job
         title = self.query_one("#which", Words)
-        if view is not None and job is None:
-            self._blank()
-            title.say(f"No drop matches {plain(self.words, 40)}. Press f to change this.")
-            return
         if view is None or job is None:
             self._blank()
-            title.say(model.loading or "No drop recorded yet. Press o to choose another session.")
+            missing = model.loading or "No drop recorded yet. Press o to choose another session."
+            if view is not None:
+                missing = f"No drop matches {plain(self.words, 40)}. Press f to change this."
+            title.say(missing)
             return
         title.say(_which(view, job, self))
         drop, hz = view.drops[job], view.scales[job].hz
@@ -153,18 +149,16 @@ class HistoryPage(Page):
         indicators = indicators_at(view.channels, drop, seen)
         self.query_one(GateBoard).show(view.protocol, indicators, 0.0)
         self._draw_chains(view, job, indicators)
-        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        key = (view.path, job, hz, self.jobs if self.comparing else len(seen))
-        if z.wants(key):
-            if self.comparing:
-                first, second = run_picture(view, self.jobs, job), laid_over(view, self.jobs, job)
-            else:
-                first, second = drop_pictures(view, job, seen)
-            z.show(first, key)
-            dz.show(second, key)
-        now_ms = self.player.time_s * 1e3
-        z.point_at(None if self.comparing else now_ms)
-        dz.point_at(now_ms)
+        jobs, now_ms = self.jobs, self.player.time_s * 1e3
+        if self.comparing:
+            self.draw(
+                (view.path, job, hz, jobs),
+                lambda: (run_picture(view, jobs, job), laid_over(view, jobs, job)),
+            )
+        else:
+            self.draw((view.path, job, hz, len(seen)), lambda: drop_pictures(view, job, seen))
+        self.query_one("#z", Figure).point_at(None if self.comparing else now_ms)
+        self.query_one("#dz", Figure).point_at(now_ms)
         told = view.path, view.reading, job, self.comparing and self.jobs
         if self._told != told:
             self._told = told
@@ -187,9 +181,8 @@ class HistoryPage(Page):
         self._told = None
         self.query_one(ChainView).show(None)
         self.query_one("#numbers", Words).say("")
-        self.query_one(GateBoard).clear()
-        for name in ("#z", "#dz"):
-            self.query_one(name, Figure).show(None)
+        self.query_one(GateBoard).take([])
+        self.draw(None, lambda: (None, None))
 
 
 def comparison(view: SessionView, jobs: Sequence[Job]) -> Content:

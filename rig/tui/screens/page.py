@@ -9,7 +9,10 @@ from textual.containers import Vertical
 from rig.tui.widgets.figure import Figure
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
     from rig.tui.model import Model
+    from rig.tui.plotting import Picture
 
 
 class Page(Vertical):
@@ -34,6 +37,15 @@ class Page(Vertical):
 
     def other_chart(self) -> None:
         """Show another quantity where there is a choice."""
+
+    def draw(
+        self, key: Hashable, pictures: Callable[[], tuple[Picture | None, Picture | None]]
+    ) -> None:
+        """Draw figures z and dz, anew where what `key` stands for has changed."""
+        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
+        if key is None or z.wants(key):
+            for figure, picture in zip((z, dz), pictures(), strict=True):
+                figure.show(picture, key)
 
     def point(self, by: int) -> None:
         """Move the cursor of every plot."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.model import Model
+    from rig.tui.plotting import Picture
 
 
 class ResultPage(Page):
@@ -58,20 +59,19 @@ class ResultPage(Page):
         numbers = self.query_one("#numbers", Words)
         numbers.display = ready
         self.set_class(not ready, "-unknown")
-        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
         if not ready or view is None or job is None:
-            z.show(None)
-            dz.show(None)
+            self.draw(None, lambda: (None, None))
             return
         if self._told != (view.path, view.reading, job):  # predicting takes its time
             self._told = view.path, view.reading, job
             numbers.say(number_table(view, job))
             self.query_one("#why", Words).say(why_words(view, job))
-        key = (view.path, job, view.scales[job].hz)
-        if z.wants(key):
-            first, second = drop_pictures(view, job)
-            z.show(speed_picture(view, job) or first, key)
-            dz.show(second, key)
+        self.draw((view.path, job, view.scales[job].hz), lambda: _pictures(view, job))
+
+
+def _pictures(view: SessionView, job: Job) -> tuple[Picture | None, Picture | None]:
+    heights, apart = drop_pictures(view, job)
+    return speed_picture(view, job) or heights, apart
 
 
 def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:

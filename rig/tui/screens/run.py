@@ -111,11 +111,7 @@ class RunPage(Page):
             if model.protocol is not None and model.run is not None:
                 self._falls = motions(model.protocol, model.run, self._table, hz)
         self._chains(model, hz, live=live)
-        z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)
-        if z.wants(key):
-            first, second = chain_pictures(self._falls)
-            z.show(first, key)
-            dz.show(second, key)
+        self.draw(key, lambda: chain_pictures(self._falls))
 
     def _chains(self, model: Model, hz: float, *, live: bool) -> None:
         """Draw both chains where the latest edge has them."""

@@ -80,18 +80,15 @@ class SessionPage(Page):
             return
         means, charts = inclined(view.analysis, view.curves), control_pictures(view)
         turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
-        shown = {
-            "separation": means[:1],
-            "speed": means[1:2] if not low else [],  # no room for both; Δz says more
-            "control": turned[:1],
-            "second": charts[:2][1:] if wide else [],
-        }
-        if wide:
-            shown["control"] = charts[:1]
-        charted = [picture.y_label for picture in (*shown["control"], *shown["second"])]
-        self.query_one("#meaning", Words).say("\n".join(map(meaning, charted)))
-        for figure, name in zip(figures, _FIGURES, strict=True):
-            figure.show(next(iter(shown[name]), None), key)
+        speed = [] if low else means[1:2]  # no room for both; Δz says more
+        charted = charts[:2] if wide else turned[:1]
+        self.query_one("#meaning", Words).say(
+            "\n".join(meaning(picture.y_label) for picture in charted)
+        )
+        for figure, shown in zip(
+            figures, (means[:1], speed, charted[:1], charted[1:]), strict=True
+        ):
+            figure.show(next(iter(shown), None), key)
 
     def other_chart(self) -> None:
         """Show the other quantity in the control chart."""

@@ -27,10 +27,6 @@ class GateBoard(SpanView):
         """Draw what the gates do now."""
         self.take(board(protocol, indicators, now_s, self.size.width or 78))
 
-    def clear(self) -> None:
-        """Draw nothing."""
-        self.take([])
-
 
 def board(
     protocol: Protocol | None, indicators: Indicators, now_s: float, width: int
