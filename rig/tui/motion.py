@@ -157,8 +157,6 @@ def separation(
         go together, measured and by the model. `None` for Δz as it fell, measured and by the model.
     """
     nothing = np.empty(0)
-    if len(pair) < 2:
-        return Separation(nothing, nothing, nothing, nothing, nothing)
     impact, free = pair
     later = skew_s or 0.0
     delay = free.delay_s if skew_s is None else impact.delay_s

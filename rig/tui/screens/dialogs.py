@@ -50,6 +50,8 @@ class Dialog(ModalScreen[Any]):
     """
     LEAVE = ""
     """The key that cancels; empty: any that means nothing else."""
+    first: int | None = None
+    """The line of the list, if there is one, that is highlighted at first."""
 
     def __init__(self, *parts: Widget, keys: Sequence[tuple[str, str, str]] = ()) -> None:
         super().__init__()
@@ -61,6 +63,8 @@ class Dialog(ModalScreen[Any]):
         yield StopLine()
 
     def on_mount(self) -> None:
+        for options in self.query(OptionList):
+            options.highlighted = self.first
         self.query("Input, OptionList").focus()
 
     def move(self, by: int) -> None:
@@ -123,10 +127,6 @@ class AskReason(Dialog):
         super().__init__(_heading(question), line, options, keys=keys)
         self._reasons = reasons
 
-    def on_mount(self) -> None:
-        for options in self.query(OptionList):
-            options.highlighted = None
-
     def move(self, by: int) -> None:
         """Take the previous or next of the list."""
         super().move(by)
@@ -172,11 +172,7 @@ class Pick(Dialog):
     def __init__(self, question: str, lines: Sequence[Content], chosen: int) -> None:
         keys = (("Enter", "choose", "screen.take"), ("Backspace", "cancel", "screen.leave"))
         super().__init__(_heading(question), OptionList(*lines, markup=False), keys=keys)
-        self._chosen = chosen
-
-    def on_mount(self) -> None:
-        for options in self.query(OptionList):
-            options.highlighted = self._chosen
+        self.first = chosen
 
     @on(OptionList.OptionSelected)
     def action_take(self) -> None:
@@ -201,6 +197,7 @@ class Palette(Dialog):
     Palette OptionList { max-height: 16; }
     """
     LEAVE = "escape"
+    first = 0
 
     def __init__(self, keys: Mapping[str, str], hindrance: Callable[[Action], str]) -> None:
         rows = [(action, hindrance(action)) for action in ACTIONS if action.name != "palette"]
@@ -210,10 +207,6 @@ class Palette(Dialog):
         options.can_focus = False
         run = ("↑ ↓ Enter", "run", "screen.take")
         super().__init__(Input(placeholder="Search commands"), options, keys=(run, _CANCEL))
-
-    def on_mount(self) -> None:
-        for options in self.query(OptionList):
-            options.action_first()
 
     @on(Input.Changed)
     def _typed(self, event: Input.Changed) -> None:

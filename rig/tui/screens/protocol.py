@@ -81,11 +81,10 @@ class ProtocolPage(Page):
 
     def show(self, model: Model) -> None:
         """Draw the list, and the running session's protocol once there is one."""
-        running = model.flow.stage is not Stage.PROTOCOL and model.protocol is not None
-        self.query_one("#files", Words).display = not running
-        if running:
-            assert model.protocol is not None
-            self.query_one("#scene", Words).say(self._description(model.protocol))
+        running = None if model.flow.stage is Stage.PROTOCOL else model.protocol
+        self.query_one("#files", Words).display = running is None
+        if running is not None:
+            self.query_one("#scene", Words).say(self._description(running))
             return
         if self.chosen < 0:
             self._choose_usable()

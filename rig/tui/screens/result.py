@@ -89,12 +89,10 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
             continue
         line = f"{row.label:15}{plus_minus(measured, row.scale):>20} {row.unit:4}"
         model = expected.get(row.name)
-        if not wide:
-            pass
-        elif model is not None:
+        if wide and model is not None:
             line += f"{plus_minus(stated(model), row.scale):>16}"
             line += f"   {fixed(errors.get(row.name), 2):>5}"
-        elif row == RELEASE_SKEW:
+        elif wide and row == RELEASE_SKEW:
             limit = view.protocol.accept.release_skew * row.scale
             line += f"{f'limit ±{limit:g}':>16}"
         lines.append(Content(line))

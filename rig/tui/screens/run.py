@@ -83,8 +83,7 @@ class RunPage(Page):
         )
         if counting:
             self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
-        checks = self.query_one("#checks", Words)
-        checks.say(_checks(model))
+        self.query_one("#checks", Words).say(_checks(model))
         self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
         self._plots(model)
 

@@ -29,8 +29,7 @@ class StatusBar(Vertical):
     SCOPED_CSS = False  # how much is shown depends on the screen
     DEFAULT_CSS = """
     StatusBar { dock: top; height: auto; }
-    StatusBar #tabs { height: 1; padding: 0 1; background: $panel; }
-    StatusBar #headline { height: 1; padding: 0 1; background: $panel; }
+    StatusBar #tabs, StatusBar #headline { height: 1; padding: 0 1; background: $panel; }
     StatusBar #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
                     background: $error 20%; color: $foreground; }
     StatusBar #alarm.-told { background: $primary 20%; }
