@@ -45,18 +45,15 @@ _STYLE: Any = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "errorbar.capsize": 2.5,
+    "figure.titlesize": SIZE,
+    "figure.titleweight": "bold",
     "figure.facecolor": PAPER,  # a ground of its own: viewers may be dark
     "axes.facecolor": PAPER,
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
     "font.size": SIZE,
     "grid.color": RULE,
     "grid.linewidth": 0.6,
-    "axes.labelsize": SIZE,
     "axes.titlesize": SIZE,
-    "legend.fontsize": SIZE,
-    "legend.title_fontsize": SIZE,
-    "xtick.labelsize": SIZE,
-    "ytick.labelsize": SIZE,
     "legend.edgecolor": "none",
     "legend.facecolor": PAPER,
     "legend.fancybox": False,
@@ -152,6 +149,13 @@ def write_figure(path: Path, drawing: Canvas) -> None:
         stream.write(content)
 
 
+def annotate(
+    axes: Axes, words: str, at: tuple[float, float], points: tuple[float, float], **look: Any
+) -> None:
+    """Write words so many points from a place, which is in data unless `look` has ``xycoords``."""
+    axes.annotate(words, at, points, textcoords="offset points", **look)
+
+
 @contextmanager
 def canvas(
     heights: tuple[float, ...],
@@ -192,11 +196,4 @@ def canvas(
         figure.align_ylabels(drawing.axes)
         if simulated:
             # In a strip of its own, where it hides nothing and nothing hides it.
-            figure.suptitle(
-                "SIMULATED DATA",
-                x=0.995,
-                ha="right",
-                fontsize=SIZE,
-                fontweight="bold",
-                color=SECOND,
-            )
+            figure.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)

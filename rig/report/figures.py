@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.result import GOOD
 from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
 from rig.report.bars import LABELS, bar
-from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, RULE, SECOND, canvas
+from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, RULE, SECOND, annotate, canvas
 from rig.report.numbers import fixed, value_of
 from rig.report.panels import (
     legend_above,
@@ -278,14 +278,8 @@ def _free_fall_line(axes: Axes, speed: float | None) -> None:
     if speed is None:
         return
     axes.axhline(speed, color=MUTED, linewidth=1.0, linestyle=(0, (1, 2)))
-    axes.annotate(
-        f"free fall, {fixed(speed, 2)} m/s",
-        (0.005, speed),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 3),
-        textcoords="offset points",
-        color=MUTED,
-    )
+    at, coords = (0.005, speed), ("axes fraction", "data")
+    annotate(axes, f"free fall, {fixed(speed, 2)} m/s", at, (0, 3), xycoords=coords, color=MUTED)
 
 
 def _references(summary: Sequence[Incline]) -> tuple[dict[Condition, float], str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.result import GOOD
 from rig.measurands import RELEASE_SKEW
 from rig.protocol.protocol import Condition
-from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND
+from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, annotate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,15 +80,8 @@ def limit_lines(axes: Axes, limit_ms: float) -> None:
         axes.axhline(sign * limit_ms, color=SECOND, linewidth=1.0, linestyle=(0, (5, 2.5)))
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -1.15 * limit_ms), max(high, 1.15 * limit_ms))
-    axes.annotate(
-        f"limit ±{limit_ms:g} ms",
-        (0.995, limit_ms),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 3),
-        textcoords="offset points",
-        color=SECOND,
-        ha="right",
-    )
+    at, coords = (0.995, limit_ms), ("axes fraction", "data")
+    annotate(axes, f"limit ±{limit_ms:g} ms", at, (0, 3), xycoords=coords, color=SECOND, ha="right")
 
 
 def legend_above(axes: Axes) -> None:
@@ -121,13 +114,5 @@ def mark_inclines(panels: Sequence[Axes], runs: Sequence[DropResult]) -> None:
         for axes in panels:
             if place:
                 axes.axvline(low, color=MUTED, linewidth=0.6, alpha=0.6)
-        panels[0].annotate(
-            f"{incline:g}°",
-            ((low + high) / 2, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            color=MUTED,
-        )
+        at, look = ((low + high) / 2, 1.0), {"ha": "center", "va": "bottom", "color": MUTED}
+        annotate(panels[0], f"{incline:g}°", at, (0, 2), xycoords=("data", "axes fraction"), **look)

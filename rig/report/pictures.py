@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -61,70 +60,54 @@ def pictures(
     """
     measured = {name for one in analysis.runs for name in one.quantities}
     two = SEPARATION.name in measured
-    drawn: list[tuple[Callable[[], str], PageFigure]] = []
+    drawn: list[PageFigure | None] = []
+
+    def add(draw: Callable[[], str], alt: str, caption: str, place: str = "results") -> None:
+        figure = sections.make(
+            f'The figure "{alt}"', lambda: PageFigure(draw(), alt, caption, place)
+        )
+        drawn.append(figure)
+
     if two or SPEED.name in measured:
         both = "Separation and end speed" if two else "End speed"
         apart = "Separation and speed" if two else "Speed"
         chain = "impact chain" if two else "chain"
-        drawn.append(
-            (
-                lambda: incline_figure(analysis, curves, simulated, bars),
-                PageFigure(
-                    "",
-                    f"{both} against incline",
-                    f"{apart} of the {chain}'s top rod as it reaches the surface, against incline. "
-                    "Lines: the model, with its U (95 %) as a band. Below each: measured minus "
-                    "predicted, with U (95 %) of that difference. Bars on means: "
-                    f"{LABELS[bars]}." + (_GAP if unanswered(curves or {}) else ""),
-                ),
-            )
+        add(
+            lambda: incline_figure(analysis, curves, simulated, bars),
+            f"{both} against incline",
+            f"{apart} of the {chain}'s top rod as it reaches the surface, against incline. "
+            "Lines: the model, with its U (95 %) as a band. Below each: measured minus "
+            "predicted, with U (95 %) of that difference. Bars on means: "
+            f"{LABELS[bars]}." + (_GAP if unanswered(curves or {}) else ""),
         )
     if two:
-        drawn.append(
-            (
-                lambda: runs_figure(analysis, simulated, skew_limit_s),
-                PageFigure(
-                    "",
-                    "Runs in order",
-                    "Every run, in the order of recording. Bars are expanded uncertainties (95 %). "
-                    "Markers show which chain struck. If the markers differ, the chains differ. If "
-                    "a skew stays when the chains change places, it belongs to the sides.",
-                    "drops",
-                ),
-            )
+        add(
+            lambda: runs_figure(analysis, simulated, skew_limit_s),
+            "Runs in order",
+            "Every run, in the order of recording. Bars are expanded uncertainties (95 %). "
+            "Markers show which chain struck. If the markers differ, the chains differ. If "
+            "a skew stays when the chains change places, it belongs to the sides.",
+            "drops",
         )
     if acceleration_in(measured):
-        drawn.append(
-            (
-                lambda: gravity_figure(analysis, simulated, site_m_s2),
-                PageFigure(
-                    "",
-                    "Acceleration of each run",
-                    "Acceleration of each run. Bars are expanded uncertainties (95 %).",
-                ),
-            )
+        add(
+            lambda: gravity_figure(analysis, simulated, site_m_s2),
+            "Acceleration of each run",
+            "Acceleration of each run. Bars are expanded uncertainties (95 %).",
         )
-    for one, film in _filmed(analysis, films or {}):
-        judged = "" if one.verdict in GOOD else f" ({one.verdict})"
-        drawn.append(
-            (
-                partial(film_figure, film),
-                PageFigure(
-                    "",
-                    f"How run {one.run.number} fell",
-                    f"Run {one.run.number}{judged}, simulated at {film.incline_deg:g}°: the impact "
-                    "chain from the front and, below, along its rods. Slack strings are dotted.",
-                    "impacts",
-                ),
-            )
+    for drop, film in _filmed(analysis, films or {}):
+        verdict = "" if drop.verdict in GOOD else f" ({drop.verdict})"
+        add(
+            partial(film_figure, film),
+            f"How run {drop.run.number} fell",
+            f"Run {drop.run.number}{verdict}, simulated at {film.incline_deg:g}°: the impact "
+            "chain from the front and, below, along its rods. Slack strings are dotted.",
+            "impacts",
         )
-    found = []
-    for draw, figure in drawn:
-        svg = sections.make(f'The figure "{figure.alt}"', draw)
-        if svg is not None:
-            found.append(replace(figure, svg=svg))
-    budget = sections.make("The figure of the budget", lambda: budget_figure(analysis, simulated))
-    return [*found, budget] if budget is not None else found
+    drawn.append(
+        sections.make("The figure of the budget", lambda: budget_figure(analysis, simulated))
+    )
+    return [figure for figure in drawn if figure is not None]
 
 
 def _filmed(
