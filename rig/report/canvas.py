@@ -11,7 +11,7 @@ from rig.errors import InputError
 from rig.files import replacing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from matplotlib.axes import Axes
@@ -34,6 +34,11 @@ _DPI = 200  # of PNG files: sharp in a column of a journal
 
 SIZE = 9.0
 """Points, of all type in a figure."""
+
+CAPTION: Mapping[str, Any] = {"y": 0.0, "va": "bottom", "parse_math": False, "line": 0.19}
+"""Of a text below all panels; a title may have a $."""
+PASSES: Mapping[str, Any] = {"in_layout": False}
+"""It may pass under the next panel."""
 
 _STYLE: Any = {
     "axes.axisbelow": True,
@@ -165,6 +170,8 @@ def canvas(
     columns: int = 1,
     sharex: bool = True,
     description: str | None = None,
+    caption: str = "",
+    caption_look: Mapping[str, Any] = CAPTION,
 ) -> Iterator[Canvas]:
     """Set the style up, hand out empty panels, and make the SVG text at the end.
 
@@ -182,18 +189,32 @@ def canvas(
         Whether all panels have one horizontal axis.
     description
         Kept in the file's metadata, where programs find it.
+    caption
+        Written below the panels, in lines as they are.
+    caption_look
+        How: properties of the text, with the vertical place ``y`` and the ``line`` height, inches.
     """
     import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     with ctrl_c_waits(), mpl.rc_context(_STYLE):
+        look = dict(caption_look)
+        line = look.pop("line")
+        heights += (line * (caption.count("\n") + 2),) if caption else ()
         figure = Figure(figsize=(width_in, sum(heights)), layout="constrained")
         panels = figure.subplots(
             len(heights), columns, sharex=sharex, squeeze=False, height_ratios=list(heights)
         )
-        drawing = Canvas(figure, list(panels.flat), description)
+        shown, foot = (panels[:-1], panels[-1]) if caption else (panels, [])
+        drawing = Canvas(figure, list(shown.flat), description)
         yield drawing
-        figure.align_ylabels(drawing.axes)
+        for panel in foot:
+            panel.axis("off")
+        if caption:
+            foot[0].text(0.0, look.pop("y"), caption, transform=foot[0].transAxes, **look)
+            for panel in shown[-1] if sharex else ():
+                panel.tick_params(labelbottom=True)  # which its panel below would take
+        figure.align_ylabels(panels.flat)
         if simulated:
             # In a strip of its own, where it hides nothing and nothing hides it.
             figure.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)

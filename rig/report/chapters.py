@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from html import escape
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
@@ -15,15 +16,16 @@ from rig.report.attachments import link
 from rig.report.columns import (
     AUDIT,
     Column,
+    fine,
+    mean_columns,
     run_columns,
     run_incline,
     summary_columns,
-    summary_incline,
 )
 from rig.report.embed import embedded
 from rig.report.finding import finding, raised
 from rig.report.method import METHOD, PAPER, SOFTWARE, method_words
-from rig.report.numbers import fixed, plus_minus, signed
+from rig.report.numbers import plus_minus, signed
 from rig.report.tables import bullets, paragraphs, scrolling, table
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
     from rig.report.attachments import Attachment
+    from rig.report.columns import Mean
     from rig.report.embed import PageFigure
     from rig.report.html import ReportContext
     from rig.report.parts import Part
@@ -137,15 +140,13 @@ def _budget(context: ReportContext) -> str:
     ]
     if not lines:
         return _figures(context, "budget")
-    columns: tuple[Column[tuple[Incline, Measurand]], ...] = (
+    columns: tuple[Column[Mean], ...] = (
         Column("", lambda one: f"{one[1].symbol} ({one[1].fine})", numeric=False),
-        Column("incline (°)", lambda one: summary_incline(one[0])),
-        Column("strikes", lambda one: one[0].impact_chain or "", numeric=False),
-        Column("n", lambda one: str(one[0].n)),
+        *mean_columns(itemgetter(0)),
         Column("u, runs / √n", lambda one: _part(one, "runs")),
         Column("u, common", lambda one: _part(one, "common")),
-        Column("u", lambda one: _fine(one, one[0].means[one[1].name].u)),
-        Column("U", lambda one: _fine(one, one[0].means[one[1].name].expanded)),
+        Column("u", lambda one: fine(one[1], one[0].means[one[1].name].u)),
+        Column("U", lambda one: fine(one[1], one[0].means[one[1].name].expanded)),
         Column("largest common sources", lambda one: _largest(*one), numeric=False),
     )
     said = context.sections.make(
@@ -158,13 +159,8 @@ def _budget(context: ReportContext) -> str:
     return _figures(context, "budget") + (said or "") + paragraphs([note])
 
 
-def _fine(one: tuple[Incline, Measurand], value: float) -> str:
-    return fixed(value * one[1].fine_scale, one[1].fine_decimals)
-
-
-def _part(one: tuple[Incline, Measurand], name: str) -> str:
-    part = one[0].means[one[1].name].budget.get(name)
-    return "" if part is None else _fine(one, part)
+def _part(one: Mean, name: str) -> str:
+    return fine(one[1], one[0].means[one[1].name].budget.get(name))
 
 
 def _largest(line: Incline, row: Measurand) -> str:

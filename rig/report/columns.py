@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
 
+    Mean = tuple[Incline, Measurand]
+
 T = TypeVar("T")
 
 AGREES, DISAGREES = "agrees", "disagrees"
@@ -56,14 +58,26 @@ def summary_columns(row: Measurand) -> list[Column[Incline]]:
     Eₙ is the normalized error; within ±1 measurement and prediction agree.
     """
     return [
-        Column("incline (°)", summary_incline),
-        Column("strikes", lambda line: line.impact_chain or "", numeric=False),
-        Column("n", lambda line: str(line.n)),
+        *mean_columns(lambda line: line),
         Column(_heading(row), lambda line: _written(row, line.means)),
         Column(f"predicted ± U ({row.unit})", lambda line: _predicted(row, line)),
         Column("Eₙ", lambda line: fixed(line.normalized_error(row.name), 2)),
         Column("model", lambda line: verdict_on(line.normalized_error(row.name)), numeric=False),
     ]
+
+
+def mean_columns(of: Callable[[T], Incline]) -> tuple[Column[T], ...]:
+    """Columns that say of which runs a mean is."""
+    return (
+        Column("incline (°)", lambda record: summary_incline(of(record))),
+        Column("strikes", lambda record: of(record).impact_chain or "", numeric=False),
+        Column("n", lambda record: str(of(record).n)),
+    )
+
+
+def fine(row: Measurand, value: float | None) -> str:
+    """Write a value of a measurand, SI, in its smaller unit; nothing for `None`."""
+    return "" if value is None else fixed(value * row.fine_scale, row.fine_decimals)
 
 
 def verdict_on(error: float | None) -> str:

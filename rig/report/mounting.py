@@ -10,7 +10,7 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
-from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
+from rig.report.canvas import INK, MODEL, MUTED, PAPER, PASSES, SECOND, canvas
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _COLOURS: dict[Side, str] = {"impact": SECOND, "free": MODEL}
 _LEGEND = "At each beam: channel: height in mm."
 _WIDTH_IN = 9.0
 _WRAP = 100
-_LINE_IN = 0.195
+_CAPTION = {"y": 1.0, "va": "top", "family": "DejaVu Sans Mono", "line": 0.195}
 _NEAR_M = 0.16  # what is drawn larger once more
 _POST_M = 0.12  # from the chains to the posts, as drawn
 
@@ -50,11 +50,11 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
     text = "\n".join(
         [protocol.title, _LEGEND, "", *_zero(protocol, gates), *_slots(protocol, gates)]
     )
-    foot = _LINE_IN * (text.count("\n") + 2)
     with canvas(
-        (5.6, foot), _WIDTH_IN, simulated=False, columns=2, sharex=False, description=protocol.title
-    ) as drawing:
-        whole, close, below, empty = drawing.axes
+        (5.6,), _WIDTH_IN, simulated=False, columns=2, sharex=False,
+        description=protocol.title, caption=text, caption_look={**_CAPTION, **PASSES},
+    ) as drawing:  # fmt: skip
+        whole, close = drawing.axes
         top = max(gate.height for gate in gates.gates)
         low = min(gate.height for gate in gates.gates)
         hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
@@ -66,10 +66,6 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
         _side_view(close, protocol, gates, near)
         _name_inclines(close, protocol, 0.45 * near)
         close.set_title(f"close to the {protocol.zero}" if inclines else "lowest gates", loc="left")
-        for panel in (below, empty):
-            panel.axis("off")
-        words = below.text(0, 1, text, va="top", family="DejaVu Sans Mono", color=INK)
-        words.set_in_layout(False)  # it goes on under the other panel
     return drawing
 
 
@@ -82,10 +78,10 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
                   "end, to each beam and to the glider's middle before release."),
     ])  # fmt: skip
     with canvas(
-        (3.0, _LINE_IN * (text.count("\n") + 2)), _WIDTH_IN, simulated=False, sharex=False,
-        description=protocol.title,
+        (3.0,), _WIDTH_IN, simulated=False, sharex=False,
+        description=protocol.title, caption=text, caption_look=_CAPTION,
     ) as drawing:  # fmt: skip
-        side, below = drawing.axes
+        (side,) = drawing.axes
         start = protocol.drop.value
 
         def at(along: float, above: float = 0.0) -> tuple[float, float]:
@@ -106,8 +102,6 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
         side.set_xlabel("mm")
         side.set_title(f"the track at {track.incline_deg.value:g}°, from the side", loc="left")
         side.grid(visible=False)
-        below.axis("off")
-        below.text(0, 1, text, va="top", family="DejaVu Sans Mono", color=INK)
     return drawing
 
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     Columns = Mapping[str, list[float]]
     _Kind = tuple[Callable[[], dict[str, list[float]]], Callable[[list[Axes], Columns], None], int]
 
-_LINE_HEIGHT = 0.19  # inches
 _WRAP = 96
 
 
@@ -45,17 +44,10 @@ def paper_figure(
     """
     compute, draw, panels = _KINDS[number]
     columns = compute()
-    caption = _caption(number)
-    foot = _LINE_HEIGHT * (caption.count("\n") + 2)
-    with canvas((*((2.9,) * panels), foot), simulated=False) as drawing:
-        *axes, below = drawing.axes
-        draw(axes, columns)
+    with canvas((2.9,) * panels, simulated=False, caption=_caption(number)) as drawing:
+        draw(drawing.axes, columns)
         if resolved is not None:
-            _RESOLVED[number](axes, resolved)
-        below.axis("off")
-        below.text(0.0, 0.0, caption, va="bottom", transform=below.transAxes)
-        # The caption's panel must not take the labels of the axis all panels share.
-        axes[-1].tick_params(labelbottom=True)
+            _RESOLVED[number](drawing.axes, resolved)
     return drawing, columns
 
 

@@ -7,8 +7,8 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS, averaged, told
-from rig.report.bars import LABELS, bar
-from rig.report.columns import Column, summary_incline
+from rig.report.bars import bar
+from rig.report.columns import Column, fine, mean_columns
 from rig.report.numbers import degrees, fixed, plus_minus
 
 if TYPE_CHECKING:
@@ -18,19 +18,8 @@ if TYPE_CHECKING:
     from rig.analysis.result import Measured
     from rig.analysis.summary import GateMeans, Incline
     from rig.measurands import Measurand
-
-_SCATTER: tuple[Column[Mapping[str, str]], ...] = (
-    Column("incline (°)", itemgetter("incline")),
-    Column("strikes", itemgetter("strikes"), numeric=False),
-    Column("n", itemgetter("n")),
-    Column("", itemgetter("quantity"), numeric=False),
-    Column("mean", itemgetter("mean")),
-    Column("SD", itemgetter("SD")),
-    Column("SE", itemgetter("SE")),
-    Column("u", itemgetter("u")),
-    Column("U95", itemgetter("U95")),
-    Column("SD/2", itemgetter("half-SD")),
-)
+    from rig.report.bars import Bars
+    from rig.report.columns import Mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +107,24 @@ def scatter_part(summary: Sequence[Incline]) -> Part:
             "u and U95: standard and expanded uncertainty of the mean, with the errors that all "
             "runs share. SD/2: half of SD, as in the bars of Pantaleone's figures."
         ],
-        _SCATTER,
-        [*_scatters(summary)],
+        tuple(_scatter_columns()),
+        [(line, row) for line in summary for row in averaged() if row.name in line.means],
     )
 
+
+def _scatter_columns() -> Iterator[Column[Mean]]:
+    yield from mean_columns(itemgetter(0))
+    yield Column("", lambda mean: f"{mean[1].symbol} ({mean[1].fine})", numeric=False)
+    yield Column("mean", lambda mean: fine(mean[1], mean[0].means[mean[1].name].value))
+    for heading, kind in _BARS.items():
+        yield _bar_column(heading, kind)
+
+
+def _bar_column(heading: str, kind: Bars) -> Column[Mean]:
+    return Column(heading, lambda mean: fine(mean[1], bar(mean[0], mean[1].name, kind)))
+
+
+_BARS: dict[str, Bars] = {"SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "SD/2": "half-SD"}
 
 _MOVES: tuple[Column[Mapping[str, Any]], ...] = (
     Column("prior", lambda row: str(row["prior"]), numeric=False),
@@ -148,26 +151,5 @@ def prior_part(moves: Sequence[Mapping[str, Any]]) -> Part:
 def _fine(row: Mapping[str, Any]) -> tuple[str, str, str]:
     """Quantity with its unit, and both moves in it."""
     one = MEASURANDS[row["quantity"]]
-    wider, narrower = (
-        fixed(row[word] * one.fine_scale, one.fine_decimals) for word in ("wider", "narrower")
-    )
+    wider, narrower = (fine(one, row[word]) for word in ("wider", "narrower"))
     return f"{one.symbol} ({one.fine})", wider, narrower
-
-
-def _scatters(summary: Sequence[Incline]) -> Iterator[Mapping[str, str]]:
-    for line in summary:
-        for row in averaged():
-            if row.name not in line.means:
-                continue
-            values: dict[str, float | None] = {"mean": line.means[row.name].value}
-            values |= {kind: bar(line, row.name, kind) for kind in LABELS}
-            yield {
-                "incline": summary_incline(line),
-                "strikes": line.impact_chain or "",
-                "n": str(line.n),
-                "quantity": f"{row.symbol} ({row.fine})",
-                **{
-                    key: "" if value is None else fixed(value * row.fine_scale, row.fine_decimals)
-                    for key, value in values.items()
-                },
-            }

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.measurands import SEPARATION, SPEED
-from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, SIZE, canvas
+from rig.report.canvas import CAPTION, INK, MODEL, MODEL_BAND, MUTED, PASSES, SIZE, canvas
 from rig.sweep.compute import PILE
 from rig.sweep.variables import VARIABLES
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rig.sweep.compute import Swept
     from rig.sweep.layout import Axis, Layout
 
-_LINE_HEIGHT = 0.19  # inches
 _WRAP = 96
 
 
@@ -44,19 +43,19 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Canv
         Where the model has no answer the picture is empty; where the point lies beyond its
         domain, maps are hatched and curves dashed. Colours span what is found inside the domain.
     """
-    caption = _caption(facts)
-    foot = _LINE_HEIGHT * (caption.count("\n") + 2)
     flat = len(layout.grid.axes) == 2
     shown = [(SEPARATION, swept.separation_m)] if layout.two_chains else []
     shown += [(SPEED, swept.speed_m_s)]
     with canvas(
-        (3.4, foot) if flat else (*(2.9,) * len(shown), foot),
+        (3.4,) if flat else (2.9,) * len(shown),
         9.0 if flat and len(shown) > 1 else 7.0,
         simulated=False,
         columns=len(shown) if flat else 1,
         description=json.dumps(facts, ensure_ascii=False),
+        caption=_caption(facts),
+        caption_look={**CAPTION, **PASSES},
     ) as drawing:
-        panels, (below, *empty) = drawing.axes[: len(shown)], drawing.axes[len(shown) :]
+        panels = drawing.axes
         for panel, (row, found) in zip(panels, shown, strict=True):
             if flat:
                 image = _map(panel, layout.grid.axes, row.scale * found, swept.in_domain)
@@ -65,16 +64,6 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Canv
                 _curve(panel, layout.grid.axes[0], row.scale * found, swept)
                 panel.set_ylabel(row.axis)
         panels[-1].set_xlabel(VARIABLES[layout.grid.axes[0].name].label)
-        for panel in (below, *empty):
-            panel.axis("off")
-        said = below.text(
-            0.0, 0.0, caption, va="bottom", transform=below.transAxes,
-            parse_math=False,  # a title may have a $
-        )  # fmt: skip
-        said.set_in_layout(False)  # it may pass under the other map
-        # The caption's panel must not take the labels of the axis all panels share.
-        for panel in panels if flat else panels[-1:]:
-            panel.tick_params(labelbottom=True)
     return drawing
 
 
