@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from html import escape
-from operator import itemgetter
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
@@ -16,6 +16,7 @@ from rig.report.attachments import link
 from rig.report.columns import (
     AUDIT,
     Column,
+    Mean,
     fine,
     mean_columns,
     run_columns,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
     from rig.report.attachments import Attachment
-    from rig.report.columns import Mean
     from rig.report.embed import PageFigure
     from rig.report.html import ReportContext
     from rig.report.parts import Part
@@ -133,7 +133,7 @@ def _titled(row: Measurand) -> str:
 
 def _budget(context: ReportContext) -> str:
     lines = [
-        (line, row)
+        Mean(line, row)
         for row in averaged()
         for line in context.analysis.summary
         if row.name in line.means and line.means[row.name].budget
@@ -141,13 +141,13 @@ def _budget(context: ReportContext) -> str:
     if not lines:
         return _figures(context, "budget")
     columns: tuple[Column[Mean], ...] = (
-        Column("", lambda one: f"{one[1].symbol} ({one[1].fine})", numeric=False),
-        *mean_columns(itemgetter(0)),
-        Column("u, runs / √n", lambda one: _part(one, "runs")),
-        Column("u, common", lambda one: _part(one, "common")),
-        Column("u", lambda one: fine(one[1], one[0].means[one[1].name].u)),
-        Column("U", lambda one: fine(one[1], one[0].means[one[1].name].expanded)),
-        Column("largest common sources", lambda one: _largest(*one), numeric=False),
+        Column("", lambda mean: f"{mean.row.symbol} ({mean.row.fine})", numeric=False),
+        *mean_columns(attrgetter("line")),
+        Column("u, runs / √n", lambda mean: _part(mean, "runs")),
+        Column("u, common", lambda mean: _part(mean, "common")),
+        Column("u", lambda mean: fine(mean.row, mean.line.means[mean.row.name].u)),
+        Column("U", lambda mean: fine(mean.row, mean.line.means[mean.row.name].expanded)),
+        Column("largest common sources", lambda mean: _largest(*mean), numeric=False),
     )
     said = context.sections.make(
         "The uncertainty budget", lambda: table("Uncertainty of the means", columns, lines)
@@ -159,8 +159,8 @@ def _budget(context: ReportContext) -> str:
     return _figures(context, "budget") + (said or "") + paragraphs([note])
 
 
-def _part(one: Mean, name: str) -> str:
-    return fine(one[1], one[0].means[one[1].name].budget.get(name))
+def _part(mean: Mean, name: str) -> str:
+    return fine(mean.row, mean.line.means[mean.row.name].budget.get(name))
 
 
 def _largest(line: Incline, row: Measurand) -> str:

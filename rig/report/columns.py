@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from rig.analysis.result import COUNTS, Audit, Measured
 from rig.measurands import acceleration_in, averaged, listed
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
-
-    Mean = tuple[Incline, Measurand]
 
 T = TypeVar("T")
 
@@ -35,6 +33,13 @@ class Column(Generic[T]):
     heading: str
     cell: Callable[[T], str]
     numeric: bool = True
+
+
+class Mean(NamedTuple):
+    """A measurand of a line of the summary that has its mean."""
+
+    line: Incline
+    row: Measurand
 
 
 def summary_incline(line: Incline) -> str:

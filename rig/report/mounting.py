@@ -10,7 +10,7 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
-from rig.report.canvas import INK, MODEL, MUTED, PAPER, PASSES, SECOND, canvas
+from rig.report.canvas import INK, MODEL, MUTED, PAPER, PASSES, SECOND, annotate, canvas
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
     slope = math.radians(track.incline_deg.value)
     text = "\n".join([
         protocol.title, _LEGEND, "",
-        *_wrapped("Lengths are measured along the track from one mark (x), such as its lower "
-                  "end, to each beam and to the glider's middle before release."),
+        *textwrap.wrap("Lengths are measured along the track from one mark (x), such as its lower "
+                  "end, to each beam and to the glider's middle before release.", _WRAP),
     ])  # fmt: skip
     with canvas(
         (3.0,), _WIDTH_IN, simulated=False, sharex=False,
@@ -96,8 +96,7 @@ def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Can
         for gate in gates.gates:
             ends = at(gate.height), at(gate.height, _POST_M)
             side.plot(*zip(*ends, strict=True), color=MODEL, linewidth=0.9)
-            side.annotate(_label(gate), ends[1], (0, 4), textcoords="offset points",
-                          ha="center", color=MODEL)  # fmt: skip
+            annotate(side, _label(gate), ends[1], (0, 4), ha="center", color=MODEL)
         side.set_aspect("equal", adjustable="datalim")
         side.set_xlabel("mm")
         side.set_title(f"the track at {track.incline_deg.value:g}°, from the side", loc="left")
@@ -148,8 +147,8 @@ def _side_view(
     for incline in _inclines(protocol):
         fall = math.tan(math.radians(incline))
         face = -face_below(protocol, incline)
-        ends = [(y, face + y * fall) for y in (-0.5 * post, 1.2 * post)]
-        axes.plot(*zip(*_mm(ends), strict=True), color=MUTED, linewidth=1.0, zorder=1)
+        ends = [(1e3 * y, 1e3 * (face + y * fall)) for y in (-0.5 * post, 1.2 * post)]
+        axes.plot(*zip(*ends, strict=True), color=MUTED, linewidth=1.0, zorder=1)
     for y in (-post, post):
         axes.plot([1e3 * y] * 2, [-20, 1e3 * top], color=INK, linewidth=3.0, zorder=2)
     chain = next(iter(protocol.chains.values()))
@@ -166,11 +165,9 @@ def _side_view(
         )  # fmt: skip
         if gate.height < named_above:
             continue
-        axes.annotate(
-            _label(gate), (1e3 * side * post, 1e3 * gate.height),
-            xytext=(6 * side, 0), textcoords="offset points", va="center",
-            ha="right" if side < 0 else "left", color=_COLOURS[gate.side],
-        )  # fmt: skip
+        at, look = (1e3 * side * post, 1e3 * gate.height), {"ha": "right" if side < 0 else "left"}
+        color = _COLOURS[gate.side]
+        annotate(axes, _label(gate), at, (6 * side, 0), va="center", color=color, **look)
     axes.axhline(0, color=INK, linewidth=0.8, linestyle=":")
     axes.plot(0, 0, "x", color=INK, zorder=4)
     axes.set_aspect("equal", adjustable="box")
@@ -195,10 +192,6 @@ def _name_inclines(axes: Axes, protocol: Protocol, radius: float) -> None:
         axes.text(*at, f"{incline:g}°", color=INK, ha="center", va="center", bbox=box)
 
 
-def _mm(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    return [(1e3 * y, 1e3 * z) for y, z in points]
-
-
 def _zero(protocol: Protocol, gates: Gates) -> list[str]:
     """Say where heights are counted from, and how that is carried to both posts."""
     if not _inclines(protocol):
@@ -218,11 +211,7 @@ def _zero(protocol: Protocol, gates: Gates) -> list[str]:
     )
     if len(_inclines(protocol)) > 1:
         zero += " To change the incline, turn the board about that rod: 0 stays."
-    return [*_wrapped(zero), *filter(None, [beams]), ""]
-
-
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, _WRAP)
+    return [*textwrap.wrap(zero, _WRAP), *filter(None, [beams]), ""]
 
 
 def _slots(protocol: Protocol, gates: Gates) -> list[str]:
@@ -236,10 +225,11 @@ def _slots(protocol: Protocol, gates: Gates) -> list[str]:
         ends = [beam_ends(protocol, height, one) for one in inclines]
         rows.append([f"{1e3 * height:g}", *(f"{1e3 * y:.0f} | {1e3 * s:.0f}" for y, s in ends)])
     return [
-        *_wrapped(
+        *textwrap.wrap(
             "Each beam crosses the rods front to back and meets the board at: mm uphill of the "
             "rods | mm up along the board. Cut a slot there, a little wider than the beam. Or put "
-            "the uphill part closer to the rods than the first number."
+            "the uphill part closer to the rods than the first number.",
+            _WRAP,
         ),
         *text_table(rows),
     ]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import itemgetter
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS, averaged, told
 from rig.report.bars import bar
-from rig.report.columns import Column, fine, mean_columns
+from rig.report.columns import Column, Mean, fine, mean_columns
 from rig.report.numbers import degrees, fixed, plus_minus
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rig.analysis.summary import GateMeans, Incline
     from rig.measurands import Measurand
     from rig.report.bars import Bars
-    from rig.report.columns import Mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,20 +107,20 @@ def scatter_part(summary: Sequence[Incline]) -> Part:
             "runs share. SD/2: half of SD, as in the bars of Pantaleone's figures."
         ],
         tuple(_scatter_columns()),
-        [(line, row) for line in summary for row in averaged() if row.name in line.means],
+        [Mean(line, row) for line in summary for row in averaged() if row.name in line.means],
     )
 
 
 def _scatter_columns() -> Iterator[Column[Mean]]:
-    yield from mean_columns(itemgetter(0))
-    yield Column("", lambda mean: f"{mean[1].symbol} ({mean[1].fine})", numeric=False)
-    yield Column("mean", lambda mean: fine(mean[1], mean[0].means[mean[1].name].value))
+    yield from mean_columns(attrgetter("line"))
+    yield Column("", lambda mean: f"{mean.row.symbol} ({mean.row.fine})", numeric=False)
+    yield Column("mean", lambda mean: fine(mean.row, mean.line.means[mean.row.name].value))
     for heading, kind in _BARS.items():
         yield _bar_column(heading, kind)
 
 
 def _bar_column(heading: str, kind: Bars) -> Column[Mean]:
-    return Column(heading, lambda mean: fine(mean[1], bar(mean[0], mean[1].name, kind)))
+    return Column(heading, lambda mean: fine(mean.row, bar(mean.line, mean.row.name, kind)))
 
 
 _BARS: dict[str, Bars] = {"SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "SD/2": "half-SD"}
