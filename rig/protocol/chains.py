@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from rig.model.chain import XI, Chain
-from rig.protocol.fields import Section, did_you_mean, join, mapping, unique_entries
+from rig.protocol.fields import Section, did_you_mean, join, read_value, unique_entries
+from rig.protocol.keys import Mapped
 from rig.protocol.protocol import RodChain
 from rig.protocol.rods import are_apart, list_rods, place_rods
 from rig.protocol.yamltree import Mapping, ScalarNode, Sequence
@@ -49,7 +50,10 @@ def read_chains(
         if not name.isidentifier() or len(name) > _LONGEST_NAME:
             message = "this name needs to be one word of letters and digits, such as A"
             faults.add(place, join("chains", name), message)
-    described = {name: mapping(own, join("chains", name), faults) for name, own in nodes.items()}
+    described: dict[str, Mapping | None] = {
+        name: read_value(Mapped(), own, join("chains", name), "chains", faults)
+        for name, own in nodes.items()
+    }
     bases = {name: like for name, own in described.items() if (like := _base(own)) is not None}
     chains: dict[str, RodChain | None] = {}
     for name in sorted(nodes, key=lambda name: name in bases):

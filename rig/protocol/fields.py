@@ -99,14 +99,13 @@ class Section:
         """Whether nothing is faulty or missing: of these keys, or of all."""
         return self._faulty.isdisjoint(names) if names else not self._faulty
 
-    def need(self, name: str) -> bool:
-        """Return whether a key is there; note that it is missing otherwise."""
+    def need(self, name: str) -> None:
+        """Note a key that is missing."""
         if name not in self.nodes:
             self._faulty.add(name)
             if not self.lenient:
                 message = f"missing; write for example {name}: {keys.example(self._table[name])}"
                 self.faults.add(self.node.place, self.key(name), message)
-        return name in self.nodes
 
     def key(self, name: str) -> str:
         """Return the full path of one of its keys."""
@@ -172,13 +171,6 @@ def unique_entries(
             places[key.text] = key.place
             values[key.text] = value
     return places, values
-
-
-def mapping(node: Node, path: str, faults: FieldFaults) -> Mapping | None:
-    """Return a node that is a mapping, or note a fault."""
-    if not isinstance(node, Mapping):
-        faults.add(node.place, path, f"found {node}; accepted: {_form(keys.Mapped())}")
-    return node if isinstance(node, Mapping) else None
 
 
 def read_value(

@@ -61,10 +61,9 @@ def record_ms(protocol: Protocol) -> int:
 
 def unmeasurable(protocol: Protocol) -> list[str]:
     """Return the reasons why a drop can only be predicted; none if it can be measured."""
-    found = []
-    if protocol.initial_speed != AT_REST:
-        found.append(f"initial_speed: the rig releases {protocol.vocabulary.body} from rest")
-    return found
+    if protocol.initial_speed == AT_REST:
+        return []
+    return [f"initial_speed: the rig releases {protocol.vocabulary.body} from rest"]
 
 
 def with_gates(protocol: Protocol, channels: Collection[int]) -> Protocol:
@@ -108,13 +107,20 @@ def too_long(protocol: Protocol) -> Problem | None:
     """Say that a fall takes more time than any board can record, when it does."""
     if record_ms(protocol) <= LONGEST_RECORD_MS:
         return None
-    place = place_of(load(protocol.text, protocol.source), "drop")
     message = (
         f"from here a drop takes up to {longest_fall(protocol):.3g} s and needs a recording of "
         f"{record_ms(protocol) / 1e3:.3g} s; boards record for at most "
         f"{LONGEST_RECORD_MS / 1e3:g} s: shorten the drop"
     )
-    return Problem(protocol.source, place.line, place.column, "drop", message)
+    return _located(protocol, message, "drop")
+
+
+def _located(protocol: Protocol, message: str, *path: str | int) -> Problem:
+    """Return a problem at the place of the file that a path leads to."""
+    place = place_of(load(protocol.text, protocol.source), *path)
+    steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    key = "".join(steps).removeprefix(".")
+    return Problem(protocol.source, place.line, place.column, key, message)
 
 
 def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
@@ -143,14 +149,10 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     def want(kind: str, least: float, what: str, has: str, *path: str | int) -> None:
         if getattr(board, kind) >= least:
             return
-        place = place_of(load(protocol.text, protocol.source), *path)
-        key = ""
-        for step in path:
-            key += f"[{step}]" if isinstance(step, int) else f".{step}" if key else step
         others = [other.one for other in BOARDS.values() if getattr(other, kind) >= least]
         other = f", or use {' or '.join(others)}" if others else ""
         message = f"found {what}; the board ({board.name}) has {has}: change this{other}"
-        found.append(Problem(protocol.source, place.line, place.column, key, message))
+        found.append(_located(protocol, message, *path))
 
     release = protocol.release
     has = f"releases 0 to {board.releases - 1}"
@@ -178,9 +180,6 @@ def check_recordable(protocol: Protocol, board: Capabilities | None = None) -> N
         With every problem.
     """
     check_measurable(protocol)
-    longer = too_long(protocol)
-    problems = [] if longer is None else [longer]
-    if board is not None:
-        problems += lacking(protocol, board)
-    if problems:
-        raise InputError(problems=problems)
+    problems = [too_long(protocol), *(lacking(protocol, board) if board else ())]
+    if any(problems):
+        raise InputError(problems=filter(None, problems))

@@ -13,7 +13,8 @@ from rig.errors import InputError
 from rig.files import read_input
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
-from rig.protocol.fields import FieldFaults, Section, mapping
+from rig.protocol.fields import FieldFaults, read_value, unique_entries
+from rig.protocol.keys import Mapped
 from rig.protocol.protocol import (
     SIDES,
     Accept,
@@ -27,7 +28,7 @@ from rig.protocol.protocol import (
     Protocol,
     ReleasePulse,
 )
-from rig.protocol.yamltree import Place, ScalarNode, load
+from rig.protocol.yamltree import load, place_at
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from rig.model.surface import Surface
-    from rig.protocol.protocol import RodChain
+    from rig.protocol.fields import Section
     from rig.protocol.yamltree import Node
 
 MAX_BYTES = 1_000_000
@@ -73,11 +74,9 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        before = data[: error.start]
-        line = before.count(b"\n") + 1
-        column = len(before[before.rfind(b"\n") + 1 :].decode("utf-8")) + 1
+        before = data[: error.start].decode("utf-8")
         faults = FieldFaults(source)
-        faults.add(Place(line, column), "", "not UTF-8 text; save the file as UTF-8")
+        faults.add(place_at(before, len(before)), "", "not UTF-8 text; save the file as UTF-8")
         raise InputError(problems=faults.problems.values()) from None
     return parse(text, source)
 
@@ -116,15 +115,15 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
 
 def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Protocol | None:
     """Build the protocol from its root; `None` (and faults) if anything is wrong."""
-    root = mapping(node, "", faults)
-    if root is None:
+    top: Section | None = read_value(Mapped(), node, "", "", faults)
+    if top is None:
         return None
-    top = Section(root, "", "", faults)
-    chains: dict[str, RodChain] | None = None
+    chains, count = None, 1
     if top["chains"]:
         struck, measured = "surface" in top, "gates" in top
         chains = read_chains(top["chains"], faults, seen_by_gates=measured, struck=struck)
-    check_scene(top, chains, count=_count_chains(top), kept=kept)
+        count = len(unique_entries(top["chains"], "chains", faults)[1])
+    check_scene(top, chains, count=count, kept=kept)
     if faults.problems or chains is None:
         return None
     track = top["track"] and InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
@@ -158,13 +157,6 @@ def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
     """Return the values of a section, some by the names that `rig.protocol.protocol` has."""
     values = section.values if section else {}
     return {names.get(name, name): value for name, value in values.items()}
-
-
-def _count_chains(top: Section) -> int:
-    """Return how many chains the file names, whether or not they can be read."""
-    if top["chains"] is None:
-        return 1
-    return len({key.text for key, _ in top["chains"].entries if isinstance(key, ScalarNode)})
 
 
 def _gravity(top: Section) -> Quantity:

@@ -8,8 +8,8 @@ are bounded while reading, so that no file can exhaust the stack or the memory.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import yaml
 
@@ -74,8 +74,8 @@ class Sequence:
     """A list."""
 
     place: Place
-    items: list[Node] = field(default_factory=list)
-    size: int = 1
+    items: list[Node]
+    size: int
 
     def __str__(self) -> str:
         return "a list"
@@ -86,8 +86,8 @@ class Mapping:
     """A mapping; entries in file order, repeated keys included."""
 
     place: Place
-    entries: list[tuple[Node, Node]] = field(default_factory=list)
-    size: int = 1
+    entries: list[tuple[Node, Node]]
+    size: int
 
     def __str__(self) -> str:
         return "a mapping"
@@ -140,13 +140,13 @@ def load(text: str, source: str) -> Node:
         place, message = refusal.place, refusal.message
     except yaml.reader.ReaderError as error:
         character = f"U+{ord(body[error.position]):04X}"
-        place = _place_of(body, error.position)
+        place = place_at(body, error.position)
         message = f"control character {character}; write plain text only"
     except yaml.MarkedYAMLError as error:
         from rig.protocol.yamlmend import explain  # noqa: PLC0415 - only a mistake needs it
 
         index, message = explain(body, error)
-        place = _place_of(body, index)
+        place = place_at(body, index)
     except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
         # The parser lets a few int() and chr() errors of broken escapes and directives through.
         place, message = Place(1, 1), "this file cannot be read; see its quotes and % lines"
@@ -162,8 +162,8 @@ class _RefusalError(Exception):
         self.place, self.message = place, message
 
 
-def _place_of(text: str, index: int) -> Place:
-    """Return the line and column of a character."""
+def place_at(text: str, index: int) -> Place:
+    """Return the line and column of a character by its index."""
     before = text[:index]
     return Place(before.count("\n") + 1, index - before.rfind("\n"))
 
@@ -185,13 +185,21 @@ def _refuse_tabs(text: str) -> None:
             raise _RefusalError(Place(number, column + 1), "a tab; use blanks")
 
 
+class _Frame(NamedTuple):
+    """A list or mapping that is not closed yet; of a mapping keys and values take turns."""
+
+    place: Place
+    anchor: str | None
+    is_list: bool
+    parts: list[Node]
+
+
 class _Builder:
     """Builds the tree from parser events with a stack of its own, so nothing recurses."""
 
     def __init__(self) -> None:
-        self.root: Node | None = None
-        self.stack: list[tuple[Sequence | Mapping, str | None]] = []
-        self.keys: list[Node | None] = []  # per open node: a key that still waits for its value
+        # Below everything that is open lies the file, a list of documents.
+        self.stack = [_Frame(Place(1, 1), None, is_list=True, parts=[])]
         self.anchors: dict[str, Node] = {}
         self.nodes = 0
 
@@ -207,55 +215,42 @@ class _Builder:
                 self._node(event, place)
             elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
                 self._close()
-        if self.root is None:
+        if not self.stack[0].parts:
             raise _RefusalError(Place(1, 1), "the file is empty; begin with protocol: 1")
-        return self.root
+        return self.stack[0].parts[0]
 
     def _node(self, event: Any, place: Place) -> None:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
                 name = quoted(str(event.anchor))
                 raise _RefusalError(place, f"no anchor stands before the alias {name}")
-            self._add(self.anchors[event.anchor], place)
-            return
-        if event.tag is not None:
+            node = self.anchors[event.anchor]
+            self._add(node, place, event.anchor, node.size)
+        elif event.tag is not None:
             raise _RefusalError(place, f"the tag {quoted(event.tag)} is not accepted; leave it out")
-        if isinstance(event, yaml.ScalarEvent):
+        elif isinstance(event, yaml.ScalarEvent):
             # "\uD800" in double quotes makes half a character, which no file or database takes.
             if any("\ud800" <= character <= "\udfff" for character in event.value):
                 raise _RefusalError(place, "half of a surrogate pair; write the character itself")
-            scalar = ScalarNode(event.value, event.style is None, place)
-            if event.anchor:
-                self.anchors[event.anchor] = scalar
-            self._add(scalar, place)
-            return
-        if len(self.stack) >= MAX_DEPTH:
+            self._add(ScalarNode(event.value, event.style is None, place), place, event.anchor)
+        elif len(self.stack) > MAX_DEPTH:
             raise _RefusalError(place, f"more than {MAX_DEPTH} levels of brackets or indents")
-        is_list = isinstance(event, yaml.SequenceStartEvent)
-        self.stack.append((Sequence(place) if is_list else Mapping(place), event.anchor))
-        self.keys.append(None)
+        else:
+            is_list = isinstance(event, yaml.SequenceStartEvent)
+            self.stack.append(_Frame(place, event.anchor, is_list, []))
 
     def _close(self) -> None:
-        node, anchor = self.stack.pop()
-        self.keys.pop()
-        if anchor:
-            self.anchors[anchor] = node
-        # The parts were counted as they came; only the node itself is new.
-        self._add(node, node.place, counted=node.size - 1)
+        place, anchor, is_list, parts = self.stack.pop()
+        size = 1 + sum(part.size for part in parts)
+        entries = list(zip(parts[::2], parts[1::2], strict=not is_list))
+        node = Sequence(place, parts, size) if is_list else Mapping(place, entries, size)
+        self._add(node, place, anchor)
 
-    def _add(self, node: Node, place: Place, counted: int = 0) -> None:
-        self.nodes += node.size - counted
+    def _add(self, node: Node, place: Place, anchor: str | None, more: int = 1) -> None:
+        """Append a node to what is open; its parts were counted as they came, but for an alias."""
+        self.nodes += more
         if self.nodes > MAX_NODES:
             raise _RefusalError(place, f"more than {MAX_NODES} values, aliases expanded")
-        if not self.stack:
-            self.root = node
-            return
-        parent, _ = self.stack[-1]
-        parent.size += node.size
-        if isinstance(parent, Sequence):
-            parent.items.append(node)
-        elif (key := self.keys[-1]) is None:
-            self.keys[-1] = node
-        else:
-            parent.entries.append((key, node))
-            self.keys[-1] = None
+        if anchor:
+            self.anchors[anchor] = node
+        self.stack[-1].parts.append(node)
