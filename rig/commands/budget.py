@@ -7,15 +7,9 @@ from functools import partial
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
-from rig.analysis.monte_carlo import (
-    adaptive,
-    agreement,
-    monte_carlo,
-    session_monte_carlo,
-    until_decided,
-)
 from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
 from rig.cache.entry import recall
@@ -25,18 +19,14 @@ from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.report.numbers import decimals_for, fixed, plus_minus
-from rig.results import (
-    calibration,
-    check_open,
-    protocol_of,
-    results,
-)
+from rig.results import calibration, check_open, protocol_of, results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Mapping
 
+    from rig.analysis.monte_carlo import Propagated
     from rig.analysis.session import Analysis
     from rig.measurands import Measurand
     from rig.results import SessionResults
@@ -89,11 +79,11 @@ def budget(
     records = whole.records()
     record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
     if trials is None:
-        trial, drawn = until_decided(fit, alone.quantities, seed)
+        trial, drawn = monte_carlo.until_decided(fit, alone.quantities, seed)
     elif isinstance(trials, str):
-        trial, drawn = adaptive(fit, seed)
+        trial, drawn = monte_carlo.adaptive(fit, seed)
     else:
-        trial, drawn = monte_carlo(fit, trials, seed), trials
+        trial, drawn = monte_carlo.monte_carlo(fit, trials, seed), trials
     return {
         "run": number,
         "learned": record["learned"],
@@ -103,11 +93,8 @@ def budget(
             "trials": drawn,
             "seed": seed,
             "quantities": {
-                name: one.json()
-                | agreement(
-                    alone.quantities[name].value, alone.quantities[name].u, one, drawn
-                ).json()
-                for name, one in trial.items()
+                name: _compare_trials(alone.quantities[name], sample, drawn)
+                for name, sample in trial.items()
             },
         },
     }
@@ -118,6 +105,12 @@ def _measured(record: Mapping[str, Any], name: str) -> Measured:
     found, degrees = record[name], record["degrees"][name]
     lines = {one["name"]: one["u"] for one in record["budget"] if one["quantity"] == name}
     return Measured(found["value"], found["u"], math.inf if degrees is None else degrees, lines)
+
+
+def _compare_trials(measured: Measured, sample: Propagated, trials: int) -> dict[str, Any]:
+    """Write what trials gave, and how far it agrees with a measured value."""
+    agreement = monte_carlo.agreement(measured.value, measured.u, sample, trials)
+    return sample.json() | agreement.json()
 
 
 def _lines(measured: Measured) -> dict[str, Any]:
@@ -157,16 +150,11 @@ def _table(found: Mapping[str, Any]) -> list[str]:
         lines += [
             f"  by itself u = {_written(row, alone['u'])} {row.fine}; by {drawn['trials']} "
             f"trials (seed {drawn['seed']}) {_written(row, trial['u'])} {row.fine}",
-            f"  95 % of trials in {low} … {high} {row.unit}" + _judgement(trial),
+            f"  95 % of trials in {low} … {high} {row.unit}",
         ]
+        if trial["decided"]:
+            lines[-1] += ": both agree" if trial["agrees"] else ": they do not agree"
     return lines
-
-
-def _judgement(trial: Mapping[str, Any]) -> str:
-    """Say whether both ways agree, where the trials are enough to tell."""
-    if not trial["decided"]:
-        return ""
-    return ": both agree" if trial["agrees"] else ": they do not agree"
 
 
 def _written(row: Measurand, u: float) -> str:
@@ -206,14 +194,14 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
         (result.run.number, result.attempt): result
         for result in (*analysis.runs, *analysis.superseded)
     }
-    drawn = session_monte_carlo(analysis.joint, trials, SEED)
+    drawn = monte_carlo.session_monte_carlo(analysis.joint, trials, SEED)
     runs = []
     for key, one in zip(analysis.adjusted, drawn, strict=True):
-        quantities = {}
-        for name, measured in results[key].quantities.items():
-            agreed = agreement(measured.value, measured.u, one[name], trials)
-            quantities[name] = one[name].json() | agreed.json()
-            quantities[name]["u_ratio"] = one[name].u / measured.u
+        quantities = {
+            name: _compare_trials(measured, one[name], trials)
+            | {"u_ratio": one[name].u / measured.u}
+            for name, measured in results[key].quantities.items()
+        }
         runs.append({"run": key[0], "attempt": key[1], "quantities": quantities})
     return {"trials": trials, "seed": SEED, "runs": runs}
 

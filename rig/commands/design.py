@@ -95,25 +95,21 @@ def _length(option: str, text: str | None) -> float | None:
     return value
 
 
-def _tried(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> dict[str, Any]:
-    outcome = trials(with_beams(protocol, beams))
-    text = trials_text(outcome, protocol.vocabulary)
-    return {"drops": outcome.drops, "read": outcome.read, "text": text}
-
-
 def _said(
     protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
 ) -> dict[str, Any]:
     assert protocol.gates is not None
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
     expected: Forecast = forecast(protocol, layout, sure=True)
+    outcome = trials(with_beams(protocol, beams))
+    text = trials_text(outcome, protocol.vocabulary)
     return {
         "gates": [
             {"channel": gate.channel, "side": side, "height_m": height}
             for gate, (side, height) in zip(protocol.gates.gates, beams, strict=True)
         ],
         "readable": readable(protocol, beams),
-        "trials": _tried(protocol, beams),
+        "trials": {"drops": outcome.drops, "read": outcome.read, "text": text},
         "measurands": [
             {
                 "name": name,
@@ -149,15 +145,12 @@ def design_text(found: Mapping[str, Any]) -> str:
     ]
     for name in layouts:
         lines.append("")
-        sides = [*dict.fromkeys(gate["side"] for gate in found[name]["gates"])]
-        for side in sides:
-            heights = ", ".join(
-                f"{gate['height_m'] * 1e3:g}"
-                for gate in found[name]["gates"]
-                if gate["side"] == side
-            )
-            where = f", {side} side" if len(sides) > 1 else ""
-            lines.append(f"{name}{where} (mm): {heights}")
+        heights: dict[str, list[str]] = {}
+        for gate in found[name]["gates"]:
+            heights.setdefault(gate["side"], []).append(f"{gate['height_m'] * 1e3:g}")
+        for side, millimetres in heights.items():
+            where = f", {side} side" if len(heights) > 1 else ""
+            lines.append(f"{name}{where} (mm): {', '.join(millimetres)}")
         lines.append(f"{name}: {found[name]['trials']['text']}")
         if not found[name]["readable"]:
             lines.append(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS, GATES
 from rig.commands.output import print_results
@@ -43,15 +45,6 @@ _DROPS = {
 """Where the drop of a scene without a surface is measured."""
 
 
-class _Question(NamedTuple):
-    """One question: its option, its words, the default and the accepted answers."""
-
-    option: str
-    words: str
-    usual: str
-    accepted: tuple[str, ...] = ()
-
-
 def main(arguments: Namespace) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path = Path(arguments.output)
@@ -82,43 +75,35 @@ def main(arguments: Namespace) -> int:
 
 def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     """Return the board and the draft; ask for what the command line leaves open."""
-    scene = _ask(
-        arguments,
-        _Question("scene", "What do you drop?", "object", tuple(SCENES)),
-        explained=SCENES,
-    )
-    board = _ask(arguments, _Question("board", "Which board times it?", "pico", (*BOARDS, _OTHER)))
+    answer = partial(_ask, arguments)
+    scene = answer("scene", "What do you drop?", "object", SCENES)
+    board = answer("board", "Which board times it?", "pico", dict.fromkeys((*BOARDS, _OTHER), ""))
     struck, body = scene in STRUCK, scene in {"object", "track"}
     fence = scene == "picket-fence"
     part = "bar" if fence else "rod"
-    gates = _ask(arguments, _Question("gates", "How many gates?", "2" if fence else "4"))
+    gates = answer("gates", "How many gates?", "2" if fence else "4")
     rods, length = "1", ""
     if not body:
         parts = "bars of the fence" if fence else "rods of a chain"
-        rods = _ask(arguments, _Question("rods", f"How many {parts}?", "8" if fence else "25"))
+        rods = answer("rods", f"How many {parts}?", "8" if fence else "25")
         words = f"Distance from the middle of the lowest {part} to that of the highest?"
-        length = _ask(arguments, _Question("length", words, "350 mm" if fence else "1165 mm"))
+        length = answer("length", words, "350 mm" if fence else "1165 mm")
     thick = {"object": "20 mm", "track": "100 mm", "picket-fence": "25 mm"}.get(scene, "12.7 mm")
     words = "Its length in a beam, along its path?" if body else f"Height of one {part}?"
-    diameter = _ask(arguments, _Question("diameter", words, thick))
+    diameter = answer("diameter", words, thick)
     inclines = ""
     if struck:
         result = "separation" if scene == "two-chains" else "speed"
-        words, aims = "What do you want to measure?", (result, *_INCLINES)
-        aim = _ask(arguments, _Question("aim", words, result, aims))
-        words = "Inclines of the board?"
-        inclines = _ask(arguments, _Question("incline", words, _INCLINES.get(aim, "40 deg")))
+        aims = dict.fromkeys((result, *_INCLINES), "")
+        aim = answer("aim", "What do you want to measure?", result, aims)
+        inclines = answer("incline", "Inclines of the board?", _INCLINES.get(aim, "40 deg"))
     elif scene == "track":
-        words = "Incline of the track?"
-        inclines = _ask(arguments, _Question("incline", words, "3 deg ± 0.1 deg"))
+        inclines = answer("incline", "Incline of the track?", "3 deg ± 0.1 deg")
     drops = {"track": "1500 mm ± 1 mm", "object": "900 mm ± 1 mm", "picket-fence": "400 mm ± 2 mm"}
     start = "Start" if scene == "track" else "Drop height"
     words = f"{start}, from {_DROPS.get(scene, 'the contact point to the lowest rod')}?"
-    drop = _ask(arguments, _Question("drop", words, drops.get(scene, "180 mm ± 2 mm")))
-    repeats = _ask(
-        arguments,
-        _Question("repeats", f"How many drops{' at each incline' if struck else ''}?", "12"),
-    )
+    drop = answer("drop", words, drops.get(scene, "180 mm ± 2 mm"))
+    repeats = answer("repeats", f"How many drops{' at each incline' if struck else ''}?", "12")
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
     chosen: Scene = next(name for name in SCENES if name == scene)
     return board, Draft(
@@ -128,23 +113,31 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
 
 
 def _ask(
-    arguments: Namespace, question: _Question, explained: Mapping[Scene, str] | None = None
+    arguments: Namespace,
+    option: str,
+    words: str,
+    usual: str,
+    accepted: Mapping[Scene, str] | Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Return the answer of the command line or of the user, or the default."""
-    value = getattr(arguments, question.option)
+    """Return the answer of the command line or of the user, or the default.
+
+    `accepted` is empty where any answer is; an answer with a meaning has a line of its own.
+    """
+    value = getattr(arguments, option)
     if value is not None:
         return str(value)
     if arguments.yes or not sys.stdin.isatty():
-        say(f"{question.words} {question.usual} (--{question.option})")
-        return question.usual
-    for word, meaning in (explained or {}).items():
-        say(f"  {word:14} {meaning}")
-    choice = f" ({', '.join(question.accepted)})" if question.accepted and not explained else ""
+        say(f"{words} {usual} (--{option})")
+        return usual
+    meanings = [f"  {word:14} {meaning}" for word, meaning in accepted.items() if meaning]
+    for line in meanings:
+        say(line)
+    choice = f" ({', '.join(accepted)})" if accepted and not meanings else ""
     while True:
-        answer = ask(f"{question.words}{choice} [{question.usual}] ") or question.usual
-        if not question.accepted or answer in question.accepted:
+        answer = ask(f"{words}{choice} [{usual}] ") or usual
+        if not accepted or answer in accepted:
             return answer
-        say(f"  accepted: {', '.join(question.accepted)}")
+        say(f"  accepted: {', '.join(accepted)}")
 
 
 def _count(name: str, text: str, most: int = 1000) -> int:
