@@ -6,7 +6,6 @@ What a single key may be is in `rig.protocol.keys`; how the rods of a chain fit 
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from rig.protocol.keys import DEFAULTS, example, key_at
@@ -90,13 +89,8 @@ def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
             drag.fault("air_density", message, at_key=True)
     else:
         for rods in chains:
-            lacking = {
-                "mass": not rods.weighed,
-                "diameter": min(rods.diameters) == 0.0,
-                "rod_length": math.isnan(rods.rod_length),
-            }
-            missing = ", ".join(key for key, lacks in lacking.items() if lacks)
-            if missing:
+            if rods.unstated:
+                missing = ", ".join(rods.unstated)
                 message = f"needs {missing} of {rods.name}; state it, or terminal_speed instead"
                 drag.fault("coefficient", message)
 

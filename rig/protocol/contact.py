@@ -36,10 +36,8 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
 
 def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
     """Name the keys of a chain that `touching_heights` needs and that are not there."""
-    thick = bool(chain.diameters) and min(chain.diameters) > 0.0
-    long = not _sine(chain) or not math.isnan(chain.rod_length)
-    lacking = {"diameter": thick, "rod_length": long}
-    return tuple(key for key, known in lacking.items() if not known)
+    needed = {"diameter", "rod_length"} if _sine(chain) else {"diameter"}
+    return tuple(key for key in chain.unstated if key in needed)
 
 
 def _sine(chain: RodChain) -> float:

@@ -7,12 +7,12 @@ from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.protocol.contact import touching_heights
+from rig.protocol.fields import Section
 from rig.protocol.protocol import SIDES, RodChain, vocabulary_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
-    from rig.protocol.fields import Section
     from rig.units import Quantity
 
 CLEARANCE_M = 0.001
@@ -42,14 +42,17 @@ def check_sides(section: Section, *, surface: bool, chains: int) -> None:
     if not surface or chains > 1:
         section.need("free")
     lines: dict[int, int] = {}
-    for side in SIDES:
-        for gate in section[side] or ():
-            channel = gate["channel"] if gate else None
-            if channel in lines:
-                message = f"channel {channel} is already used on line {lines[channel]}"
-                gate.fault("channel", message)
-            elif channel is not None:
-                lines[channel] = gate.place("channel").line
+    for gate in _sections(section):
+        channel = gate["channel"]
+        if channel in lines:
+            gate.fault("channel", f"channel {channel} is already used on line {lines[channel]}")
+        elif channel is not None:
+            lines[channel] = gate.place("channel").line
+
+
+def _sections(section: Section) -> Iterator[Section]:
+    """Gates of all sides that are mappings at all, in the order of the file's keys."""
+    return (gate for side in SIDES for gate in section[side] or () if gate)
 
 
 class _Rod(NamedTuple):
@@ -80,14 +83,13 @@ def check_clear(
     inclines
         Of the board, where heights are measured from it.
     """
-    rods = sorted(
-        _Rod(z - half, z + half, number, chain.name)
-        for chain in chains
-        for number, (height, width) in enumerate(
-            zip(chain.chain.heights, chain.widths, strict=True), start=1
-        )
-        for z, half in ((drop.value + height, width / 2 + max(CLEARANCE_M, drop.u)),)
-    )
+    rods = []
+    for chain in chains:
+        places = zip(chain.chain.heights, chain.widths, strict=True)
+        for number, (height, width) in enumerate(places, start=1):
+            z, half = drop.value + height, width / 2 + max(CLEARANCE_M, drop.u)
+            rods.append(_Rod(z - half, z + half, number, chain.name))
+    rods.sort()
     lowest = max(width for chain in chains for width in chain.widths) / 2 if surface else 0.0
     lowest += max(
         (max(touching_heights(chain, incline)) for chain in chains for incline in inclines),
@@ -96,9 +98,7 @@ def check_clear(
     top = min(drop.value + chain.chain.length for chain in chains)
     part = vocabulary_of(chains, struck=surface).part
     alone = next(iter(chains)).name if all(chain.chain.rods == 1 for chain in chains) else None
-    for gate in (
-        gate for side in SIDES for gate in section[side] or () if gate and gate.is_sound()
-    ):
+    for gate in filter(Section.is_sound, _sections(section)):
         height = gate["height"]
         message = f"found {_mm(height)}"
         rod = next((rod for rod in rods if rod.low < height < rod.high), None)

@@ -7,7 +7,7 @@ empty, and every later stage leaves it out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, hypot, nan, radians, sin
+from math import cos, hypot, isnan, nan, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.protocol.keys import DEFAULTS
@@ -63,6 +63,16 @@ class RodChain:
     diameters: tuple[float, ...] = ()
     rod_length: float = nan
     weighed: bool = False
+
+    @property
+    def unstated(self) -> tuple[str, ...]:
+        """The keys of the rods that the file leaves open, though a scene may do without them."""
+        known = {
+            "mass": self.weighed,
+            "diameter": min(self.diameters, default=0.0) > 0.0,
+            "rod_length": not isnan(self.rod_length),
+        }
+        return tuple(key for key, stated in known.items() if not stated)
 
 
 def vocabulary_of(chains: Collection[RodChain], *, struck: bool) -> Vocabulary:

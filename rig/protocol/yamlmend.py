@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import yaml
 
@@ -114,29 +114,25 @@ def _stray(text: str, at: int, begin: int) -> Iterator[Mend]:
 
 def _open_quotes(text: str, stop: int) -> Iterator[Mend]:
     """Close a quote at the end of its line, before a comma, bracket or comment if there is one."""
-    tokens: list[Any] = []
+    starts: list[int] = []
     try:
-        tokens.extend(yaml.scan(text[:stop], Loader=yaml.SafeLoader))
+        starts.extend(
+            token.start_mark.index
+            for token in yaml.scan(text[:stop], Loader=yaml.SafeLoader)
+            if getattr(token, "style", None) and token.start_mark.line < token.end_mark.line
+        )
     except yaml.MarkedYAMLError as error:
-        starts = [error.context_mark.index] if error.context_mark else []
-    else:
-        starts = []
-    starts += [
-        token.start_mark.index
-        for token in tokens
-        if getattr(token, "style", None) and token.start_mark.line < token.end_mark.line
-    ]
+        if error.context_mark:
+            starts.insert(0, error.context_mark.index)
     for start in starts:
         quote = text[start : start + 1]
         if quote not in {'"', "'"}:
             continue
-        end = _line_end(text, start)
-        for found in re.finditer(r"\s*(?:#|[,}\]]|$)", text[start + 1 : end]):
-            to = start + 1 + found.start()
-            message = f"a quote is open from here: close it with {quote}"
+        message = f"a quote is open from here: close it with {quote}"
+        for end in re.finditer(r"\s*(?:#|[,}\]]|$)", text[start + 1 : _line_end(text, start)]):
+            to = start + 1 + end.start()
             yield Mend(start, message, to, to, quote)
-        message = f"a quote is open from here: close it with {quote}, or leave it out"
-        yield Mend(start, message, start, start + 1, "")
+        yield Mend(start, f"{message}, or leave it out", start, start + 1, "")
 
 
 def _colons(text: str, start: int) -> Iterator[Mend]:
