@@ -89,8 +89,8 @@ def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
             drag.fault("air_density", message, at_key=True)
     else:
         for rods in chains:
-            if rods.unstated:
-                missing = ", ".join(rods.unstated)
+            if rods.missing_keys:
+                missing = ", ".join(rods.missing_keys)
                 message = f"needs {missing} of {rods.name}; state it, or terminal_speed instead"
                 drag.fault("coefficient", message)
 

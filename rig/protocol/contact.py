@@ -37,7 +37,7 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
 def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
     """Name the keys of a chain that `touching_heights` needs and that are not there."""
     needed = {"diameter", "rod_length"} if _sine(chain) else {"diameter"}
-    return tuple(key for key in chain.unstated if key in needed)
+    return tuple(key for key in chain.missing_keys if key in needed)
 
 
 def _sine(chain: RodChain) -> float:

@@ -65,7 +65,7 @@ class RodChain:
     weighed: bool = False
 
     @property
-    def unstated(self) -> tuple[str, ...]:
+    def missing_keys(self) -> tuple[str, ...]:
         """The keys of the rods that the file leaves open, though a scene may do without them."""
         known = {
             "mass": self.weighed,
