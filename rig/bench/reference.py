@@ -37,76 +37,62 @@ def exact_fall(
     drop: float,
     gravity: float,
     initial_speed: float = 0.0,
+    kappa: float = 0.0,
 ) -> Exact:
-    """Eqs. 9 and 1 rod by rod; floats are taken at their exact value."""
-    # A fast chain hardly gains speed in a leg, and (V' − V)/g lives on what is left of it.
-    slow = gravity * (drop + heights[-1])
-    fast = 2.0 * math.log10(initial_speed) - math.log10(slow) if initial_speed and slow else 0.0
+    """Eqs. 9 and 1 rod by rod, with g − κv² in air; floats are taken at their exact value."""
+    reach = drop + heights[-1]
+    if kappa:
+        # The free chain's way is the logarithm of nearly 1, over κ, and a speed in thick air is
+        # nearly the terminal one: hardly any air and very much of it both take digits.
+        spare = max(0, round(-4.0 * math.log10(kappa))) + round(kappa * reach)
+    else:
+        # A fast chain hardly gains speed in a leg, and (V' − V)/g lives on what is left of it.
+        slow = gravity * reach
+        fast = 2.0 * math.log10(initial_speed) - math.log10(slow) if initial_speed and slow else 0.0
+        spare = max(0, round(fast))
     context = decimal.Context(
-        prec=DIGITS + _SPARE + max(0, round(fast)), Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
+        prec=DIGITS + _SPARE + spare, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
     )
     with decimal.localcontext(context):
-        g, start = Decimal(gravity), Decimal(initial_speed)
+        g, k, start = Decimal(gravity), Decimal(kappa), Decimal(initial_speed)
         exact = [Decimal(mass) for mass in masses]
         # From the top: a light end would be lost in the sum of a chain over many decades.
         above = [*accumulate(reversed(exact[1:]))][::-1]
         time, speed, before = Decimal(0), start, -Decimal(drop)
         arrival = speed
-        for k, (m, height) in enumerate(zip(exact, map(Decimal, heights), strict=True)):
-            distance = height - before
-            if distance:
-                arrival = (speed * speed + 2 * g * distance).sqrt()
-                time += (arrival - speed) / g if g else distance / speed
-            else:
-                arrival = speed
-            speed = arrival
-            if k < len(above):
-                pull = alphas[k] * m * arrival / (1 + gammas[k] * m / above[k])
-                speed += pull / above[k]
-            before = height
-        top = Decimal(drop) + Decimal(heights[-1])
-        return Exact(top - start * time - g * time * time / 2, arrival, time)
-
-
-def exact_air_fall(
-    masses: Sequence[float],
-    heights: Sequence[float],
-    alphas: Sequence[Decimal],
-    gammas: Sequence[Decimal],
-    drop: float,
-    gravity: float,
-    kappa: float,
-    initial_speed: float = 0.0,
-) -> Exact:
-    """Eq. 9 rod by rod, and g − κv² between, integrated as textbooks have it; κ > 0, g > 0."""
-    # The free chain's way is the logarithm of nearly 1, over κ, and a speed in thick air is nearly
-    # the terminal one: hardly any air and very much of it both take digits.
-    spare = _SPARE + max(0, round(-4.0 * math.log10(kappa)))
-    spare += round(kappa * (drop + heights[-1]))
-    with mpmath.workdps(DIGITS + spare):
-        g, k = mpmath.mpf(gravity), mpmath.mpf(kappa)
-        terminal = mpmath.sqrt(g / k)
-        masses_ = [mpmath.mpf(mass) for mass in masses]
-        above = [*accumulate(reversed(masses_[1:]))][::-1]
-        start = mpmath.mpf(initial_speed)
-        time, speed, before = mpmath.mpf(0), start, -mpmath.mpf(drop)
-        arrival = speed
-        for n, (m, height) in enumerate(zip(masses_, map(mpmath.mpf, heights), strict=True)):
-            fading = mpmath.exp(-2 * k * (height - before))
-            arrival = mpmath.sqrt(speed**2 * fading + terminal**2 * (1 - fading))
-            gone = (terminal + arrival) * (terminal - speed)
-            time += mpmath.log(gone / ((terminal - arrival) * (terminal + speed))) / (
-                2 * mpmath.sqrt(g * k)
-            )
+        for n, (m, height) in enumerate(zip(exact, map(Decimal, heights), strict=True)):
+            arrival, duration = _exact_leg(height - before, speed, g, k)
+            time += duration
             speed = arrival
             if n < len(above):
-                alpha, gamma = mpmath.mpf(str(alphas[n])), mpmath.mpf(str(gammas[n]))
-                speed += alpha * m * arrival / (1 + gamma * m / above[n]) / above[n]
+                pull = alphas[n] * m * arrival / (1 + gammas[n] * m / above[n])
+                speed += pull / above[n]
             before = height
-        turns = mpmath.sqrt(g * k) * time
-        way = mpmath.log(mpmath.cosh(turns) + start / terminal * mpmath.sinh(turns)) / k
-        apart = mpmath.mpf(drop) + mpmath.mpf(heights[-1]) - way
-        return Exact(*(Decimal(mpmath.nstr(one, DIGITS)) for one in (apart, arrival, time)))
+        top = Decimal(drop) + Decimal(heights[-1])
+        return Exact(top - _exact_way(time, start, g, k), arrival, time)
+
+
+def _exact_leg(
+    distance: Decimal, speed: Decimal, gravity: Decimal, kappa: Decimal
+) -> tuple[Decimal, Decimal]:
+    """Speed at the end of a leg and its duration, as textbooks have them."""
+    if not distance:
+        return speed, Decimal(0)
+    if not kappa:
+        arrival = (speed * speed + 2 * gravity * distance).sqrt()
+        return arrival, (arrival - speed) / gravity if gravity else distance / speed
+    terminal, fading = (gravity / kappa).sqrt(), (-2 * kappa * distance).exp()
+    arrival = (speed * speed * fading + terminal * terminal * (1 - fading)).sqrt()
+    gone = (terminal + arrival) * (terminal - speed) / ((terminal - arrival) * (terminal + speed))
+    return arrival, gone.ln() / (2 * (gravity * kappa).sqrt())
+
+
+def _exact_way(time: Decimal, start: Decimal, gravity: Decimal, kappa: Decimal) -> Decimal:
+    """How far the chain that strikes nothing has fallen."""
+    if not kappa:
+        return start * time + gravity * time * time / 2
+    grown, share = ((gravity * kappa).sqrt() * time).exp(), start / (gravity / kappa).sqrt()
+    return (((1 + share) * grown + (1 - share) / grown) / 2).ln() / kappa
 
 
 def exact_coefficients(

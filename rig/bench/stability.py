@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from rig.bench.extremes import PITCH, extremes
-from rig.bench.reference import exact_air_fall, exact_coefficients, exact_fall
+from rig.bench.reference import exact_coefficients, exact_fall
 from rig.errors import DomainError
 from rig.model.chain import Chain
 from rig.model.drag import drag_fall
@@ -57,19 +57,17 @@ class StabilityRow:
 
 
 def stability(
-    scenes: Iterable[Extreme] | None = None, progress: Callable[[StabilityRow], None] | None = None
+    progress: Callable[[StabilityRow], None] | None = None,
 ) -> list[StabilityRow]:
-    """Try every scene.
+    """Try every scene of `rig.bench.extremes.extremes`.
 
     Parameters
     ----------
-    scenes
-        By default all of `rig.bench.extremes.extremes`.
     progress
         Told each row as it is done.
     """
     rows = []
-    for scene in extremes() if scenes is None else scenes:
+    for scene in extremes():
         row = examine(scene)
         rows.append(row)
         if progress is not None:
@@ -133,9 +131,7 @@ def _exact(scene: Extreme) -> Exact:
     if scene.alpha is not None:
         alpha = Decimal(scene.alpha)
     body = chain.masses, chain.heights, [alpha] * chain.rods, [gamma] * chain.rods
-    if scene.kappa:
-        return exact_air_fall(*body, scene.drop, scene.gravity, scene.kappa, scene.initial_speed)
-    return exact_fall(*body, scene.drop, scene.gravity, scene.initial_speed)
+    return exact_fall(*body, scene.drop, scene.gravity, scene.initial_speed, scene.kappa)
 
 
 def _naive(scene: Extreme, impact: Impact, exact: Exact) -> str:
@@ -207,8 +203,3 @@ def _end_speed(ratio: float, rods: int, restitution: float) -> float:
     chain = Chain(tuple(ratio**k for k in range(rods)), tuple(PITCH * k for k in range(rods)))
     impact = impact_on(Surface(Quantity(restitution)), chain, 0.0)
     return fall(chain, impact.alpha, impact.gamma, 0.18, 9.81).speed_m_s
-
-
-def as_json(rows: Iterable[StabilityRow]) -> list[dict[str, object]]:
-    """Rows as plain objects."""
-    return [asdict(row) for row in rows]
