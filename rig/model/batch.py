@@ -9,7 +9,6 @@ Nothing is raised and no warning given: where a single fall has no answer the re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -135,78 +134,45 @@ def falls(
     shape = np.broadcast_shapes(*(one.shape for one in given))
     flat = [np.broadcast_to(one, shape).reshape(-1) for one in given]
     ends = np.empty((3, flat[0].size))
-    room = np.empty((5, _BLOCK))
     with np.errstate(all="ignore"):
         for start in range(0, flat[0].size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            end = ends[:, block]
-            march = _March(*(one[block] for one in flat), *end, *room[:, : end.shape[1]])
-            march.through(*profile)
+            ends[:, block] = _block_ends(*profile, *(one[block] for one in flat))
     return FallBatch(*(row.reshape(shape) for row in ends))
 
 
-@dataclass(slots=True)
-class _March:
-    """A block of falls on their way from rod to rod; every array is of shape ``(falls,)``."""
+def _block_ends(
+    mass: Floats,
+    height: Floats,
+    alpha: Floats,
+    gamma: Floats,
+    drop: Floats,
+    gravity: Floats,
+    initial_speed: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """Δz, V and t of falls rod by rod; masses, heights of ``(rods,)``, all else ``(falls,)``."""
+    twice_g = gravity * 2.0
+    first = height[0] + drop
+    arrival, time = _leg(first, initial_speed, twice_g)
+    # A rod released on the contact point strikes at once, though its leg's time was 0/0.
+    arrival = np.where(first == 0.0, initial_speed, arrival)
+    time = np.where(first == 0.0, 0.0, time)
+    gained, separation = np.zeros_like(drop), np.zeros_like(drop)
+    # Summed from the top, as in rig.model.fall.kicks.
+    above = np.cumsum(mass[:0:-1])[::-1]
+    for m, rest, gap in zip(mass[:-1], above, np.diff(height), strict=True):
+        step = arrival * (alpha * m / (gamma * m + rest))  # Eq. 9
+        gained += step
+        arrival, duration = _leg(gap, arrival + step, twice_g)
+        time += duration
+        separation += gained * duration
+    return separation, arrival, time
 
-    alpha: Floats
-    gamma: Floats
-    drop: Floats
-    gravity: Floats
-    initial_speed: Floats
-    # Results, written in place.
-    separation: Floats
-    arrival: Floats
-    time: Floats
-    # Room to work in.
-    speed: Floats
-    gained: Floats
-    twice_g: Floats
-    one: Floats
-    other: Floats
 
-    def through(self, mass: Floats, height: Floats) -> None:
-        """All legs and impacts; masses and heights of shape ``(rods,)``."""
-        self.speed[:] = self.initial_speed
-        for array in (self.separation, self.time, self.gained):
-            array.fill(0.0)
-        np.multiply(self.gravity, 2.0, out=self.twice_g)
-        first = height[0] + self.drop
-        self._leg(first)
-        # A rod released on the contact point strikes at once, though its leg's time was 0/0.
-        still = first == 0.0
-        if still.any():
-            self.arrival[still] = self.speed[still]
-            self.time[still] = self.separation[still] = 0.0
-        # Summed from the top, as in rig.model.fall.kicks.
-        above = np.cumsum(mass[:0:-1])[::-1]
-        for m, rest, gap in zip(mass[:-1], above, np.diff(height), strict=True):
-            self._impact(m, rest)
-            self._leg(gap)
-
-    def _leg(self, distance: Floats | float) -> None:
-        """Free fall over a distance."""
-        one, other = self.one, self.other
-        np.multiply(self.speed, self.speed, out=one)
-        np.multiply(self.twice_g, distance, out=other)
-        np.add(one, other, out=one)
-        np.sqrt(one, out=self.arrival)
-        np.add(self.speed, self.arrival, out=one)
-        np.divide(2.0 * distance, one, out=one)
-        np.add(self.time, one, out=self.time)
-        np.multiply(self.gained, one, out=one)
-        np.add(self.separation, one, out=self.separation)
-
-    def _impact(self, mass: float, above: float) -> None:
-        """A rod's impact, Eq. 9: ΔV = V α m / (M + γ m)."""
-        one, other = self.one, self.other
-        np.multiply(self.gamma, mass, out=one)
-        np.add(one, above, out=one)
-        np.multiply(self.alpha, mass, out=other)
-        np.divide(other, one, out=one)
-        np.multiply(self.arrival, one, out=one)
-        np.add(self.gained, one, out=self.gained)
-        np.add(self.arrival, one, out=self.speed)
+def _leg(distance: Floats | float, speed: Floats, twice_g: Floats) -> tuple[Floats, Floats]:
+    """Speed at the end of a free fall over a distance, and its duration."""
+    arrival = np.sqrt(speed * speed + twice_g * distance)
+    return arrival, 2.0 * distance / (speed + arrival)
 
 
 def _gamma(inertia: Floats, inertia_above: Floats) -> Floats:
