@@ -61,7 +61,7 @@ def figure_3(step_deg: float = 1.0) -> Columns:
 
     Inclines at which the rod would not slide are left out of the first.
     """
-    columns: Columns = {name: [] for name in ("incline_deg", "pile", "separation_m", "speed_m_s")}
+    rows = []
     steps = round(90.0 / step_deg)
     for on_pile, surface in ((0.0, BARE), (1.0, SURFACE)):
         for number in range(steps):
@@ -73,10 +73,12 @@ def figure_3(step_deg: float = 1.0) -> Columns:
             if impact.notes:
                 continue
             found = _fall(UNIFORM, impact)
-            row = (incline, on_pile, found.separation_m, found.speed_m_s)
-            for name, value in zip(columns, row, strict=True):
-                columns[name].append(value)
-    return columns
+            rows.append((incline, on_pile, found.separation_m, found.speed_m_s))
+    return _columns(("incline_deg", "pile", "separation_m", "speed_m_s"), rows)
+
+
+def _columns(names: Sequence[str], rows: Sequence[Sequence[float]]) -> Columns:
+    return {name: [row[n] for row in rows] for n, name in enumerate(names)}
 
 
 def figure_4() -> Columns:
@@ -89,32 +91,21 @@ def figure_4() -> Columns:
     impact = impact_on(BARE, chain, MIDDLE_INCLINE)
     gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
     motion = Motion(chain, gains, DROP, GRAVITY)
-    columns: Columns = {
-        name: [] for name in ("time_s", "height_m", "speed2", "free_height_m", "free_speed2")
-    }
     moments = [(0.0, 0.0)]
     for hit in motion.hits:
         moments += [(hit.time_s, hit.speed_before), (hit.time_s, hit.speed_after)]
+    rows = []
     for time, velocity in moments[:-1]:  # the top rod's own impact pulls on nothing
         now = motion.at(time)
         top = now.height_m + chain.length
-        row = (time, top, velocity**2, top + now.separation_m, (GRAVITY * time) ** 2)
-        for name, value in zip(columns, row, strict=True):
-            columns[name].append(value)
-    return columns
+        rows.append((time, top, velocity**2, top + now.separation_m, (GRAVITY * time) ** 2))
+    return _columns(("time_s", "height_m", "speed2", "free_height_m", "free_speed2"), rows)
 
 
 def figure_6(points: int = 199) -> Columns:
     """Δz and V against rod inertia ξ at 40°: discrete model, Eq. 14 and Eq. 15."""
-    columns: Columns = {
-        name: []
-        for name in ("inertia", "separation_m", "speed_m_s", "eq15_separation_m", "eq14_speed_m_s")
-    }
-    for number in range(1, points + 1):
-        inertia = number / (points + 1)
-        for name, value in zip(columns, _inertia_row(inertia), strict=True):
-            columns[name].append(value)
-    return columns
+    names = ("inertia", "separation_m", "speed_m_s", "eq15_separation_m", "eq14_speed_m_s")
+    return _columns(names, [_inertia_row(n / (points + 1)) for n in range(1, points + 1)])
 
 
 def _inertia_row(inertia: float) -> Sequence[float]:

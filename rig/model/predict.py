@@ -208,15 +208,13 @@ def _moved(
     inputs: _Inputs, drop: Quantity, gravity: Quantity, speed: Quantity, drag: Quantity
 ) -> Iterator[_Step]:
     """Inputs with one of the others at a time moved down and up, and the weight."""
-    for low, high, weight in _steps(drop, least=0.0):
-        yield inputs._replace(drop=low), inputs._replace(drop=high), weight
-    # Half of g is far enough for a slope, and a fall without gravity has no end.
-    for low, high, weight in _steps(gravity, least=gravity.value / 2):
-        yield inputs._replace(gravity=low), inputs._replace(gravity=high), weight
-    for low, high, weight in _steps(speed, least=0.0):
-        yield inputs._replace(speed=low), inputs._replace(speed=high), weight
-    for low, high, weight in _steps(drag, least=0.0):
-        yield inputs._replace(drag=low), inputs._replace(drag=high), weight
+    given = {"drop": drop, "gravity": gravity, "speed": speed, "drag": drag}
+    for name, quantity in given.items():
+        # Half of g is far enough for a slope, and a fall without gravity has no end.
+        least = gravity.value / 2 if name == "gravity" else 0.0
+        for *ends, weight in _steps(quantity, least):
+            low, high = (inputs._replace(**{name: end}) for end in ends)
+            yield low, high, weight
 
 
 def _steps(given: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
