@@ -49,10 +49,6 @@ _QUICK_SOLVERS: tuple[Solver, ...] = ("RK45", "LSODA")
 _MANY_RODS = 1000
 
 
-class BudgetError(RigError):
-    """A method would take longer than the sweep has time for."""
-
-
 @dataclass(frozen=True, slots=True)
 class Answer:
     """What a method finds.
@@ -294,10 +290,8 @@ def leg_by_leg(
 
     Raises
     ------
-    BudgetError
-        When it is spent.
     RigError
-        When the solver gives up.
+        When the budget is spent, or the solver gives up.
     """
     matrix = np.zeros((6, 6))
     matrix[0, 1], matrix[2, 3] = -1.0, 1.0
@@ -318,7 +312,7 @@ def leg_by_leg(
         nonlocal evaluations
         evaluations += 1
         if evaluations > budget:
-            raise BudgetError(f"more than {budget} evaluations, and the chain is not down yet")
+            raise RigError(f"more than {budget} evaluations, and the chain is not down yet")
         return matrix @ now + falling
 
     for height, gain in zip(chain.heights, gains, strict=True):

@@ -154,18 +154,15 @@ class _Trial:
 
 
 def precision(
-    chosen: Sequence[PrecisionScene] | None = None,
     *,
     quick: bool = False,
     progress: Callable[[str], None] = lambda _line: None,
     keep: Callable[[Precision], None] = lambda _so_far: None,
 ) -> Precision:
-    """Sweep every method on every scene.
+    """Sweep every method on every scene of `rig.bench.precision_reference.scenes`.
 
     Parameters
     ----------
-    chosen
-        Scenes; by default `rig.bench.precision_reference.scenes`.
     quick
         A small subset: the paper's two chains, few settings.
     progress
@@ -173,8 +170,7 @@ def precision(
     keep
         Given all that is found so far after each scene: a sweep takes long.
     """
-    if chosen is None:
-        chosen = [s for s in scenes() if not quick or s.name in {"uniform", "graded"}]
+    chosen = [scene for scene in scenes() if not quick or scene.name in {"uniform", "graded"}]
     points: list[Point] = []
     gaps: list[Gap] = []
     left_out: list[LeftOut] = []
@@ -210,11 +206,8 @@ def cheapest(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> lis
                 if point.separation_error is not None and point.separation_error <= target
             ]
             best = min(good, key=lambda point: point.median_s, default=None)
-            if best is None:
-                found.append(Cheapest(scene, model, tau, target, None, None, None))
-            else:
-                one = Cheapest(scene, model, tau, target, best.method, best.setting, best.median_s)
-                found.append(one)
+            winner = (best.method, best.setting, best.median_s) if best else (None, None, None)
+            found.append(Cheapest(scene, model, tau, target, *winner))
     return found
 
 
@@ -256,15 +249,11 @@ def _tried(
                 continue
             # What follows is dearer still.
             for rest in method.settings[place:]:
-                why = reason if rest is setting else f"not tried: {_after(setting, reason)}"
+                after = f"not tried: {setting.text} came to this: {reason}"
+                why = reason if rest is setting else after
                 left_out.append(LeftOut(scene.name, method.name, rest.text, why))
             break
     return trials
-
-
-def _after(setting: Setting, reason: str) -> str:
-    """Why nothing dearer than a setting was tried."""
-    return f"{setting.text} came to this: {reason}"
 
 
 def _take_turns(trials: Sequence[_Trial]) -> None:

@@ -177,9 +177,7 @@ class Sonic:
     decades: float
 
 
-def sonic_lengths(
-    ratios: Iterable[float] = (0.9, 0.7, 0.5, 0.3), restitution: float = 0.5
-) -> list[Sonic]:
+def sonic_lengths(ratios: Iterable[float] = (0.9, 0.7, 0.5, 0.3)) -> list[Sonic]:
     """Find the shortest chains that end faster than sound, on a hard level surface without air.
 
     Rods are `PITCH` apart and fall 18 cm before the first impact, as in the paper.
@@ -187,11 +185,11 @@ def sonic_lengths(
     found = []
     for ratio in ratios:
         low, high = 2, 4
-        while _end_speed(ratio, high, restitution) < SOUND:
+        while _end_speed(ratio, high) < SOUND:
             low, high = high, 2 * high
         while high - low > 1:
             middle = (low + high) // 2
-            if _end_speed(ratio, middle, restitution) < SOUND:
+            if _end_speed(ratio, middle) < SOUND:
                 low = middle
             else:
                 high = middle
@@ -199,7 +197,7 @@ def sonic_lengths(
     return found
 
 
-def _end_speed(ratio: float, rods: int, restitution: float) -> float:
+def _end_speed(ratio: float, rods: int) -> float:
     chain = Chain(tuple(ratio**k for k in range(rods)), tuple(PITCH * k for k in range(rods)))
-    impact = impact_on(Surface(Quantity(restitution)), chain, 0.0)
+    impact = impact_on(Surface(Quantity(0.5)), chain, 0.0)
     return fall(chain, impact.alpha, impact.gamma, 0.18, 9.81).speed_m_s
