@@ -147,21 +147,11 @@ class RowReader:
             label = stream.label if self._gate is None else row.cell(self._gate)
             key: tuple[object, ...] = (number, stream.run)
             if self._row_is_run:
-                never = (
-                    stream is not self._streams[0]
-                    and picoseconds(self._table.with_point(text)) == 0
-                )
-                if never:  # a zero after others: nothing was there
+                zero = picoseconds(self._table.with_point(text)) == 0
+                if zero and stream is not self._streams[0]:  # nothing was there
                     continue
-                key, label = (
-                    (number, row.line),
-                    stream.label
-                    or (
-                        stream.time.name
-                        if stream.time.numbered and stream.time.name[:1] in "tTZ"
-                        else ""
-                    ),
-                )
+                key, name = (number, row.line), stream.time.name
+                label = label or (name if stream.time.numbered and name[:1] in "tTZ" else "")
             elif not label and not stream.run:
                 key = (number, stream.time.at)
             run = stream.run
