@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, RodChain, Run
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PredictedIncline:
     """What the model says of one incline; `None` is what the scene does not have or tell.
 
@@ -41,15 +41,15 @@ class PredictedIncline:
     """
 
     incline_deg: float
-    impact_chain: str | None
+    impact_chain: str | None = None
     model: str
-    alpha: float | None
-    gamma: float | None
-    separation_m: float | None
-    separation_u_m: float | None
-    speed_m_s: float | None
-    speed_u_m_s: float | None
-    fall_time_s: float | None
+    alpha: float | None = None
+    gamma: float | None = None
+    separation_m: float | None = None
+    separation_u_m: float | None = None
+    speed_m_s: float | None = None
+    speed_u_m_s: float | None = None
+    fall_time_s: float | None = None
     free_fall_speed_m_s: float
     in_domain: bool
     notes: list[str]
@@ -230,14 +230,8 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
     way = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,
-        impact_chain=None,
         model=f"{way}{', drag' if protocol.drag is not None else ''}",
-        alpha=None,
-        gamma=None,
-        separation_m=None,
-        separation_u_m=None,
         speed_m_s=speed,
-        speed_u_m_s=None,
         fall_time_s=time,
         free_fall_speed_m_s=speed,
         in_domain=True,
