@@ -106,13 +106,19 @@ def predict(
     centre = drops(inputs)
     notes = impact.notes
     separation_u = speed_u = time_u = None
+    moved = {
+        "alpha": _moved_alphas(chain, surface, impact, incline_deg),
+        "drop": _steps(drop, least=0.0),
+        # Half of g is far enough for a slope, and a fall without gravity has no end.
+        "gravity": _steps(gravity, least=gravity.value / 2),
+        "speed": _steps(initial_speed, least=0.0),
+        "drag": _steps(Quantity(1.0, drag_u), least=0.0),
+    }
     try:
         spread = [
-            (drops(low), drops(high), weight)
-            for low, high, weight in (
-                *_moved_impacts(chain, surface, impact, incline_deg, inputs),
-                *_moved(inputs, drop, gravity, initial_speed, Quantity(1.0, drag_u)),
-            )
+            (drops(inputs._replace(**{name: low})), drops(inputs._replace(**{name: high})), weight)
+            for name, steps in moved.items()
+            for low, high, weight in steps
         ]
     except DomainError as error:
         notes = (*notes, f"no uncertainty: within that of μ, {error.message}")
@@ -161,9 +167,6 @@ def _ways_down(
     )
 
 
-_Step = tuple[_Inputs, _Inputs, float]
-
-
 def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quantity:
     """α of all rods together, with what the uncertainties of chain and surface make of it.
 
@@ -175,14 +178,6 @@ def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quanti
     impact = impact_on(surface, chain, incline_deg)
     steps = _moved_alphas(chain, surface, impact, incline_deg)
     return Quantity(impact.alpha, math.hypot(*((b - a) * weight for a, b, weight in steps)))
-
-
-def _moved_impacts(
-    chain: Chain, surface: Surface, impact: Impact, incline_deg: float, inputs: _Inputs
-) -> Iterator[_Step]:
-    """Inputs with what α rests on moved down and up, and u over the distance between them."""
-    for low, high, weight in _moved_alphas(chain, surface, impact, incline_deg):
-        yield inputs._replace(alpha=low), inputs._replace(alpha=high), weight
 
 
 def _moved_alphas(
@@ -201,19 +196,6 @@ def _moved_alphas(
     if impact.basis == "surface":
         for *ends, weight in _steps(surface.friction, least=0.0):
             low, high = (impact_on(surface, chain, incline_deg, friction=mu).alpha for mu in ends)
-            yield low, high, weight
-
-
-def _moved(
-    inputs: _Inputs, drop: Quantity, gravity: Quantity, speed: Quantity, drag: Quantity
-) -> Iterator[_Step]:
-    """Inputs with one of the others at a time moved down and up, and the weight."""
-    given = {"drop": drop, "gravity": gravity, "speed": speed, "drag": drag}
-    for name, quantity in given.items():
-        # Half of g is far enough for a slope, and a fall without gravity has no end.
-        least = gravity.value / 2 if name == "gravity" else 0.0
-        for *ends, weight in _steps(quantity, least):
-            low, high = (inputs._replace(**{name: end}) for end in ends)
             yield low, high, weight
 
 
