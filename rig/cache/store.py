@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import sqlite3
 import stat
-import time
 import zlib
 from contextlib import closing, suppress
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -25,16 +24,14 @@ Answer = TypeVar("Answer")
 _MOST_BYTES = 256 << 20
 """A session of 108 runs takes 2 MB of it."""
 _BUSY_S = 1.0
-_DAY_S = 86_400
-"""How exactly it is known when an entry was last used, so that to read is rarely to write."""
-_UNUSABLE = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR}
-"""What SQLite says of a file that is damaged, or that has other tables than these."""
-_CREATE = """
-CREATE TABLE IF NOT EXISTS entry (
-    key TEXT PRIMARY KEY, used_s INTEGER NOT NULL, crc32 INTEGER NOT NULL, packed BLOB NOT NULL
-) STRICT;
-CREATE INDEX IF NOT EXISTS by_use ON entry (used_s);
-"""
+_UNUSABLE = {
+    sqlite3.SQLITE_CORRUPT,
+    sqlite3.SQLITE_NOTADB,
+    sqlite3.SQLITE_ERROR,
+    sqlite3.SQLITE_FULL,
+}
+"""What SQLite says of a file that is damaged, that has other tables than these, or that is full."""
+_CREATE = "CREATE TABLE IF NOT EXISTS entry (key TEXT PRIMARY KEY, packed BLOB NOT NULL) STRICT"
 
 
 class CacheSize(NamedTuple):
@@ -52,7 +49,7 @@ class CacheFile:
     folder
         Made when it is first used, for this user alone; by default where the platform has caches.
     most_bytes
-        What all entries may take; those that were not used for longest go first.
+        What the file may take; where an entry has no more room, all others are forgotten for it.
     """
 
     def __init__(self, folder: Path | None = None, most_bytes: int = _MOST_BYTES) -> None:
@@ -62,19 +59,26 @@ class CacheFile:
 
     def get(self, key: str) -> str | None:
         """Return the text of a key; `None` where there is none."""
-        return self._transact(lambda connection: _read(connection, key))
+
+        def read(connection: sqlite3.Connection) -> str | None:
+            row = connection.execute("SELECT packed FROM entry WHERE key = ?", [key]).fetchone()
+            # What was altered fails the checksum of its compression.
+            return row and zlib.decompress(row[0]).decode("utf-8", "surrogatepass")
+
+        return self._transact(read)
 
     def put(self, key: str, text: str) -> None:
         """Keep a text, if that is possible."""
         packed = zlib.compress(text.encode("utf-8", "surrogatepass"), 1)
-        self._transact(lambda connection: self._write(connection, key, packed))
+        insert = "INSERT OR REPLACE INTO entry VALUES (?, ?)"
+        self._transact(lambda connection: connection.execute(insert, (key, packed)))
 
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""
 
         def count(connection: sqlite3.Connection) -> CacheSize:
-            (entries,) = connection.execute("SELECT count(*) FROM entry").fetchone()
-            return CacheSize(entries, _used_bytes(connection))
+            rows = "SELECT count(*), coalesce(sum(length(packed)), 0) FROM entry"
+            return CacheSize(*connection.execute(rows).fetchone())
 
         return self._transact(count)
 
@@ -83,14 +87,6 @@ class CacheFile:
         with suppress(OSError):
             self._path.unlink()
             self._path.with_name(f"{self._path.name}-journal").unlink()
-
-    def _write(self, connection: sqlite3.Connection, key: str, packed: bytes) -> None:
-        row = (key, int(time.time()), _checksum(key, packed), packed)
-        connection.execute("INSERT OR REPLACE INTO entry VALUES (?, ?, ?, ?)", row)
-        oldest = "SELECT key FROM entry ORDER BY used_s, rowid LIMIT 16"
-        while _used_bytes(connection) > self._most_bytes:
-            if not connection.execute(f"DELETE FROM entry WHERE key IN ({oldest})").rowcount:  # noqa: S608
-                break
 
     def _transact(self, use: Callable[[sqlite3.Connection], Answer]) -> Answer | None:
         """Use the file in one transaction; begin a new file where it is damaged."""
@@ -103,14 +99,17 @@ class CacheFile:
                 with closing(connection), connection:
                     # A crash of the computer may lose the file; that of a program loses nothing.
                     connection.execute("PRAGMA synchronous = OFF")
-                    connection.executescript(_CREATE)
+                    connection.execute(_CREATE)
+                    (page_bytes,) = connection.execute("PRAGMA page_size").fetchone()
+                    pages = self._most_bytes // page_bytes
+                    connection.execute(f"PRAGMA max_page_count = {pages}")
                     return use(connection)
             except sqlite3.Error as error:
                 # Else another process has it for long, or there is no room.
                 if error.sqlite_errorcode & 0xFF not in _UNUSABLE:
                     return None
                 self.clear()
-            except OSError:
+            except (OSError, ValueError, zlib.error):
                 return None
         return None
 
@@ -121,24 +120,3 @@ def _is_private(folder: Path) -> bool:
     if not folder.is_absolute() or not stat.S_ISDIR(about.st_mode):
         return False
     return os.name != "posix" or (about.st_uid == os.getuid() and not about.st_mode & 0o022)
-
-
-def _read(connection: sqlite3.Connection, key: str) -> str | None:
-    rows = connection.execute("SELECT used_s, crc32, packed FROM entry WHERE key = ?", [key])
-    used_s, crc32, packed = rows.fetchone() or (0, 0, b"")
-    if not packed or crc32 != _checksum(key, packed):
-        return None
-    now_s = int(time.time())
-    if abs(now_s - used_s) > _DAY_S:
-        connection.execute("UPDATE entry SET used_s = ? WHERE key = ?", [now_s, key])
-    return zlib.decompress(packed).decode("utf-8", "surrogatepass")
-
-
-def _checksum(key: str, packed: bytes) -> int:
-    return zlib.crc32(packed, zlib.crc32(key.encode()))
-
-
-def _used_bytes(connection: sqlite3.Connection) -> int:
-    numbers = ("page_count", "freelist_count", "page_size")
-    pages, free, size = (connection.execute(f"PRAGMA {n}").fetchone()[0] for n in numbers)
-    return int((pages - free) * size)
