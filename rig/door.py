@@ -11,12 +11,12 @@ Values are in SI units, angles in degrees. A session is opened for reading; noth
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from rig.analysis.result import GOOD, optional_package
 from rig.errors import InputError, SessionError
-from rig.measurands import MEASURANDS, SEPARATION
+from rig.measurands import MEASURANDS
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
 from rig.report.chapters import summary_html
@@ -34,12 +34,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rig.analysis.gate_passages import GatePassage
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.summary import Incline
     from rig.protocol.protocol import Protocol
     from rig.results import SessionResults
-    from rig.units import Quantity
 
 __all__ = [
     "Edges",
@@ -236,39 +234,33 @@ class RecordedSessions:
         return results_together(files, same_rig=same_rig, unfinished=unfinished)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+class _Quantity:
+    """An attribute of what has quantities: the one of this name."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, holder: _Quantities, _: type | None = None) -> Measured:
+        if self._name not in holder.quantities:
+            has = ", ".join(holder.quantities) or "no quantities"
+            raise InputError(f"{holder!r} has no {MEASURANDS[self._name].label}", f"it has {has}")
+        return holder.quantities[self._name]
+
+
 class _Quantities:
     """Measured quantities by name; those of the project have attributes of their own."""
 
-    quantities: Mapping[str, Measured]
+    separation = _Quantity("separation_m")
+    """Δz at level, corrected to simultaneous release, m."""
+    speed = _Quantity("speed_m_s")
+    """V of the impact chain's top rod, m/s."""
+    gravity = _Quantity("gravity_m_s2")
+    """Acceleration of a chain that strikes nothing, m/s²."""
+    acceleration = _Quantity("acceleration_m_s2")
+    """Acceleration of one object down its track, m/s²."""
 
-    def _one(self, name: str) -> Measured:
-        if name not in self.quantities:
-            raise InputError(f"{self!r} has no {MEASURANDS[name].label}", self._what_it_has())
-        return self.quantities[name]
-
-    def _what_it_has(self) -> str:
-        return f"it has {', '.join(self.quantities) or 'no quantities'}"
-
-    @property
-    def separation(self) -> Measured:
-        """Δz at level, corrected to simultaneous release, m."""
-        return self._one(SEPARATION.name)
-
-    @property
-    def speed(self) -> Measured:
-        """V of the impact chain's top rod, m/s."""
-        return self._one("speed_m_s")
-
-    @property
-    def gravity(self) -> Measured:
-        """Acceleration of a chain that strikes nothing, m/s²."""
-        return self._one("gravity_m_s2")
-
-    @property
-    def acceleration(self) -> Measured:
-        """Acceleration of one object down its track, m/s²."""
-        return self._one("acceleration_m_s2")
+    def __init__(self, quantities: Mapping[str, Measured]) -> None:
+        self.quantities = quantities
 
     def _written(self) -> str:
         rows = (MEASURANDS[name] for name in self.quantities)
@@ -280,7 +272,6 @@ class _Quantities:
         return ", ".join(said)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
 class RunResult(_Quantities):
     """One drop.
 
@@ -298,43 +289,23 @@ class RunResult(_Quantities):
         Name of the session, where there are several.
     """
 
-    run: int = field(kw_only=True)
-    attempt: int = field(kw_only=True)
-    incline_deg: float = field(kw_only=True)
-    impact_chain: str | None = field(kw_only=True)
-    verdict: str = field(kw_only=True)
-    reasons: tuple[str, ...] = field(kw_only=True)
-    gates: tuple[GatePassage, ...] = field(kw_only=True)
-    session: str = field(kw_only=True, default="")
+    separation_raw = _Quantity("separation_raw_m")
+    """Δz as it happened, m."""
+    release_skew = _Quantity("release_skew_s")
+    """The free chain's release less the impact chain's, s."""
+    fall_time = _Quantity("fall_time_s")
+    """From the impact chain's release to its top rod's strike, s."""
 
-    @classmethod
-    def _of(cls, one: DropResult, session: str = "") -> RunResult:
-        return cls(
-            one.quantities,
-            run=one.run.number,
-            attempt=one.attempt,
-            incline_deg=one.run.incline_deg,
-            impact_chain=one.run.impact,
-            verdict=one.verdict,
-            reasons=tuple(reason.text for reason in one.reasons),
-            gates=one.gates,
-            session=session,
-        )
-
-    @property
-    def separation_raw(self) -> Measured:
-        """Δz as it happened, m."""
-        return self._one("separation_raw_m")
-
-    @property
-    def release_skew(self) -> Measured:
-        """The free chain's release less the impact chain's, s."""
-        return self._one("release_skew_s")
-
-    @property
-    def fall_time(self) -> Measured:
-        """From the impact chain's release to its top rod's strike, s."""
-        return self._one("fall_time_s")
+    def __init__(self, drop: DropResult, session: str = "") -> None:
+        super().__init__(drop.quantities)
+        self.run = drop.run.number
+        self.attempt = drop.attempt
+        self.incline_deg = drop.run.incline_deg
+        self.impact_chain = drop.run.impact
+        self.verdict: str = drop.verdict
+        self.reasons = tuple(reason.text for reason in drop.reasons)
+        self.gates = drop.gates
+        self.session = session
 
     def __repr__(self) -> str:
         at = f" at {self.incline_deg:g}°, {self.impact_chain} strikes" if self.impact_chain else ""
@@ -342,7 +313,6 @@ class RunResult(_Quantities):
         return f"<run {self.run}{at}, {self.verdict}{said}>"
 
 
-@dataclass(frozen=True, slots=True, repr=False)
 class MeanResult(_Quantities):
     """The mean of all good runs at one incline, or of one of two unlike chains there.
 
@@ -356,20 +326,12 @@ class MeanResult(_Quantities):
         What the model says, with its u; nothing outside its domain.
     """
 
-    incline_deg: float = field(kw_only=True)
-    impact_chain: str | None = field(kw_only=True)
-    n: int = field(kw_only=True)
-    predicted: Mapping[str, Quantity] = field(kw_only=True)
-
-    @classmethod
-    def _of(cls, one: Incline) -> MeanResult:
-        return cls(
-            one.means,
-            incline_deg=one.incline_deg,
-            impact_chain=one.impact_chain,
-            n=one.n,
-            predicted=one.predicted,
-        )
+    def __init__(self, line: Incline) -> None:
+        super().__init__(line.means)
+        self.incline_deg = line.incline_deg
+        self.impact_chain = line.impact_chain
+        self.n = line.n
+        self.predicted = line.predicted
 
     def __repr__(self) -> str:
         return f"<{self.incline_deg:g}°, mean of {self.n}: {self._written()}>"
@@ -389,9 +351,9 @@ class Results:
     def __init__(self, found: SessionResults | TogetherResults) -> None:
         self._found = found
         self.runs = tuple(
-            RunResult._of(run, name) for name, part in found.analyses() for run in part.runs
+            RunResult(run, name) for name, part in found.analyses() for run in part.runs
         )
-        self.summary = tuple(MeanResult._of(line) for line in found.summary)
+        self.summary = tuple(MeanResult(line) for line in found.summary)
 
     def json(self) -> dict[str, Any]:
         """Return what `rig analyze --json` prints."""
