@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from rig.analysis.budgets import Budgets
 from rig.analysis.drop import fit_drop
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
     Progress = Callable[[int, int], None]
+
+K = TypeVar("K")
 
 _EXPLAINED = 6  # void drops of a session, after which it is not sought what else the next ones are
 KEPT = 0.9
@@ -198,8 +200,22 @@ def gather(
     results, fits
         Of each drop, as `rig.analysis.drop.fit_drop` gives them.
     """
-    found, joint, adjusted, unsettled = _fit_jointly(protocol, results, fits)
-    return replace(sum_up(protocol, found, joint, adjusted), unsettled=unsettled)
+    limit = protocol.accept.release_skew
+    good = {
+        n: fit
+        for n, (result, fit) in enumerate(zip(results, fits, strict=True))
+        if fit is not None
+        and fit.estimate.settled
+        and (result.verdict in GOOD or nearly_in_time(result, limit))
+    }
+    together = fit_together(dict(enumerate(results)), good)
+    adjusted = {
+        (result.run.number, result.attempt): drop
+        for n, drop in together.drops.items()
+        if (result := together.results[n]).verdict in GOOD
+    }
+    analysis = sum_up(protocol, together.results.values(), together.joint, adjusted)
+    return replace(analysis, unsettled=not together.settled)
 
 
 def sum_up(
@@ -231,59 +247,73 @@ def sum_up(
     return Analysis(latest, earlier, summary, rig, joint, adjusted or {}, paired, whole)
 
 
-def _fit_jointly(
-    protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
-) -> tuple[list[DropResult], JointFit | None, dict[tuple[int, int], Fit | JointDrop], bool]:
+class FittedTogether(NamedTuple, Generic[K]):
+    """Drops in the light of all.
+
+    Attributes
+    ----------
+    joint
+        `None` where there are too few drops, or their fit failed.
+    results
+        Of all that were given.
+    drops
+        Those in the fit or, where there is none, as they would have gone into it.
+    settled
+        Whether nothing failed.
+    """
+
+    joint: JointFit | None
+    results: dict[K, DropResult]
+    drops: Mapping[K, Fit | JointDrop]
+    settled: bool = True
+
+
+def fit_together(
+    results: Mapping[K, DropResult], drops: Mapping[K, Fit | JointDrop]
+) -> FittedTogether[K]:
     """Give good drops the numbers that they have in the light of all of them.
 
     A verdict is on a drop by itself, by limits fixed beforehand: what others say of the rig
     changes its numbers and not whether they count, but for a release so near the limit that the
     drop alone cannot tell. One that loses its edges among the others keeps the numbers that it has
     by itself, and is left out.
+
+    Parameters
+    ----------
+    results, drops
+        Of any drops, and of these the good ones with their unknowns.
     """
-    limit, words = protocol.accept.release_skew, protocol.vocabulary
-    good = {
-        n: fit
-        for n, (result, fit) in enumerate(zip(results, fits, strict=True))
-        if fit is not None
-        and fit.estimate.settled
-        and (result.verdict in GOOD or nearly_in_time(result, limit))
-    }
-    found = list(results)
-    joint, unsettled = None, False
-    while joint is None and len(good) >= FEWEST:
+    found, good = dict(results), dict(drops)
+    while len(good) >= FEWEST:
         joint = joint_fit(list(good.values()))
-        if not joint.settled:
-            joint, unsettled = None, True
-            break
         fewer = {
-            n: make_reason("differs_from_session", words, matched=drop.matched, alone=fit.matched)
-            for (n, fit), drop in zip(good.items(), joint.drops, strict=True)
+            key: drop.matched
+            for (key, fit), drop in zip(good.items(), joint.drops, strict=joint.settled)
             if drop.matched < KEPT * fit.matched
         }
-        if 2 * len(fewer) > len(good):
-            # It is the adjustment that fails, and no drop is to blame for that.
-            joint, unsettled = None, True
-            break
-        for n, why in fewer.items():
-            found[n] = replace(found[n], reasons=(*found[n].reasons, why))
-            del good[n]
-            joint = None
-    if joint is None:
-        return found, None, _good(found, good), unsettled
-    budgets = Budgets(joint)
-    for n, drop in zip(good, joint.drops, strict=True):
-        found[n] = joint_result(protocol, found[n], drop, budgets)
-    return found, joint, _good(found, dict(zip(good, joint.drops, strict=True))), False
+        # Where most are left out it is the adjustment that fails, and no drop is to blame for that.
+        if not joint.settled or 2 * (len(drops) - len(good) + len(fewer)) > len(drops):
+            return FittedTogether(None, found, good, settled=False)
+        if not fewer:
+            adjusted, budgets = dict(zip(good, joint.drops, strict=True)), Budgets(joint)
+            light = {
+                key: _joint_result(found[key], drop, budgets) for key, drop in adjusted.items()
+            }
+            return FittedTogether(joint, found | light, adjusted)
+        for key, matched in fewer.items():
+            result, fit = found[key], good.pop(key)
+            counts = {"matched": matched, "alone": fit.matched}
+            why = make_reason("differs_from_session", fit.model.protocol.vocabulary, **counts)
+            own = result.alone or result.quantities
+            found[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
+    return FittedTogether(None, found, good)
 
 
-def joint_result(
-    protocol: Protocol, result: DropResult, drop: JointDrop, budgets: Budgets
-) -> DropResult:
+def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:
     """Give a drop the numbers that it has in the light of all."""
     unmatched, measured = unmatched_edges(drop), budgets.measured(drop)
     reasons = [one for one in result.reasons if not one.code.startswith("release_skew")]
-    reasons += release_reasons(protocol, measured)
+    reasons += release_reasons(drop.model.protocol, measured)
     return replace(
         result,
         verdict=verdict_of(reasons),
@@ -295,14 +325,3 @@ def joint_result(
         alone=result.alone or result.quantities,
         unmatched=unmatched,
     )
-
-
-def _good(
-    results: Sequence[DropResult], adjusted: Mapping[int, Fit | JointDrop]
-) -> dict[tuple[int, int], Fit | JointDrop]:
-    """Return those of some adjusted drops that are good, by run and attempt."""
-    return {
-        (results[n].run.number, results[n].attempt): drop
-        for n, drop in adjusted.items()
-        if results[n].verdict in GOOD
-    }

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rig.analysis.budgets import Budgets
 from rig.analysis.components import stated
-from rig.analysis.joint_fit import FEWEST, joint_fit
-from rig.analysis.session import KEPT, joint_result, sum_up
+from rig.analysis.session import fit_together, sum_up
 from rig.analysis.summary import summarize
 from rig.errors import InputError
-from rig.reasons import make_error, make_reason
+from rig.reasons import make_error
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointDrop, JointFit
-    from rig.analysis.result import Measured
+    from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.protocol.protocol import Protocol
@@ -145,33 +143,31 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
             raise make_error(InputError, "sessions_unlike", path=part.name, other=first.name)
     shared = same_owners(parts, same_rig=same_rig)
     drops = _own(parts, shared)
-    joint, left_out = _fit(parts, drops)
-    results = [
+    together = fit_together(
         {
-            (one.run.number, one.attempt): replace(one, quantities=_unshared(one.quantities))
+            (place, (one.run.number, one.attempt)): replace(
+                one, quantities=_unshared(one.quantities)
+            )
+            for place, part in enumerate(parts)
             for one in (*part.analysis.runs, *part.analysis.superseded)
-        }
-        for part in parts
-    ]
-    if joint is not None:
-        budgets = Budgets(joint)
-        for (place, job), drop in zip(drops, joint.drops, strict=True):
-            protocol, result = parts[place].protocol, results[place][job]
-            results[place][job] = joint_result(protocol, result, drop, budgets)
-    for (place, job), (matched, alone) in left_out.items():
-        result, words = results[place][job], parts[place].protocol.vocabulary
-        why = make_reason("differs_from_session", words, matched=matched, alone=alone)
-        own = result.alone or result.quantities
-        results[place][job] = replace(result, reasons=(*result.reasons, why), quantities=own)
+        },
+        drops,
+    )
+    if not together.settled:
+        every = ", ".join(part.name for part in parts)
+        raise make_error(InputError, "sessions_disagree", names=every)
+    results: list[list[DropResult]] = [[] for _ in parts]
+    for (place, _), result in together.results.items():
+        results[place].append(result)
     fitted = tuple(
-        replace(part, analysis=sum_up(part.protocol, found.values(), part.analysis.joint))
+        replace(part, analysis=sum_up(part.protocol, found, part.analysis.joint))
         for part, found in zip(parts, results, strict=True)
     )
     names = {
         owner: [[parts[place].name for place in group] for group in groups]
         for owner, groups in shared.items()
     }
-    return SessionsFit(fitted, joint, _pooled(fitted), names)
+    return SessionsFit(fitted, together.joint, _pooled(fitted), names)
 
 
 def _unshared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:
@@ -193,36 +189,6 @@ def _own(parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[in
         for place, part in enumerate(parts)
         for job, fit in part.analysis.adjusted.items()
     }
-
-
-def _fit(
-    parts: Sequence[SessionPart], drops: Drops
-) -> tuple[JointFit | None, dict[Key, tuple[int, int]]]:
-    """Fit drops together; those that lose their edges among the others are taken out of them.
-
-    Returns
-    -------
-    joint, left_out
-        The fit, `None` of too few drops; edges that each drop left out keeps, and has by itself.
-    """
-    left_out: dict[Key, tuple[int, int]] = {}
-    size = len(drops)
-    while len(drops) >= FEWEST:
-        joint = joint_fit(list(drops.values()))
-        fewer = {
-            key: (drop.matched, drops[key].matched)
-            for key, drop in zip(drops, joint.drops, strict=joint.settled)
-            if drop.matched < KEPT * drops[key].matched
-        }
-        left_out |= fewer
-        if not joint.settled or 2 * len(left_out) > size:
-            names = ", ".join(part.name for part in parts)
-            raise make_error(InputError, "sessions_disagree", names=names)
-        if not fewer:
-            return joint, left_out
-        for key in fewer:
-            del drops[key]
-    return None, left_out
 
 
 def _pooled(parts: Sequence[SessionPart]) -> tuple[PooledMeans, ...]:
