@@ -10,6 +10,7 @@ from rig.analysis.drop import fit_drop
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.joint_fit import FEWEST, joint_fit
 from rig.analysis.pairs import Effects, effects
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
@@ -93,23 +94,16 @@ class Analysis:
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
-        found: dict[str, Any] = {
-            "runs": [run.json() for run in self.runs],
-            "summary": [line.json() for line in self.summary],
+        where_there_are = {
+            "superseded": self.superseded or None,
+            "summary_with_rejected": self.with_rejected or None,
+            "joint_fit_converged": False if self.unsettled else None,
+            "effects": self.effects or None,
+            "learned": None if self.rig is None else self.rig.learned,
+            "likeness": None if self.rig is None else self.rig.likeness,
         }
-        if self.superseded:
-            found["superseded"] = [run.json() for run in self.superseded]
-        if self.with_rejected:
-            found["summary_with_rejected"] = [line.json() for line in self.with_rejected]
-        if self.unsettled:
-            found["joint_fit_converged"] = False
-        if self.effects:
-            found["effects"] = [one.json() for one in self.effects]
-        if self.rig is not None:
-            found["learned"] = self.rig.learned
-            if self.rig.likeness is not None:
-                found["likeness"] = self.rig.likeness.json()
-        return found
+        more = {name: plain(each) for name, each in where_there_are.items() if each is not None}
+        return attributes(self, "runs", "summary") | more
 
 
 @one_thread

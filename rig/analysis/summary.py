@@ -161,11 +161,7 @@ def _incline(
         run.incline_deg,
         len(results),
         {name: mean(found) for name, found in values.items()},
-        {
-            name: stdev(one.value for one in found)
-            for name, found in values.items()
-            if len(found) > 1
-        },
+        {name: sd for name, found in values.items() if (sd := _scatter(found)) is not None},
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
         condition.impact_chain,
         {

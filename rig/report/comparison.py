@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
 from rig.report.canvas import MODEL, MUTED, canvas
 from rig.report.chapters import Chapter
@@ -16,7 +17,6 @@ from rig.report.tables import bullets, paragraphs, table
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from rig.analysis.summary import Incline
     from rig.measurands import Measurand
     from rig.report.canvas import Canvas
     from rig.results.together import MeanDifference, TogetherResults
@@ -98,19 +98,17 @@ def draw_comparison(results: TogetherResults) -> Canvas:
                 color=MODEL,
                 markersize=4.2,
             )
-            axes.set_yticks(range(len(members)), [_label(one) for one in members])
+            names = [", ".join(filter(None, [one.session, _runs(one)])) for one in members]
+            axes.set_yticks(range(len(members)), names)
             axes.set_ylim(len(members) - 0.5, -0.5)
             axes.set_xlabel(f"difference of {row.title} {row.symbol} ± U ({row.fine})")
     return drawing
 
 
-def _label(difference: MeanDifference) -> str:
-    return ", ".join(filter(None, [difference.session, _runs(difference)]))
-
-
-def _runs(difference: MeanDifference) -> str:
-    """Say of which runs a difference is, where a session has several kinds."""
-    return "" if acceleration_in([difference.quantity]) else str(difference.condition)
+def _runs(mean: MeanDifference | Incline) -> str:
+    """Say of which runs a mean or a difference is, where a session has several kinds."""
+    names = mean.means if isinstance(mean, Incline) else [mean.quantity]
+    return "" if acceleration_in(names) else str(mean.condition)
 
 
 def _tables(
@@ -139,15 +137,10 @@ def _means(results: TogetherResults, row: Measurand) -> list[tuple[str, Incline]
     ]
 
 
-def _where(line: Incline) -> str:
-    """Say of which runs a mean is, where a session has several kinds."""
-    return "" if acceleration_in(line.means) else str(line.condition)
-
-
 def _mean_columns(row: Measurand) -> list[Column[tuple[str, Incline]]]:
     return [
         Column("session", lambda one: one[0], numeric=False),
-        Column("runs", lambda one: _where(one[1]), numeric=False),
+        Column("runs", lambda one: _runs(one[1]), numeric=False),
         Column("n", lambda one: str(one[1].n)),
         Column(
             f"{row.symbol} ± U ({row.unit})",

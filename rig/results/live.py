@@ -112,6 +112,11 @@ class _Scene(NamedTuple):
     known: KnownDrops
     complete: bool
 
+    def fit(self, drop: Drop, scale: TimeScale) -> tuple[DropResult, Fit | None]:
+        """Fit one drop by itself."""
+        run = planned_run(self.plan, drop)
+        return fit_drop(self.protocol, run, drop, scale, known=self.known)
+
 
 class _Analysed(NamedTuple):
     """One drop by itself, at a tick rate."""
@@ -173,10 +178,9 @@ class LiveAnalysis:
         drop
             Recorded in it.
         """
-        protocol, plan, known, _ = self._planned(session)
-        scale = self.clock(session).scale(drop)
-        found, _ = fit_drop(protocol, planned_run(plan, drop), drop, scale, known=known)
-        return veiled_drop(found) if kept_back(session, protocol) else found
+        scene = self._planned(session)
+        result, _ = scene.fit(drop, self.clock(session).scale(drop))
+        return veiled_drop(result) if kept_back(session, scene.protocol) else result
 
     def read(self) -> SessionView:
         """Read the file as it is now; safe in any thread, one at a time.
@@ -248,11 +252,8 @@ class LiveAnalysis:
     def _fit(self, view: SessionView, job: Job) -> Fit | None:
         known = self._known[job]
         if known.fit is None and known.result.verdict in GOOD:
-            drop, scale = view.drops[job], view.scales[job]
-            scene = self._scene
-            assert scene is not None
-            run = scene.plan[job.run]
-            _, fit = fit_drop(scene.protocol, run, drop, scale, known=scene.known)
+            assert self._scene is not None
+            _, fit = self._scene.fit(view.drops[job], view.scales[job])
             self._known[job] = known = known._replace(fit=fit)
         return known.fit
 
@@ -272,19 +273,13 @@ class LiveAnalysis:
 
     def _analyse(self, scene: _Scene, job: Job, drop: Drop, scale: TimeScale) -> None:
         analysed = self._known.get(job)
-        if analysed is None or not _as_good(analysed.hz, scale):
-            protocol, plan, known, _ = scene
-            run = planned_run(plan, drop)
-            result, fit = fit_drop(protocol, run, drop, scale, known=known)
+        if analysed is None or abs(analysed.hz / scale.hz - 1.0) > _SAME_SCALE:
+            result, fit = scene.fit(drop, scale)
+            protocol = scene.protocol
             falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
             gravity = free_gravity(protocol, result, drop, scale) if falls else None
             self._known[job] = _Analysed(scale.hz, result, fit, gravity)
         self.done = len(self._known)
-
-
-def _as_good(hz: float, scale: TimeScale) -> bool:
-    """Whether what was found at one tick rate is still good at another."""
-    return abs(hz / scale.hz - 1.0) <= _SAME_SCALE
 
 
 def _veiled_view(view: SessionView) -> SessionView:

@@ -10,6 +10,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.differences import difference
+from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD
 from rig.analysis.several import SessionPart, fit_sessions
 from rig.analysis.summary import good_cases
@@ -56,15 +57,9 @@ class MeanDifference:
 
     def json(self) -> dict[str, Any]:
         """One member of ``differences``."""
-        return {
-            "session": self.session,
-            "reference": self.reference,
-            **self.condition.json(),
-            "quantity": self.quantity,
-            **self.value.json(),
-            "normalized_error": self.value.normalized_error,
-            "budget": dict(self.value.budget),
-        }
+        sessions = attributes(self, "session", "reference")
+        value = self.value.json() | attributes(self.value, "normalized_error", "budget")
+        return sessions | self.condition.json() | {"quantity": self.quantity} | value
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,6 +55,8 @@ class SessionResults:
 
     Attributes
     ----------
+    analysis, gravity, time_scales
+        See `Finished`.
     simulated
         Whether no chain ever fell.
     clock
@@ -67,22 +69,14 @@ class SessionResults:
         The analysis with its joint fit, where that was just made and asked for.
     """
 
-    finished: Finished
+    analysis: Analysis
+    gravity: GravityCheck | None
+    time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
     simulated: bool
     clock: Calibration
     blind: bool
     digest: str | None
     complete: Analysis | None = None
-
-    @property
-    def analysis(self) -> Analysis:
-        """See `Finished`."""
-        return self.finished.analysis
-
-    @property
-    def gravity(self) -> GravityCheck | None:
-        """See `Finished`."""
-        return self.finished.gravity
 
     @property
     def calibration(self) -> dict[str, Any]:
@@ -107,7 +101,7 @@ class SessionResults:
         """As `rig analyze --json` prints it."""
         said = self.analysis.json()
         for run in (*said["runs"], *said.get("superseded", [])):
-            run["calibration"] = self.finished.time_scales[run["run"], run["attempt"]]
+            run["calibration"] = self.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
         head |= {"blind": True} if self.blind else {}
         better = [one.json() for one in improvements(self.analysis.summary)]
@@ -167,7 +161,7 @@ def results(
         finished = kept.keep(_finished(protocol, complete, drops, clock, blind=blind))
     if blind or not with_joint_fit:
         complete = None
-    return SessionResults(finished, session.simulated, clock, blind, digest, complete)
+    return SessionResults(*finished, session.simulated, clock, blind, digest, complete)
 
 
 def _finished(
