@@ -34,32 +34,20 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """A mean less the model, under one condition.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference(Measured):
+    """A mean less the model, under one condition, m or m/s.
+
+    Its standard uncertainty holds the scatter of falls.
 
     Attributes
     ----------
     n
         Drops in the mean.
-    value, u
-        Difference and its standard uncertainty, which holds the scatter of falls, m or m/s.
     """
 
     condition: Condition
     n: int
-    value: float
-    u: float
-
-    @property
-    def expanded(self) -> float:
-        """Expanded uncertainty for 95 %."""
-        return Measured(self.value, self.u).expanded
-
-    @property
-    def normalized_error(self) -> float | None:
-        """E_n: the difference over its expanded uncertainty; within ±1 both agree (ISO 13528)."""
-        return Measured(self.value, self.u).normalized_error
 
     @property
     def chi2(self) -> float:
@@ -178,8 +166,8 @@ def _compare(name: str, lines: Sequence[_Line]) -> Comparison | None:
         return None
     covariance = covariance[np.ix_(kept, kept)]
     differences = tuple(
-        Difference(lines[n].condition, len(lines[n].values), lines[n].difference, math.sqrt(u2))
-        for n, u2 in zip(kept, np.diag(covariance).tolist(), strict=True)
+        Difference(line.difference, math.sqrt(u2), condition=line.condition, n=len(line.values))
+        for line, u2 in zip((lines[n] for n in kept), np.diag(covariance).tolist(), strict=True)
     )
     off = np.array([one.value for one in differences])
     return Comparison(name, float(off @ np.linalg.solve(covariance, off)), differences)

@@ -99,7 +99,8 @@ def compared(line: Incline) -> Incline:
     return replace(
         line,
         differences={
-            name: Difference(line.condition, line.n, one.value, one.u) for name, one in off.items()
+            name: Difference(one.value, one.u, condition=line.condition, n=line.n)
+            for name, one in off.items()
         },
     )
 
