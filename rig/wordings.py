@@ -155,8 +155,8 @@ WORDINGS: dict[str, Wording] = {
         "incline the surface more, or use fewer rods"),
     "rods_lie": _doubt(
         "rods strike others, which lie up to about {height_m:.0f mm} ± {U95_m:.0f mm} above the "
-        "contact point: lower beams see part of the fall, and V and Δz at level are extrapolated; "
-        "use V and Δz at strike",
+        "contact point: lower beams see part of the fall, and what is at level is extrapolated; "
+        "use what is at strike",
         "incline the surface more, or use fewer or thinner rods", label="rods lie there"),
     "rods_hide_end": _void(
         "rods strike others, which lie up to about {height_m:.0f mm} ± {U95_m:.0f mm} above the "

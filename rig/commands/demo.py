@@ -16,23 +16,24 @@ from rig.commands import report
 from rig.commands.narration import narrator
 from rig.commands.output import VOID, goes_on, say, show
 from rig.errors import InputError
-from rig.estimate.session import estimate
 from rig.files import make_folder, write_atomic
 from rig.measurands import averaged
 from rig.ports import truth_file
-from rig.protocol.reader import parse, read
+from rig.protocol.reader import parse
 from rig.ready import ready_protocol
 from rig.recorder.interrupts import Interrupts
 from rig.report.columns import Column, aligned
 from rig.report.estimate import symbol
 from rig.report.numbers import fixed, plus_minus
+from rig.results.estimated import session_estimate
 from rig.runner import run_protocol
+from rig.session.store import Session
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.session import Analysis
-    from rig.protocol.protocol import Protocol
+    from rig.results import SessionResults
 
 _PROTOCOL = "inclined-uniform"
 _REPEATS = "repeats: 12 "
@@ -65,10 +66,17 @@ def _dropped(protocol: Path, session: Path, arguments: Namespace) -> int:
         )
     print("SIMULATED DATA")
     print("\n".join(beside_truth(found.analysis, session)))
-    show([impacts(read(protocol), found.analysis)])
+    with Session.open(session, readonly=True) as recorded:
+        show([impacts(recorded, found)])
     page = session.with_name("report.html")
     code = report.main(
-        Namespace(session=str(session), output=str(page), figures=str(page.parent), bars="U95")
+        Namespace(
+            session=str(session),
+            output=str(page),
+            figures=str(page.parent),
+            bars="U95",
+            fresh=False,
+        )
     )
     if arguments.open or _has_screen():
         import webbrowser  # noqa: PLC0415 - only where somebody looks
@@ -123,10 +131,10 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     ]
 
 
-def impacts(protocol: Protocol, analysis: Analysis) -> str:
+def impacts(session: Session, results: SessionResults) -> str:
     """Say which β and μ the drops tell, beside those that the simulated board has."""
     try:
-        found = estimate(protocol, analysis).coefficients
+        found = session_estimate(session, results).coefficients
     except InputError as error:
         return error.message
     parts = [

@@ -137,7 +137,7 @@ def test_a_title_cannot_break_the_page(call, tmp_path):
     ("command", "work", "place"),
     [
         (["report", "SESSION", "-o"], "report.results", "none/r.html"),
-        (["estimate", "SESSION", "-o"], "estimate.detailed", "file/figures"),
+        (["estimate", "SESSION", "-o"], "estimate.results", "file/figures"),
         (["export", "SESSION", "--csv"], "export.results", "file/tables"),
         (["design", PROTOCOLS / "picket-fence.yaml", "-o"], "design.better", "none/new.yaml"),
         (["predict", "--figure", "3", "-o"], "predict._table", "none/figure.svg"),

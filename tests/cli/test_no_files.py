@@ -22,6 +22,7 @@ COMMANDS = {
     ("analyze", "session"): "X",
     ("analyze", "video"): "SESSION --video X",
     ("check", "protocol"): "X",
+    ("compare", "session"): "X SESSION",
     ("design", "learned"): "FENCE --learned X",
     ("design", "protocol"): "X",
     ("doctor", "session"): "--session X",

@@ -123,7 +123,7 @@ def refused(code, kind, *paths, **options):
 
 
 def test_what_has_no_incline_in_common_is_refused(tmp_path):
-    changes = (("", ""), ("incline: [40 deg]", "incline: [50 deg]"))
+    changes = (("", ""), ("incline: 40 deg", "incline: 50 deg"))
     first, other = (
         record(tmp_path, f"s{n}", "single-chain", series=n, change=change)
         for n, change in enumerate(changes, 1)
