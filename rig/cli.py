@@ -212,7 +212,7 @@ def _parser() -> Parser:
     _json(design)
 
     predict = command("predict", "print the predictions of the model")
-    predict.value("protocol", "PROTOCOL", "the protocol file (YAML)", nargs="?")
+    _protocol(predict, nargs="?")
     predict.add_argument(
         "--figure", type=int, choices=(3, 4, 6), help="draw this figure of the paper"
     )
@@ -289,6 +289,7 @@ def _parser() -> Parser:
         "write the comparison as a page (.html), or its figure (.svg, .png, .pdf)",
         type=_place("comparison.html"),
     )
+    _fresh(compare)
     _json(compare)
 
     estimated = command("estimate", "estimate restitution, friction and impulses from a session")

@@ -36,12 +36,11 @@ def main(arguments: Namespace) -> int:
     else:
         show(difference_lines(found))
     if arguments.output is not None:
-        path = Path(arguments.output)
-        if path.suffix in {".html", ".htm"}:
-            write_atomic(path, comparison_page(found))
+        if arguments.output.endswith((".html", ".htm")):
+            write_atomic(arguments.output, comparison_page(found))
         else:
-            write_figure(path, draw_comparison(found))
-        say(f"comparison: {path}")
+            write_figure(Path(arguments.output), draw_comparison(found))
+        say(f"comparison: {arguments.output}")
     return 0
 
 
@@ -70,5 +69,6 @@ def read_together(arguments: Namespace) -> TogetherResults:
             files,
             same_rig=arguments.same_rig,
             unfinished=arguments.unfinished,
+            fresh=arguments.fresh,
             progress=progress("analysing run"),
         )

@@ -81,10 +81,11 @@ def comparison_page(results: TogetherResults) -> str:
 
 def draw_comparison(results: TogetherResults) -> Canvas:
     """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
+    differences = results.differences()
     panels = [
         (row, members)
         for row in averaged()
-        if (members := [one for one in results.differences() if one.quantity == row.name])
+        if (members := [one for one in differences if one.quantity == row.name])
     ]
     heights = tuple(0.7 + 0.25 * len(members) for _, members in panels)
     with canvas(heights, simulated=results.simulated, sharex=False) as drawing:

@@ -194,6 +194,7 @@ def results_together(
     *,
     same_rig: bool | None = None,
     unfinished: bool = False,
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> TogetherResults:
     """Analyse several sessions in one joint fit.
@@ -206,7 +207,7 @@ def results_together(
         See `rig.analysis.several.same_owners`.
     unfinished
         Whether planned runs may be missing.
-    progress
+    fresh, progress
         As for `rig.results.results`, for one session after the other.
 
     Raises
@@ -215,14 +216,13 @@ def results_together(
         A session cannot be added to the others.
     """
     _check_repeats(files)
-    names = _names(files)
     parts, own = [], {}
-    for name, session in zip(names, files, strict=True):
+    for name, session in zip(_names(files), files, strict=True):
         protocol = protocol_of(session)
         check_open(session, protocol)
-        own[name] = found = results(session, progress, with_joint_fit=True)
-        analysis = complete_analysis(session, found, progress)
+        own[name] = found = results(session, progress, fresh=fresh, with_joint_fit=True)
         _check_whole(session, found, len(planned_runs(protocol)), unfinished=unfinished)
+        analysis = complete_analysis(session, found, progress)
         boards = [identity.get("unique_id", "") for _, identity in session.identities()]
         parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
     return TogetherResults(own, fit_sessions(parts, same_rig=same_rig))

@@ -159,9 +159,8 @@ def results(
         known = known or KnownDrops(protocol, blind=blind, fresh=fresh)
         complete = analyze(protocol, drops, clock.scale, causes, progress, known)
         finished = kept.keep(_finished(protocol, complete, drops, clock, blind=blind))
-    if blind or not with_joint_fit:
-        complete = None
-    return SessionResults(*finished, session.simulated, clock, blind, digest, complete)
+    held = complete if with_joint_fit and not blind else None
+    return SessionResults(*finished, session.simulated, clock, blind, digest, held)
 
 
 def _finished(
@@ -205,9 +204,7 @@ def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
     return {"gravity": check.json(), "notes": notes}
 
 
-def detailed(
-    session: Reader, progress: Progress | None = None, *, fresh: bool = False
-) -> tuple[Analysis, Calibration]:
+def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
     """Analyse a session and keep everything, each edge's rod too.
 
     Raises
@@ -221,8 +218,7 @@ def detailed(
         clock = Calibrator().look(session, protocol.reference_u)
         drops = list(session.drops())
         causes = rejected(session)
-    known = KnownDrops(protocol, fresh=fresh)
-    return analyze(protocol, drops, clock.scale, causes, progress, known), clock
+    return analyze(protocol, drops, clock.scale, causes, progress, KnownDrops(protocol)), clock
 
 
 def rejected(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:

@@ -62,6 +62,11 @@ def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call)
     assert said["learned"]["runs"] == 8
 
 
+def test_nothing_that_is_kept_is_used_where_that_is_asked_for(two, call, monkeypatch):  # noqa: F811
+    monkeypatch.setattr("rig.cache.store.CacheFile.get", None)
+    assert call("compare", *two, "--fresh").code == 0
+
+
 def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
     one = together(*two, same_rig=True).fit.joint.shared.blocks
     each = together(*two, same_rig=False).fit.joint.shared.blocks
@@ -116,9 +121,9 @@ def test_every_scene_is_compared(tmp_path, call, scene):  # noqa: F811
     assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
 
 
-def refused(code, kind, *paths, **options):
+def refused(code, kind, *paths, work=together):
     with pytest.raises(kind) as caught:
-        together(*paths, **options)
+        work(*paths)
     assert [reason.code for reason in caught.value.reasons] == [code]
 
 
@@ -129,9 +134,7 @@ def test_what_has_no_incline_in_common_is_refused(tmp_path):
         for n, change in enumerate(changes, 1)
     )
     found = together(first, other)
-    with pytest.raises(InputError) as caught:
-        found.differences()
-    assert [reason.code for reason in caught.value.reasons] == ["nothing_to_compare"]
+    refused("nothing_to_compare", InputError, work=found.differences)
     assert [line.incline_deg for line in found.summary] == [40.0, 50.0]
 
 
