@@ -10,16 +10,17 @@ import sys
 import threading
 from contextlib import contextmanager
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
-from rig.boards import BOARDS, FLASHED
-from rig.command_help import Parser, overview, runnable
+from rig.command_help import build_parser, runnable
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+
+    from rig.command_help import Parser
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -114,343 +115,7 @@ def _put_in_order() -> Iterator[None]:
 
 
 def _parser() -> Parser:
-    parser = Parser(
-        prog="rig",
-        usage="rig [-h] [--version] COMMAND ...",
-        description="Lab-rig controller for falling-chain and photogate experiments.",
-    )
-    parser.add_argument("--version", action="version", version=f"rig {__version__}")
-    commands = parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)
-    texts: dict[str, str] = {}
-
-    def command(name: str, text: str, module: str = "") -> Parser:
-        texts[name] = text
-        added = commands.add_parser(name, description=text)
-        added.set_defaults(module=module or name)
-        return added
-
-    demo = command("demo", "simulate drops of two chains and compare results with the hidden truth")
-    demo.value("-o --output", "DIR", "folder for all files (default: out/…)")
-    demo.value("--repeats", "N", "drops at each incline (default 1)", type=_count, default=1)
-    demo.value("--seed", "N", "of the simulation (default 1)", type=_seed, default=1)
-    demo.flag("--open", "always show the report in a browser")
-
-    new = command("new", "ask a few questions, write a protocol, draw it and simulate it")
-    new.value("output", "FILE.yaml", "the new protocol", type=_place("protocol.yaml"))
-    new.add_argument(
-        "--scene",
-        choices=("two-chains", "one-chain", "object", "track", "picket-fence"),
-        help="what you drop; an object is a ball, a card or a cylinder",
-    )
-    new.add_argument("--board", choices=(*BOARDS, "other"), help="the timer")
-    new.value("--gates", "N", "number of photogates")
-    new.value("--rods", "N", "number of rods of a chain or bars of a fence")
-    new.value("--length", "L", 'of a chain or a fence, such as "1165 mm"')
-    new.value("--diameter", "D", "of a rod; for an object its length in a beam")
-    new.add_argument(
-        "--aim", choices=("separation", "speed", "coefficients"), help="what to measure"
-    )
-    new.value("--incline", "A", 'of the board or the track, such as "40 deg, 60 deg"')
-    new.value("--drop", "H", 'drop height, such as "180 mm ± 2 mm"')
-    new.value("--repeats", "N", "number of drops at each incline")
-    new.value("--title", "TEXT", "of the protocol (default: the name of the file)")
-    new.flag("--yes", "accept the defaults without questions")
-
-    run = command("run", "run a protocol, or continue it")
-    _protocol(run)
-    run.add_argument(
-        "--port", type=_port, required=True, help="device path or URL; sim:// needs no hardware"
-    )
-    run.value("--session", "FILE", "a new file, or a session to continue", required=True)
-    run.value("--seed", "N", "of a simulation (default 0)", type=_seed)
-    run.flag("--yes", "do not wait for Enter; implied without a terminal")
-    _json(run)
-    run.value("--socket", "PATH", "socket of the daemon (default: the usual place)")
-
-    daemon = command("daemon", "keep a port and its session open for several clients")
-    daemon.add_argument("--port", type=_port, required=True, help="device path or URL")
-    daemon.value("--socket", "PATH", "socket for clients (default: the usual place)")
-    daemon.flag("--tcp", "listen on a port of 127.0.0.1, for programs without Unix sockets")
-    daemon.value(
-        "--idle-timeout",
-        "S",
-        "end after so many seconds without a client, if no drop is armed, running or "
-        "unsaved (default: run until a signal comes)",
-        type=_seconds,
-    )
-
-    _tui(command("tui", "run and watch a lab session in the terminal"))
-
-    check = command("check", "check a protocol: its scene, gates, plan and limits")
-    _protocol(check, nargs="?")
-    check.flag("--keys", "list every key that a protocol accepts")
-    check.flag("--schema", "print the keys as a JSON Schema, for editors")
-    check.add_argument("--board", choices=tuple(BOARDS), help="report what this board cannot do")
-    check.value(
-        "-o --output",
-        "FILE",
-        "draw how to mount the gates (.svg, .png, .pdf)",
-        type=_place("mounting.svg"),
-    )
-
-    design = command(
-        "design", "predict the uncertainties of a gate layout, and propose better heights"
-    )
-    _protocol(design)
-    design.value(
-        "-o --output",
-        "NEW.yaml",
-        "write the protocol with the proposed heights",
-        type=_place("proposed.yaml"),
-    )
-    design.value("--repeats", "N", "drops at each incline", type=_count)
-    design.value("--learned", "SESSION", "take the scatter from an earlier session of the same rig")
-    design.value("--lowest", "H", 'lowest beam, such as "20 mm" (default: as now)')
-    design.value("--highest", "H", "highest beam (default: as now)")
-    design.value("--spacing", "D", "least distance of two beams (default 10 mm)")
-    design.flag("--no-search", "only predict the layout of the protocol")
-    _json(design)
-
-    predict = command("predict", "print the predictions of the model")
-    _protocol(predict, nargs="?")
-    predict.add_argument(
-        "--figure", type=int, choices=(3, 4, 6), help="draw this figure of the paper"
-    )
-    predict.value(
-        "-o --output",
-        "FILE.svg",
-        "the figure (.svg, .png or .pdf); its numbers go to FILE.csv",
-        type=_place("figure.svg"),
-    )
-    predict.flag("--resolved", "add drops simulated rod by rod (figures 3 and 4)")
-    _json(predict)
-
-    _sweep(command("sweep", "map the model's Δz and V over a grid of parameters"))
-
-    imported = command("import", "make a session from the data of another timer", "import_edges")
-    imported.value(
-        "events",
-        "EVENTS",
-        "columns run,channel,time_s,state; any other timer's table of times; samples of a "
-        "logic analyser or an oscilloscope; a value change dump",
-    )
-    imported.value("--protocol", "FILE", "the protocol of these drops", required=True)
-    imported.value("-o --session", "FILE", "the new session")
-    imported.flag("--dry-run", "show how the file is read, without a session")
-    imported.value("--channel", "N", "channel of the gate, if the file has one gate", type=int)
-    imported.value("--map", "D0=2,D1=5", "channel of each input of the file; also: --map D0=2 D1=5")
-    imported.add_argument(
-        "--unit",
-        choices=("s", "ms", "us", "ns"),
-        help="unit of the times, if the file does not state it",
-    )
-    imported.add_argument(
-        "--dark",
-        choices=("high", "low", "turns", "turns-clear", "each"),
-        help="level of a signal while its beam is blocked; of times alone: beams darken and clear "
-        "in turns, clear first, or darken at each",
-    )
-    imported.value("--map-file", "FILE", "save how the file is read, or use what was saved")
-    imported.flag("--as-read", "do not compare the drops with the protocol's falls")
-    imported.flag("--allow-unused", "accept rows of which no edge is made")
-    imported.add_argument("--list-formats", action=_ListFormats, nargs=0, help="list known formats")
-    imported.value(
-        "--clock-uncertainty",
-        "U",
-        'relative standard uncertainty of the timer, such as "50 ppm" (default 0.29 %%: a '
-        "ceramic resonator)",
-    )
-    imported.flag("--simulated", "the edges come from a simulation")
-
-    analyze = command("analyze", "compute the results of a session, or of several together")
-    _session(analyze)
-    _together(analyze, "*")
-    analyze.value("--budget", "RUN", "uncertainty budget of this run", type=_count)
-    analyze.value(
-        "--trials",
-        "M",
-        "Monte Carlo trials for the budget (default: until they tell whether both agree, at "
-        "most 1600); adaptive: until u has one stable digit",
-        type=_trials,
-    )
-    analyze.value("--session-trials", "M", "Monte Carlo trials of the joint fit", type=_count)
-    analyze.flag("--scatter", "SD, SE and U of each mean, and half-SD bars")
-    analyze.value("--video", "FILE", "compare with t, x, y of a tracked video of the same drop")
-    analyze.flag("--priors", "show how each prior changes the results; takes longer")
-    _fresh(analyze)
-    _json(analyze)
-
-    compare = command("compare", "compare the means of sessions with those of the first one")
-    _session(compare)
-    _together(compare, "+")
-    compare.value(
-        "-o --output",
-        "FILE",
-        "write the comparison as a page (.html), or its figure (.svg, .png, .pdf)",
-        type=_place("comparison.html"),
-    )
-    _fresh(compare)
-    _json(compare)
-
-    estimated = command("estimate", "estimate restitution, friction and impulses from a session")
-    _session(estimated)
-    estimated.value("-o --output", "DIR", "folder for pictures as SVG files")
-    _fresh(estimated)
-    _json(estimated)
-
-    report = command("report", "write the results of a session as one HTML page")
-    _session(report)
-    report.value("-o --output", "FILE", "the page", required=True, type=_place("report.html"))
-    report.value("--figures", "DIR", "folder for the figures as SVG files too")
-    report.add_argument(
-        "--bars",
-        choices=["U95", "u", "SE", "SD", "half-SD"],
-        default="U95",
-        help="meaning of the error bars; half-SD is that of the paper",
-    )
-    _fresh(report)
-
-    export = command("export", "write a session's results and edges as CSV files")
-    _session(export)
-    export.value("--csv", "DIR", "folder for the files", required=True)
-    _fresh(export)
-
-    recover = command("recover", "list what can be read of a damaged session file, and save it")
-    _session(recover)
-    recover.value(
-        "-o --output",
-        "NEW",
-        "save all that can be read in a new file",
-        type=_place("recovered.session"),
-    )
-    recover.value("--protocol", "FILE", "the protocol file, if the session has lost it")
-
-    _session(command("unblind", "show the results of a blind session; the session records it"))
-
-    _session(command("replay", "analyse the recorded bytes again and compare the results"))
-
-    flash = command("flash", "write the firmware onto a board and verify it")
-    flash.add_argument(
-        "--board",
-        required=True,
-        choices=tuple(FLASHED),
-        help="its kind; nano-old: a Nano whose boot loader listens at 57,600 baud only",
-    )
-    flash.value(
-        "--port", "PATH", "its device, such as /dev/ttyACM0; not wanted of a Pico", type=_port
-    )
-    flash.value("--drive", "DIR", "of a Pico: where its drive is mounted, if not found by itself")
-    flash.value(
-        "--hex", "FILE", "the firmware, if not the one that comes with this program; UF2 for a Pico"
-    )
-    flash.value("--avrdude", "PATH", "where avrdude is, if not found by itself")
-
-    ports = command("ports", "list the ports where a board may be; opens none by itself")
-    ports.value(
-        "--identify",
-        "PORT",
-        "ask who is there: at these ports, or else at every candidate; opening a port "
-        "restarts the board behind it",
-        nargs="*",
-    )
-    _json(ports)
-
-    doctor = command("doctor", "look for what is wrong with this computer, a board or a session")
-    doctor.add_argument("--port", type=_port, help="also this board: device path or URL")
-    doctor.value("--session", "FILE", "also this session, and its disk")
-    doctor.flag("--clear-cache", "forget all kept results")
-    _json(doctor)
-
-    selftest = command("selftest", "have a board prove that it does what it must")
-    selftest.add_argument("--port", type=_port, required=True, help="device path or URL")
-    selftest.value(
-        "--loopback",
-        "GATE",
-        "a wire joins the sync output to this gate: measure how exactly FIRE is stamped",
-        type=int,
-        choices=range(16),
-    )
-    selftest.value("--drops", "N", "for that measurement (default 20)", type=_count, default=20)
-    selftest.flag(
-        "--release", "allow release 0 to be driven, once for 50 ms; without it no release ever is"
-    )
-    _json(selftest)
-
-    completion = command("completion", "print what a shell reads to complete what is typed")
-    completion.add_argument("shell", choices=("bash", "zsh", "fish"), help="which shell")
-
-    bench = command("bench", "error against run time, extremes, and what scenes cost")
-    benches = bench.add_subparsers(required=True, metavar="BENCH")
-    stability = benches.add_parser("stability", help="the model at the ends of what can be asked")
-    stability.set_defaults(module="bench_stability")
-    stability.value("-o --output", "DIR", "folder for page, CSV and JSON")
-    _json(stability)
-    precision = benches.add_parser("precision", help="error against run time of every method")
-    precision.set_defaults(module="bench_precision")
-    precision.value("-o --output", "DIR", "folder for page, CSV, JSON and pictures", required=True)
-    precision.flag("--quick", "a small subset, in seconds")
-    _json(precision)
-    scenes = benches.add_parser("scenes", help="what each scene loads, takes and evaluates")
-    scenes.set_defaults(module="bench_scenes")
-    scenes.value("--protocols", "DIR", "ready protocols to be measured too", default="protocols")
-    scenes.value("--rounds", "N", "of timing", type=_count, default=9)
-    scenes.value("-o --output", "DIR", "folder for page, CSV, JSON and picture")
-    _json(scenes)
-    parser.epilog = (
-        f"{overview(texts)}\n\nExit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a "
-        "run was\nvoid, 4 device trouble, 130 interrupted. rig replay: 1 the results differ."
-    )
-    return parser
-
-
-def _tui(tui: Parser) -> None:
-    tui.value("protocol", "PROTOCOL", "protocol file (default: choose it on the screen)", nargs="?")
-    tui.add_argument(
-        "--port",
-        type=_port,
-        help="device path or URL, such as sim://?pace=1; starts a daemon if none runs. "
-        "Without --port: watch the running daemon",
-    )
-    tui.value(
-        "--session", "FILE", "a new file, or a session to continue; alone: show it without a daemon"
-    )
-    tui.value("--seed", "N", "of a simulation (default 0)", type=_seed)
-    tui.value("--socket", "PATH", "socket of the daemon (default: the usual place)")
-    tui.value("--keys", "FILE", "your own keys (TOML)")
-    tui.flag("--bell", "ring the bell at every verdict")
-    tui.flag("--ascii", "use ASCII characters only")
-
-
-def _sweep(sweep: Parser) -> None:
-    _protocol(sweep)
-    sweep.value(
-        "--vary",
-        "NAME=LOW..HIGH:COUNT",
-        "an axis, as in restitution=-0.4..0.9:200 or drop=100mm..300mm:50; once for each "
-        "axis. NAME=VALUE, as in incline=40deg, holds a parameter at another value than the "
-        "protocol's. Where the plan has several inclines and none is given here, each is a layer: "
-        "an axis of its own",
-        action="append",
-        required=True,
-    )
-    sweep.value(
-        "-o --output",
-        "FILE",
-        "its ending chooses the kind: .csv a row a point; .npz arrays; .svg, .png or .pdf "
-        "curves or two maps, of one or two axes at one incline",
-        required=True,
-        type=_place("sweep.csv"),
-    )
-    who = sweep.add_mutually_exclusive_group()
-    who.add_argument(
-        "--jobs", type=_count, metavar="N", help="processes at most (default: one a core)"
-    )
-    who.add_argument(
-        "--cluster",
-        metavar="ADDRESS",
-        help="compute on a Dask cluster instead, such as tcp://lab-server:8786; its workers need "
-        "the same chainrig",
-    )
+    return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"})
 
 
 def _count(text: str) -> int:
@@ -505,31 +170,21 @@ def _place(name: str) -> Callable[[str], str]:
     return place
 
 
-def _protocol(parser: Parser, nargs: str | None = None) -> None:
-    parser.value("protocol", "PROTOCOL", "the protocol file (YAML)", nargs=nargs)
+def _typed(read: Callable[[str], object]) -> Callable[[str], dict[str, Any]]:
+    return lambda _: {"type": read}
 
 
-def _session(parser: Parser) -> None:
-    parser.value("session", "SESSION", "the session file")
-
-
-def _fresh(parser: Parser) -> None:
-    parser.flag("--fresh", "compute everything again, use no kept results")
-
-
-def _together(parser: Parser, nargs: str) -> None:
-    parser.value("others", "SESSION", "further sessions", nargs=nargs)
-    parser.add_argument(
-        "--same-rig",
-        action=argparse.BooleanOptionalAction,
-        help="whether several sessions have the same posts, gates and chains (default: those with "
-        "the same title and board, as far as their protocols agree)",
-    )
-    parser.flag("--unfinished", "add sessions whose plan is not finished too")
-
-
-def _json(parser: Parser) -> None:
-    parser.flag("--json", "print JSON instead of a table")
+_KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
+    "int": _typed(int),
+    "count": _typed(_count),
+    "trials": _typed(_trials),
+    "seed": _typed(_seed),
+    "port": _typed(_port),
+    "seconds": _typed(_seconds),
+    "file": lambda name: {"type": _place(name)},
+    "formats": lambda _: {"action": _ListFormats, "nargs": 0},
+}
+"""Kinds of values that `rig.command_help` names, as argparse takes them."""
 
 
 if __name__ == "__main__":

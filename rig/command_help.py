@@ -1,4 +1,4 @@
-"""Help of the command line: commands in groups, two examples each, spelling, the program's name."""
+"""The command line as ``command_help.txt`` describes it: the parser, its help and its mistakes."""
 
 from __future__ import annotations
 
@@ -7,82 +7,46 @@ import os
 import re
 import sys
 from functools import cache
-from typing import TYPE_CHECKING, Any, NoReturn
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from rig.streams import say
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-GROUPS: dict[str, tuple[str, ...]] = {
-    "The first minutes": ("demo", "new"),
-    "Before a session": ("check", "predict", "design", "sweep"),
-    "The board": ("ports", "flash", "selftest", "doctor"),
-    "A session": ("run", "tui", "daemon", "import"),
-    "Results": (
-        "analyze",
-        "compare",
-        "report",
-        "estimate",
-        "export",
-        "unblind",
-        "replay",
-        "recover",
-    ),
-    "Studies of the program itself": ("bench",),
-    "The shell": ("completion",),
-}
-"""Every command, in the order in which they are met."""
-
-EXAMPLES: dict[str, tuple[str, ...]] = {
-    "new": ("rig new my-ball.yaml",
-            'rig new my-chains.yaml --scene two-chains --board mega --gates 8 --yes'),
-    "demo": ("rig demo", "rig demo --repeats 12 -o my-demo"),
-    "check": ("rig check protocols/inclined-uniform.yaml", "rig check --keys"),
-    "predict": ("rig predict protocols/graded-chain.yaml", "rig predict --figure 3 -o figure.svg"),
-    "design": (
-        "rig design protocols/inclined-uniform.yaml",
-        "rig design protocols/inclined-uniform.yaml --repeats 4",
-    ),
-    "sweep": (
-        "rig sweep protocols/single-chain.yaml --vary friction=0..0.4:50 -o sweep.svg",
-        "rig sweep protocols/inclined-uniform.yaml --vary drop=100mm..300mm:20 -o sweep.csv",
-    ),
-    "ports": ("rig ports", "rig ports --json"),
-    "flash": ("rig flash --board mega --port /dev/ttyACM0", "rig flash --board uno --port COM3"),
-    "selftest": ("rig selftest --port /dev/ttyACM0", "rig selftest --port sim:// --release"),
-    "doctor": ("rig doctor", "rig doctor --port /dev/ttyACM0 --session my.session"),
-    "run": (
-        "rig run protocols/single-chain.yaml --port sim:// --session my.session",
-        "rig run my-chains.yaml --port /dev/ttyACM0 --session my.session --yes",
-    ),
-    "tui": (
-        "rig tui protocols/inclined-uniform.yaml --port sim:// --session my.session",
-        "rig tui --session my.session",
-    ),
-    "daemon": ("rig daemon --port /dev/ttyACM0", "rig daemon --port sim:// --tcp"),
-    "import": (
-        "rig import edges.csv --protocol my-chains.yaml --session my.session",
-        "rig import logger.txt --protocol my-chains.yaml --dry-run",
-    ),
-    "analyze": ("rig analyze my.session", "rig analyze my.session --budget 1"),
-    "compare": ("rig compare before.session after.session",
-                "rig compare group-1.session group-2.session -o groups.html"),
-    "report": ("rig report my.session -o report.html",
-               "rig report my.session -o report.html --figures my-figures"),
-    "estimate": ("rig estimate my.session", "rig estimate my.session -o my-pictures"),
-    "export": ("rig export my.session --csv my-csv",
-               "rig export my.session --csv /tmp/for-a-spreadsheet"),
-    "unblind": ("rig unblind my.session", "rig unblind my.session && rig analyze my.session"),
-    "replay": ("rig replay my.session", "rig replay old.session"),
-    "recover": ("rig recover my.session", "rig recover my.session -o saved.session"),
-    "completion": ("rig completion bash", "rig completion fish"),
-    "bench": ("rig bench stability", "rig bench scenes -o my-folder"),
-}  # fmt: skip
+    from collections.abc import Callable, Mapping, Sequence
 
 
-_COMMANDS = "|".join(sum(GROUPS.values(), ()))
-_NAMED = re.compile(rf"(?<![\w/.-])rig (?=(?:{_COMMANDS}|--help)(?![\w:-]))")
+class Command(NamedTuple):
+    """One command, or one of two words below another.
+
+    `arguments` are rows for `_add_argument`, `examples` whole command lines.
+    """
+
+    name: str
+    text: str
+    arguments: list[str]
+    examples: list[str]
+
+
+def _read_page(page: str) -> dict[str, list[Command]]:
+    """Return the commands of each group."""
+    groups: dict[str, list[Command]] = {}
+    for paragraph in page.strip().split("\n\n"):
+        head, *lines = paragraph.splitlines()
+        if head.startswith("## "):
+            groups[head.removeprefix("## ")] = commands = []
+        elif not head.startswith("#"):
+            examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
+            name, text = head.split(": ", 1)
+            commands.append(Command(name, text, lines[: len(lines) - len(examples)], examples))
+    return groups
+
+
+GROUPS = _read_page(Path(__file__).with_suffix(".txt").read_text("utf-8"))
+"""Every command by its group, in the order in which they are met."""
+COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
+
+_NAMED = re.compile(rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))")
 """A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
 
 
@@ -125,22 +89,10 @@ def _join_pairs(typed: Sequence[str]) -> list[str]:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose mistakes name what was meant, and whose help has groups and examples."""
+    """A parser whose mistakes name what was meant."""
 
     def __init__(self, **options: Any) -> None:
-        options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
-        super().__init__(**options)
-        examples = EXAMPLES.get(self.prog.removeprefix("rig "))
-        if examples:
-            self.epilog = "\n  ".join(["examples:", *examples])
-
-    def flag(self, name: str, text: str) -> None:
-        """Accept an option that is there or not."""
-        self.add_argument(name, action="store_true", help=text)
-
-    def value(self, names: str, metavar: str, text: str, **kind: Any) -> None:
-        """Accept an option or an argument with a value; `kind` is as argparse takes it."""
-        self.add_argument(*names.split(), metavar=metavar, help=text, **kind)
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
 
     def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
         """Parse; what is left over is the mistake of the sub-command that was named."""
@@ -162,10 +114,10 @@ class Parser(argparse.ArgumentParser):
         if action.choices is not None and value not in action.choices:
             from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
 
-            known = list(map(str, action.choices))
-            near = get_close_matches(str(value), known, n=1)
-            guess = f"did you mean {near[0]}? " if near else ""
-            message = f"found '{value}'; {guess}accepted: {', '.join(known)}"
+            accepted = list(map(str, action.choices))
+            likely = get_close_matches(str(value), accepted, n=1)
+            guess = f"did you mean {likely[0]}? " if likely else ""
+            message = f"found '{value}'; {guess}accepted: {', '.join(accepted)}"
             raise argparse.ArgumentError(action, message)
 
     def error(self, message: str) -> NoReturn:
@@ -174,15 +126,88 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
-def overview(texts: dict[str, str]) -> str:
-    """All commands with what they do, in groups.
+_WORDS: dict[str, dict[str, Any]] = {
+    "flag": {"action": "store_true"},
+    "yes-no": {"action": argparse.BooleanOptionalAction},
+    "append": {"action": "append"},
+    "required": {"required": True},
+    "either": {},
+    "?": {"nargs": "?"},
+    "*": {"nargs": "*"},
+    "+": {"nargs": "+"},
+}
+"""What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``
+and kinds of values; of several with ``either`` only one is accepted."""
+
+
+def _add_argument(
+    parser: Parser | argparse._MutuallyExclusiveGroup,
+    row: str,
+    kinds: Mapping[str, Callable[[str], dict[str, Any]]],
+) -> None:
+    """Accept what a row of the page describes."""
+    names, words, text = (part.strip() for part in row.split("|", 2))
+    *flags, metavar = names.split()
+    options: dict[str, Any] = {"help": text.replace("%", "%%")}
+    if not flags or metavar.startswith("-"):
+        flags.append(metavar)
+    else:
+        options["metavar"] = metavar
+    for word in words.split():
+        if word in _WORDS:
+            options |= _WORDS[word]
+        elif word.startswith("="):
+            options["default"] = word.removeprefix("=")
+        elif word.startswith("{"):
+            options["choices"] = list(map(options.get("type", str), word.strip("{}").split(",")))
+        else:
+            kind, _, detail = word.partition(":")
+            options |= kinds[kind](detail)
+    parser.add_argument(*flags, **options)
+
+
+def build_parser(
+    version: str, kinds: Mapping[str, Callable[[str], dict[str, Any]]], modules: Mapping[str, str]
+) -> Parser:
+    """Make the parser of all commands.
 
     Parameters
     ----------
-    texts
-        One line on each command.
+    version
+        What ``--version`` prints.
+    kinds
+        What argparse needs to know of each kind of value: of what stands behind its colon.
+    modules
+        Modules of commands whose names are not theirs.
     """
     lines = []
-    for group, names in GROUPS.items():
-        lines += ["", f"{group}:", *(f"  {name:<12}{texts[name]}" for name in names)]
-    return "\n".join(lines)
+    for group, commands in GROUPS.items():
+        top = (command for command in commands if " " not in command.name)
+        lines += ["", f"{group}:", *(f"  {command.name:<12}{command.text}" for command in top)]
+    parser = Parser(
+        prog="rig",
+        usage="rig [-h] [--version] COMMAND ...",
+        description="Lab-rig controller for falling-chain and photogate experiments.",
+        epilog="\n".join(lines) + "\n\n"
+        "Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was\n"
+        "void, 4 device trouble, 130 interrupted. rig replay: 1 the results differ.",
+    )
+    parser.add_argument("--version", action="version", version=version)
+    below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
+    parsers: dict[str, Parser] = {}
+    for name, command in COMMANDS.items():
+        outer, _, last = name.rpartition(" ")
+        if outer not in below:
+            below[outer] = parsers[outer].add_subparsers(required=True, metavar=outer.upper())
+        examples = "\n  ".join(["examples:", *command.examples]) if command.examples else None
+        options: dict[str, Any] = {"help": command.text} if outer else {}
+        parsers[name] = below[outer].add_parser(
+            last, description=command.text, epilog=examples, **options
+        )
+        parsers[name].set_defaults(module=modules.get(name, name.replace(" ", "_")))
+        either = None
+        for row in command.arguments:
+            if " either " in row:
+                either = either or parsers[name].add_mutually_exclusive_group()
+            _add_argument(either if either and " either " in row else parsers[name], row, kinds)
+    return parser

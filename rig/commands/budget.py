@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
-from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
 from rig.cache.entry import recall
 from rig.commands.output import print_found, tell_damage
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from rig.analysis.monte_carlo import Propagated
+    from rig.analysis.result import Measured
     from rig.analysis.session import Analysis
     from rig.measurands import Measurand
     from rig.results import SessionResults
@@ -42,8 +41,8 @@ def main(arguments: Namespace) -> int:
         asked, fresh = (arguments.budget, arguments.trials, SEED), arguments.fresh
         whole = results(session, fresh=fresh)
         make = partial(budget, session, whole, *asked)
-        found = recall(dict, make, "budget", whole.digest, asked, fresh=fresh)
-    print_found(found, lambda: "\n".join(_table(found)), as_json=arguments.json)
+        account = recall(dict, make, "budget", whole.digest, asked, fresh=fresh)
+    print_found(account, lambda: "\n".join(_table(account)), as_json=arguments.json)
     return tell_damage(whole.analysis)
 
 
@@ -76,35 +75,27 @@ def budget(
     alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
         raise InputError(f"run {number} is void: {sentences(alone.reasons)}")
-    records = whole.records()
-    record = next(one for one in records if (one["run"], one["attempt"]) == (number, drop.attempt))
+    result = next(result for result in whole.analysis.runs if result.run.number == number)
     if trials is None:
-        trial, drawn = monte_carlo.until_decided(fit, alone.quantities, seed)
+        samples, count = monte_carlo.until_decided(fit, alone.quantities, seed)
     elif isinstance(trials, str):
-        trial, drawn = monte_carlo.adaptive(fit, seed)
+        samples, count = monte_carlo.adaptive(fit, seed)
     else:
-        trial, drawn = monte_carlo.monte_carlo(fit, trials, seed), trials
+        samples, count = monte_carlo.monte_carlo(fit, trials, seed), trials
     return {
         "run": number,
-        "learned": record["learned"],
-        "budget": {name: _lines(_measured(record, name)) for name in record["degrees"]},
-        "by_itself": {name: _lines(measured) for name, measured in alone.quantities.items()},
+        "learned": result.learned,
+        "budget": {name: _lines(value) for name, value in result.quantities.items()},
+        "by_itself": {name: _lines(value) for name, value in alone.quantities.items()},
         "monte_carlo": {
-            "trials": drawn,
+            "trials": count,
             "seed": seed,
             "quantities": {
-                name: _compare_trials(alone.quantities[name], sample, drawn)
-                for name, sample in trial.items()
+                name: _compare_trials(alone.quantities[name], sample, count)
+                for name, sample in samples.items()
             },
         },
     }
-
-
-def _measured(record: Mapping[str, Any], name: str) -> Measured:
-    """Return a measured value as a drop's record has it."""
-    found, degrees = record[name], record["degrees"][name]
-    lines = {one["name"]: one["u"] for one in record["budget"] if one["quantity"] == name}
-    return Measured(found["value"], found["u"], math.inf if degrees is None else degrees, lines)
 
 
 def _compare_trials(measured: Measured, sample: Propagated, trials: int) -> dict[str, Any]:
@@ -115,52 +106,46 @@ def _compare_trials(measured: Measured, sample: Propagated, trials: int) -> dict
 
 def _lines(measured: Measured) -> dict[str, Any]:
     degrees = max(1.0, measured.degrees)
+    sources = sorted(measured.budget.items(), key=lambda source: -source[1])
     return {
         **measured.json(),
         "degrees": min(degrees, 1e6),
         "k": coverage_factor(degrees),
-        "lines": [
-            {"name": name, "u": u, "share": (u / measured.u) ** 2}
-            for name, u in sorted(measured.budget.items(), key=lambda line: -line[1])
-        ],
+        "lines": [{"name": name, "u": u, "share": (u / measured.u) ** 2} for name, u in sources],
     }
 
 
-def _table(found: Mapping[str, Any]) -> list[str]:
-    """One block a quantity, in its own unit and, of what makes it uncertain, the finer one."""
-    lines = [f"run {found['run']}"]
-    drawn = found["monte_carlo"]
-    for name, one in found["budget"].items():
-        row = MEASURANDS[name]
-        whole = plus_minus(one, row.scale)
-        lines += [
-            "",
-            f"{row.symbol} = {whole} {row.unit} (U, 95 %), "
-            f"u = {_written(row, one['u'])} {row.fine}, "
-            f"ν = {one['degrees']:.0f}, k = {one['k']:.2f}",
-        ]
-        lines += [
-            f"  {line['name']:<18}{_written(row, line['u']):>10} {row.fine:<5}"
-            f"{100 * line['share']:6.1f} %"
-            for line in one["lines"]
-        ]
-        alone, trial = found["by_itself"][name], drawn["quantities"][name]
+def _table(account: Mapping[str, Any]) -> Iterator[str]:
+    """Write a block a quantity, in its own unit and, of its sources, the finer unit."""
+    yield f"run {account['run']}"
+    trials = account["monte_carlo"]
+    for name, value in account["budget"].items():
+        row, trial = MEASURANDS[name], trials["quantities"][name]
+        alone = _written(row, account["by_itself"][name]["u"])
+        yield ""
+        yield (
+            f"{row.symbol} = {plus_minus(value, row.scale)} {row.unit} (U, 95 %), "
+            f"u = {_written(row, value['u'])}, ν = {value['degrees']:.0f}, k = {value['k']:.2f}"
+        )
+        for line in value["lines"]:
+            u, _, unit = _written(row, line["u"]).rpartition(" ")
+            yield f"  {line['name']:<18}{u:>10} {unit:<5}{100 * line['share']:6.1f} %"
+        yield (
+            f"  by itself u = {alone}; by {trials['trials']} trials (seed {trials['seed']}) "
+            f"{_written(row, trial['u'])}"
+        )
         digits = decimals_for(row.scale * trial["u"])
         low, high = (fixed(row.scale * trial[end], digits) for end in ("low", "high"))
-        lines += [
-            f"  by itself u = {_written(row, alone['u'])} {row.fine}; by {drawn['trials']} "
-            f"trials (seed {drawn['seed']}) {_written(row, trial['u'])} {row.fine}",
-            f"  95 % of trials in {low} … {high} {row.unit}",
-        ]
-        if trial["decided"]:
-            lines[-1] += ": both agree" if trial["agrees"] else ": they do not agree"
-    return lines
+        verdict = ": both agree" if trial["agrees"] else ": they do not agree"
+        yield (
+            f"  95 % of trials in {low} … {high} {row.unit}{verdict if trial['decided'] else ''}"
+        )
 
 
 def _written(row: Measurand, u: float) -> str:
     """Write a standard uncertainty in a quantity's finer unit."""
     fine = row.fine_scale * u
-    return fixed(fine, decimals_for(fine)) if fine >= _LEAST else f"< {_LEAST:g}"
+    return f"{fixed(fine, decimals_for(fine)) if fine >= _LEAST else f'< {_LEAST:g}'} {row.fine}"
 
 
 def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
@@ -190,32 +175,33 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
         )
     if trials < 2:
         raise InputError(f"{trials} trials tell no uncertainty", "ask for a hundred or more")
-    results = {
-        (result.run.number, result.attempt): result
-        for result in (*analysis.runs, *analysis.superseded)
-    }
-    drawn = monte_carlo.session_monte_carlo(analysis.joint, trials, SEED)
-    runs = []
-    for key, one in zip(analysis.adjusted, drawn, strict=True):
-        quantities = {
-            name: _compare_trials(measured, one[name], trials)
-            | {"u_ratio": one[name].u / measured.u}
-            for name, measured in results[key].quantities.items()
+    drops = {(run.run.number, run.attempt): run for run in (*analysis.runs, *analysis.superseded)}
+    samples = monte_carlo.session_monte_carlo(analysis.joint, trials, SEED)
+    by_run = [
+        {
+            "run": number,
+            "attempt": attempt,
+            "quantities": {
+                name: _compare_trials(measured, sample[name], trials)
+                | {"u_ratio": sample[name].u / measured.u}
+                for name, measured in drops[number, attempt].quantities.items()
+            },
         }
-        runs.append({"run": key[0], "attempt": key[1], "quantities": quantities})
-    return {"trials": trials, "seed": SEED, "runs": runs}
+        for (number, attempt), sample in zip(analysis.adjusted, samples, strict=True)
+    ]
+    return {"trials": trials, "seed": SEED, "runs": by_run}
 
 
-def trials_lines(found: Mapping[str, Any]) -> Iterator[str]:
+def trials_lines(trials: Mapping[str, Any]) -> Iterator[str]:
     """Say in words how far both ways agree."""
-    yield f"Monte Carlo of the whole session: {found['trials']} trials, seed {found['seed']};"
+    yield f"Monte Carlo of the whole session: {trials['trials']} trials, seed {trials['seed']};"
     yield "95 % intervals beside value ± 1.96 u (JCGM 101, clause 8)"
-    names = found["runs"][0]["quantities"]
-    for name in names:
-        ones = [run["quantities"][name] for run in found["runs"]]
-        agree = sum(one["agrees"] for one in ones)
-        chance = sum(not one["decided"] for one in ones)
-        ratio = fmean(one["u_ratio"] for one in ones)
-        said = f"{agree} of {len(ones)} agree, {chance} undecided"
-        symbol = MEASURANDS[name].symbol
-        yield f"  {symbol:<12} u by trials / u by budget {ratio:.3f}, {said}"
+    for name in trials["runs"][0]["quantities"]:
+        drops = [run["quantities"][name] for run in trials["runs"]]
+        agree = sum(drop["agrees"] for drop in drops)
+        undecided = sum(not drop["decided"] for drop in drops)
+        ratio = fmean(drop["u_ratio"] for drop in drops)
+        yield (
+            f"  {MEASURANDS[name].symbol:<12} u by trials / u by budget {ratio:.3f}, "
+            f"{agree} of {len(drops)} agree, {undecided} undecided"
+        )

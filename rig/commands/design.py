@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.components import stated
@@ -18,9 +17,9 @@ from rig.files import check_place, write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
-from rig.report.columns import Column, aligned
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
+from rig.text_table import text_table
 from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
@@ -42,32 +41,31 @@ def main(arguments: Namespace) -> int:
         check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
-    there = beams_of(protocol)
+    beams = beams_of(protocol)
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     components = stated(protocol) if arguments.learned is None else _learned(arguments.learned)
-    limits = room(
-        protocol,
-        _length("--lowest", arguments.lowest),
-        _length("--highest", arguments.highest),
-        _length("--spacing", arguments.spacing) or SPACING_M,
+    lowest, highest, spacing = (
+        _read_length(f"--{name}", getattr(arguments, name))
+        for name in ("lowest", "highest", "spacing")
     )
+    limits = room(protocol, lowest, highest, spacing or SPACING_M)
     if limits.lowest > limits.highest:
         raise InputError(
             "--lowest is above --highest", "the highest beam is below the start of the drop"
         )
-    found: dict[str, Any] = {
+    layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "stated" if arguments.learned is None else "learned",
-        "current": _said(protocol, there, components),
+        "current": _forecast(protocol, beams, components),
     }
     if not arguments.no_search:
         proposed = better(protocol, components, limits, say)
-        found["proposed"] = _said(protocol, proposed, components)
+        layouts["proposed"] = _forecast(protocol, proposed, components)
         if arguments.output:
             write_atomic(arguments.output, with_heights(protocol, proposed))
             say(f"protocol: {arguments.output}")
-    print_found(found, lambda: design_text(found), as_json=arguments.json)
+    print_found(layouts, lambda: design_text(layouts), as_json=arguments.json)
     return 0
 
 
@@ -83,7 +81,7 @@ def _learned(path: str) -> Components:
     return joint.components
 
 
-def _length(option: str, text: str | None) -> float | None:
+def _read_length(option: str, text: str | None) -> float | None:
     if text is None:
         return None
     try:
@@ -95,9 +93,10 @@ def _length(option: str, text: str | None) -> float | None:
     return value
 
 
-def _said(
+def _forecast(
     protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
 ) -> dict[str, Any]:
+    """Return what a layout measures, and how well, as JSON has it."""
     assert protocol.gates is not None
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
     expected: Forecast = forecast(protocol, layout, sure=True)
@@ -130,29 +129,25 @@ def _said(
 
 def design_text(found: Mapping[str, Any]) -> str:
     """Write layouts and their uncertainties, for a terminal."""
-    layouts = [name for name in ("current", "proposed") if name in found]
+    layouts = {name: found[name] for name in ("current", "proposed") if name in found}
+    cells = {name: _uncertainties(layout) for name, layout in layouts.items()}
+    rows = [[what, *(column[what] for column in cells.values())] for what in cells["current"]]
     lines = [
         f"expected standard uncertainties of {found['runs']} runs, with the {found['scatter']} "
         "scatter",
         "",
-        *aligned(
-            [
-                Column("quantity", itemgetter("what"), numeric=False),
-                *(Column(name, itemgetter(name)) for name in layouts),
-            ],
-            _records(found, layouts),
-        ),
+        *text_table([["quantity", *layouts], *rows], left={0}, rule=True),
     ]
-    for name in layouts:
-        lines.append("")
+    for name, layout in layouts.items():
         heights: dict[str, list[str]] = {}
-        for gate in found[name]["gates"]:
+        for gate in layout["gates"]:
             heights.setdefault(gate["side"], []).append(f"{gate['height_m'] * 1e3:g}")
+        lines.append("")
         for side, millimetres in heights.items():
             where = f", {side} side" if len(heights) > 1 else ""
             lines.append(f"{name}{where} (mm): {', '.join(millimetres)}")
-        lines.append(f"{name}: {found[name]['trials']['text']}")
-        if not found[name]["readable"]:
+        lines.append(f"{name}: {layout['trials']['text']}")
+        if not layout["readable"]:
             lines.append(
                 f"{name}: drops may be void, because edges are ambiguous; "
                 "add a beam above the drop height"
@@ -160,19 +155,17 @@ def design_text(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _records(found: Mapping[str, Any], layouts: list[str]) -> list[dict[str, str]]:
-    rows: dict[str, dict[str, str]] = {}
-    for layout in layouts:
-        for line in found[layout]["measurands"]:
-            quantity = MEASURANDS[line["name"]]
-            if quantity.told:
-                what = f"{quantity.symbol} of one run ({quantity.fine})"
-                row = rows.setdefault(what, {"what": what})
-                row[layout] = _plain(line["u_run"] * quantity.fine_scale)
-        for line in found[layout]["coefficients"]:
-            row = rows.setdefault(line["name"], {"what": symbol(line["name"])})
-            row[layout] = _plain(line["u"]) if line["identified"] else "not identified"
-    return list(rows.values())
+def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:
+    """Write the standard uncertainty of each quantity of one run, and of each coefficient."""
+    cells = {}
+    for line in layout["measurands"]:
+        row = MEASURANDS[line["name"]]
+        if row.told:
+            name = f"{row.symbol} of one run ({row.fine})"
+            cells[name] = _plain(line["u_run"] * row.fine_scale)
+    for line in layout["coefficients"]:
+        cells[symbol(line["name"])] = _plain(line["u"]) if line["identified"] else "not identified"
+    return cells
 
 
 def _plain(uncertainty: float) -> str:

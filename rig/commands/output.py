@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rig.command_help import runnable
 from rig.files import write_atomic
 from rig.streams import say as narrate
+from rig.streams import tolerated
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -93,7 +94,8 @@ def stage(what: str) -> None:
         Empty to clear the line.
     """
     if sys.stderr.isatty():
-        print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
+        with tolerated(sys.stderr):
+            print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
 
 
 def leave_study(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
-from rig.commands.output import say
+from rig.commands.output import goes_on, say, stage
 from rig.errors import InputError
 from rig.files import check_place, replacing
 from rig.protocol import reader
@@ -21,12 +20,11 @@ from rig.sweep.tables import provenance, write_csv, write_npz
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from concurrent.futures import Executor
 
     from rig.protocol.protocol import Protocol
 
-INTERRUPTED = 130
 _KINDS = (".csv", ".npz", *(f".{kind}" for kind in KINDS))
 # Processes take longer to start than this process to compute so many pieces.
 _FEW_CHUNKS = 20
@@ -40,26 +38,28 @@ def main(arguments: Namespace) -> int:
     layout = lay_out(protocol, arguments.vary)
     if _drawn(output):
         _check_drawable(layout)
-    try:
-        swept = _computed(layout, arguments.jobs, arguments.cluster)
+    with goes_on("nothing was written"):
+        swept = _compute(layout, arguments.jobs, arguments.cluster)
         _write(output, protocol, layout, swept)
-    except KeyboardInterrupt:
-        say("rig: interrupted; nothing was written")
-        return INTERRUPTED
     say(f"{output}: {_summary(swept)}")
     return 0
 
 
-def _computed(layout: Layout, jobs: int | None, address: str | None) -> Swept:
-    progress = Progress(layout.grid.size, sys.stderr)
+def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
+    size, start = layout.grid.size, time.monotonic()
     length = chunk_length(layout.chain.rods)
-    chunks = -(-layout.grid.size // length)
+
+    def show(done: int) -> None:
+        rate = done / (time.monotonic() - start)
+        left = (size - done) / rate
+        stage(f"{done / size:4.0%} of {size} points, {rate:.3g}/s, {left:.0f} s left")
+
     try:
-        with _executor(jobs, address, chunks) as (executor, workers):
+        with _executor(jobs, address, -(-size // length)) as (executor, workers):
             # Twice as many pieces as workers, so that none waits for its next one.
-            return compute(layout, executor, 2 * workers, length, progress.show)
+            return compute(layout, executor, 2 * workers, length, show)
     finally:
-        progress.clear()
+        stage("")
 
 
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
@@ -83,8 +83,8 @@ def _executor(jobs: int | None, address: str | None, chunks: int) -> Iterator[tu
     if address is not None:
         from rig.sweep.cluster import cluster  # noqa: PLC0415 - it needs Dask
 
-        with cluster(address) as found:
-            yield found
+        with cluster(address) as executor:
+            yield executor
         return
     workers = min(cores() if jobs is None else jobs, chunks)
     if workers == 1 or (jobs is None and chunks < _FEW_CHUNKS):
@@ -126,65 +126,10 @@ def _check_drawable(layout: Layout) -> None:
 
 def _summary(swept: Swept) -> str:
     """Count the points, and those of which a reader of the file should know."""
-    parts = [f"{swept.notes.size} points"]
-    for number, words in (
-        (swept.notes.size - int(swept.in_domain.sum()), "beyond the model's domain"),
-        (int(((swept.notes & NO_ANSWER) > 0).sum()), "without an answer"),
-        (int(((swept.notes & PILE) > 0).sum()), "on the pile"),
-    ):
-        if number:
-            parts.append(f"{number} {words}")
-    return ", ".join(parts)
-
-
-_REDRAW_S = 0.1
-_QUIET_S = 2.0  # what takes no longer needs no log lines
-
-
-class Progress:
-    """Shows the share of the points that is done, their rate and the time left.
-
-    Parameters
-    ----------
-    size
-        Number of points.
-    stream
-        Where to show it: on a terminal one line, rewritten; elsewhere a line a quarter.
-    clock
-        Seconds, from any origin.
-    """
-
-    def __init__(
-        self, size: int, stream: TextIO, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._size, self._stream, self._clock = size, stream, clock
-        self._terminal = stream.isatty()
-        self._start = self._last = clock()
-        self._quarter = 0
-        self._drawn = False
-
-    def show(self, done: int) -> None:
-        """Take note of `done` points, and show it if it is time."""
-        now = self._clock()
-        quarter = 4 * done // self._size
-        if self._terminal:
-            due = now - self._last >= _REDRAW_S
-        else:
-            due = now - self._last >= _QUIET_S and self._quarter < quarter < 4
-        if not due:
-            return
-        self._last, self._quarter, self._drawn = now, quarter, True
-        rate = done / (now - self._start)
-        left = (self._size - done) / rate
-        line = f"{done / self._size:4.0%} of {self._size} points, {rate:.3g}/s, {left:.0f} s left"
-        self._write(f"\r{line}\x1b[K" if self._terminal else f"{line}\n")
-
-    def clear(self) -> None:
-        """Leave the terminal's line empty for what is said next."""
-        if self._terminal and self._drawn:
-            self._write("\r\x1b[K")
-
-    def _write(self, text: str) -> None:
-        with suppress(OSError):  # a sweep does not end because nobody looks any more
-            self._stream.write(text)
-            self._stream.flush()
+    counts = {
+        "beyond the model's domain": ~swept.in_domain,
+        "without an answer": (swept.notes & NO_ANSWER) > 0,
+        "on the pile": (swept.notes & PILE) > 0,
+    }
+    parts = [f"{points.sum()} {words}" for words, points in counts.items() if points.any()]
+    return ", ".join([f"{swept.notes.size} points", *parts])

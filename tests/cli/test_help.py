@@ -7,8 +7,9 @@ import shlex
 
 import pytest
 
+from rig.boards import BOARDS, FLASHED
 from rig.cli import BAD_INPUT, INTERRUPTED, _parser
-from rig.command_help import EXAMPLES, GROUPS
+from rig.command_help import COMMANDS
 from rig.commands.output import VOID
 from rig.commands.replay import DIFFERENT
 from rig.errors import DeviceError, InputError, RigError
@@ -20,13 +21,23 @@ def commands():
 
 
 def test_every_command_has_a_group_and_two_examples(call):
-    known = set(commands())
-    assert {name for names in GROUPS.values() for name in names} == known == set(EXAMPLES)
+    known = commands()
+    assert [name for name in COMMANDS if " " not in name] == list(known)
     done = call()
     assert (done.code, done.out) == (2, "")
     for name in known:
         assert f"\n  {name} " in done.err
-        assert len(EXAMPLES[name]) >= 2
+        assert len(COMMANDS[name].examples) >= 2
+        assert COMMANDS[name].text in done.err
+
+
+def test_each_board_is_a_choice():
+    def choices(command):
+        return next(a.choices for a in commands()[command]._actions if a.dest == "board")
+
+    assert choices("check") == list(BOARDS)
+    assert choices("new") == [*BOARDS, "other"]
+    assert choices("flash") == list(FLASHED)
 
 
 def test_every_exit_code_is_listed():
@@ -38,7 +49,10 @@ def test_every_exit_code_is_listed():
     assert max(map(len, text.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("line", [one for lines in EXAMPLES.values() for one in lines])
+EXAMPLES = [line for command in COMMANDS.values() for line in command.examples]
+
+
+@pytest.mark.parametrize("line", EXAMPLES)
 def test_examples_are_commands(line):
     for part in line.split(" && "):
         program, *words = shlex.split(part)

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from rig import __version__
-from rig.commands.sweep import Progress
 from tests.cli.lab import PROTOCOLS
 from tests.sweep.conftest import SCENE, VARY
 from tests.test_imports import packages_loaded_by
@@ -139,38 +138,16 @@ def test_a_missing_dask_is_named(sweep, monkeypatch):
     assert done.err.endswith(" -m pip install distributed\n")
 
 
-class Stream(io.StringIO):
-    """A terminal, or none."""
-
-    def __init__(self, terminal):
-        super().__init__()
-        self.isatty = lambda: terminal
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
 
-def shown(terminal, seconds, steps=1000):
-    """What is shown of a sweep of so many seconds."""
-    now = 0.0
-    stream = Stream(terminal)
-    progress = Progress(10 * steps, stream, lambda: now)
-    for step in range(1, steps + 1):
-        now = seconds * step / steps
-        progress.show(10 * step)
-    progress.clear()
-    return stream.getvalue()
-
-
-def test_a_terminal_has_one_line_that_is_rewritten():
-    text = shown(terminal=True, seconds=10.0)
-    assert "\n" not in text
-    assert text.endswith("\r\x1b[K")
-    assert 50 <= text.count("\r") <= 102
-    assert "\r 50% of 10000 points, 1e+03/s, 5 s left" in text
-
-
-def test_a_log_has_three_lines_at_most():
-    assert [line.split("%")[0].strip() for line in shown(False, 3600.0).splitlines()] == [
-        "25",
-        "50",
-        "75",
-    ]
-    assert shown(False, 1.9) == ""
+def test_a_terminal_has_one_line_that_is_rewritten(sweep, monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    sweep("s.csv", "friction=0..1:20000", ONE_INCLINE, more=("--jobs", "1"))
+    drawn, said = terminal.getvalue().rsplit("\r\x1b[K", 1)
+    assert "\n" not in drawn
+    assert re.search(r"\r\x1b\[K100% of 20000 points, \S+/s, 0 s left", drawn)
+    assert "s.csv: 20000 points" in said
