@@ -96,11 +96,11 @@ def read_films(session: Path) -> dict[tuple[int, int], Film]:
 
     A line that was cut off while it was written is passed over.
     """
-    found: dict[tuple[int, int], Film] = {}
+    films: dict[tuple[int, int], Film] = {}
     with suppress(OSError), truth_file(session).open(encoding="utf-8") as lines:
         for line in lines:
             with suppress(ValueError, TypeError):
                 truth = json.loads(line)
                 if truth.get("film") is not None:
-                    found[truth["run"], truth["attempt"]] = Film(**truth["film"])
-    return found
+                    films[truth["run"], truth["attempt"]] = Film(**truth["film"])
+    return films

@@ -49,14 +49,14 @@ def completed(url: str, protocol: Path, session: Path, seed: int | None, before:
         settings["seed"] = str(seed)
     old = _split(before)
     if old.scheme == parts.scheme:
-        known = _settings(old)
-        seeds = known.get("seed", "0"), settings.get("seed", known.get("seed", "0"))
-        if seeds[0] != seeds[1]:
+        earlier = _settings(old)
+        seed_before = earlier.get("seed", "0")
+        if (new := settings.get("seed", seed_before)) != seed_before:
             raise InputError(
-                f"{session} was simulated with seed {seeds[0]}: seed {seeds[1]} means other chains",
+                f"{session} was simulated with seed {seed_before}: seed {new} means other chains",
                 "leave the seed out to continue it, or give a new session file",
             )
-        settings = known | settings
+        settings = earlier | settings
     settings.setdefault("protocol", str(protocol.resolve()))
     settings.setdefault("truth", str(truth_file(session)))
     settings.setdefault("seed", "0")

@@ -62,10 +62,9 @@ class PredictedIncline:
 
     def json(self) -> dict[str, Any]:
         """As ``rig predict --json`` prints it, without what the scene does not have."""
-        found = asdict(self)
-        absent = [] if self.struck else ["separation_u_m", "speed_u_m_s"]
-        absent += [] if self.impact_chain else ["impact_chain"]
-        return {name: value for name, value in found.items() if name not in {*absent, "struck"}}
+        absent = {"struck"} if self.struck else {"struck", "separation_u_m", "speed_u_m_s"}
+        absent |= set() if self.impact_chain else {"impact_chain"}
+        return {name: value for name, value in asdict(self).items() if name not in absent}
 
 
 def predictions(protocol: Protocol) -> list[PredictedIncline]:
@@ -75,28 +74,30 @@ def predictions(protocol: Protocol) -> list[PredictedIncline]:
     """
     if protocol.surface is None:
         return [_free_fall(protocol)]
-    found = []
+    lines = []
     for incline in dict.fromkeys(protocol.plan.inclines):
         for struck in protocol.strikers:
-            one = predict_incline(protocol, incline, struck, beside(protocol, struck))
-            found.append(
+            model = predict_incline(protocol, incline, struck, beside(protocol, struck))
+            lines.append(
                 PredictedIncline(
                     incline_deg=incline,
                     impact_chain=struck if protocol.unlike_chains else None,
-                    model=one.model,
-                    alpha=one.alpha,
-                    gamma=one.gamma,
-                    separation_m=one.separation,
-                    separation_u_m=one.separation_u,
-                    speed_m_s=one.speed,
-                    speed_u_m_s=one.speed_u,
-                    fall_time_s=one.time,
-                    free_fall_speed_m_s=one.free_fall_speed,
-                    in_domain=one.in_domain,
-                    notes=list(one.notes),
+                    notes=list(model.notes),
+                    **{name: getattr(model, of_model) for name, of_model in _OF_MODEL.items()},
                 )
             )
-    return found
+    return lines
+
+
+_OF_MODEL = {name: name for name in ("model", "alpha", "gamma", "in_domain")} | {
+    "separation_m": "separation",
+    "separation_u_m": "separation_u",
+    "speed_m_s": "speed",
+    "speed_u_m_s": "speed_u",
+    "fall_time_s": "time",
+    "free_fall_speed_m_s": "free_fall_speed",
+}
+"""Attributes of a `PredictedIncline` and those of the model's prediction that they have."""
 
 
 def beside(protocol: Protocol, struck: str) -> str | None:
@@ -122,22 +123,19 @@ def predict_incline(
     assert protocol.surface is not None
     chain, drop = as_struck(protocol, incline_deg, struck)
     kappas = air_of(protocol, struck)
-    found = predict(
-        chain,
-        protocol.surface,
-        incline_deg,
-        drop,
-        protocol.gravity,
+    drag_u = 0.0 if protocol.drag is None else protocol.drag.relative_u
+    model = predict(
+        *(chain, protocol.surface, incline_deg, drop, protocol.gravity),
         initial_speed=protocol.initial_speed,
         kappas=kappas,
-        drag_u=0.0 if protocol.drag is None else protocol.drag.relative_u,
+        drag_u=drag_u,
     )
-    if free is None or found.separation is None or found.time is None:
-        return found
+    if free is None or model.separation is None or model.time is None:
+        return model
     # Top rods of unlike chains start at unlike heights.
     longer = protocol.chains[free].chain.length - protocol.chains[struck].chain.length
-    held = _held_back(protocol, kappas, air_of(protocol, free), found.time)
-    return replace(found, separation=found.separation + longer + held)
+    held = _held_back(protocol, kappas, air_of(protocol, free), model.time)
+    return replace(model, separation=model.separation + longer + held)
 
 
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
@@ -145,14 +143,14 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     if run.impact is None:
         row = GRAVITY if protocol.track is None else ACCELERATION
         return {row.name: protocol.gravity}
-    one = predict_incline(protocol, run.incline_deg, run.impact, run.free)
-    found = {
-        SEPARATION.name: (one.separation if run.free is not None else None, one.separation_u),
-        SPEED.name: (one.speed, one.speed_u),
-        FALL_TIME.name: (one.time, one.time_u),
+    model = predict_incline(protocol, run.incline_deg, run.impact, run.free)
+    values = {
+        SEPARATION.name: (model.separation if run.free is not None else None, model.separation_u),
+        SPEED.name: (model.speed, model.speed_u),
+        FALL_TIME.name: (model.time, model.time_u),
     }
     return {
-        name: Quantity(value, u or 0.0) for name, (value, u) in found.items() if value is not None
+        name: Quantity(value, u or 0.0) for name, (value, u) in values.items() if value is not None
     }
 
 
@@ -163,16 +161,16 @@ def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, floa
     """
     if run.impact is None:
         return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
-    found: dict[str, dict[str, float]] = {}
-    for name, low, high, share in _moved(protocol, run, run.impact):
+    slopes: dict[str, dict[str, float]] = {}
+    for name, low, high, share in _vary_coefficients(protocol, run, run.impact):
         below, above = predicted_run(low, run), predicted_run(high, run)
         for measurand in below.keys() & above.keys():
-            moved = above[measurand].value - below[measurand].value
-            found.setdefault(measurand, {})[name] = share * moved
-    return found
+            difference = above[measurand].value - below[measurand].value
+            slopes.setdefault(measurand, {})[name] = share * difference
+    return slopes
 
 
-def _moved(
+def _vary_coefficients(
     protocol: Protocol, run: Run, struck: str
 ) -> Iterator[tuple[str, Protocol, Protocol, float]]:
     """Each coefficient, made less and more, and its uncertainty over the distance between them."""
@@ -195,28 +193,32 @@ def _moved(
         stated.append(("pile", pile.restitution, lambda to: on(pile=replace(pile, restitution=to))))
     if alpha is not None:
         stated.append((f"alpha {protocol.condition(run).impact_chain}", alpha, giving))
-    for name, value, moved in stated:
+    for name, value, change in stated:
         if value.u:
-            least = max(0.0, value.value - value.u) if name == "friction" else value.value - value.u
-            most = value.value + value.u
-            low, high = (moved(Quantity(end)) for end in (least, most))
-            yield name, low, high, value.u / (most - least)
+            low, high = value.value - value.u, value.value + value.u
+            low = max(0.0, low) if name == "friction" else low
+            yield name, change(Quantity(low)), change(Quantity(high)), value.u / (high - low)
 
 
 def notes(protocol: Protocol) -> list[str]:
     """Every note on a planned incline, the same ones of several inclines together."""
-    at: dict[str, list[str]] = {}
-    for one in predictions(protocol):
-        for note in one.notes:
-            at.setdefault(note, []).append(one.label)
-    return [f"{', '.join(labels)}: {note}" for note, labels in at.items()]
+    return group_notes(predictions(protocol))
+
+
+def group_notes(lines: Sequence[PredictedIncline]) -> list[str]:
+    """Write each note once, with the inclines that have it."""
+    labels: dict[str, list[str]] = {}
+    for line in lines:
+        for note in line.notes:
+            labels.setdefault(note, []).append(line.label)
+    return [f"{', '.join(inclines)}: {note}" for note, inclines in labels.items()]
 
 
 def _free_fall(protocol: Protocol) -> PredictedIncline:
     """Predict the fall of a chain that strikes nothing."""
     ((name, rods),) = protocol.chains.items()
     drop, gravity, start = (
-        each.value for each in (protocol.drop, protocol.gravity, protocol.initial_speed)
+        value.value for value in (protocol.drop, protocol.gravity, protocol.initial_speed)
     )
     if protocol.drag is None:
         from rig.model.fall import free_fall  # noqa: PLC0415 - all that this scene needs
@@ -227,10 +229,10 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
 
         kappa = air_of(protocol, name)[0]
         speed, time = drag_leg(drop + rods.chain.length, start, gravity, kappa)
-    way = "free fall" if protocol.track is None else "track"
+    scene = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,
-        model=f"{way}{', drag' if protocol.drag is not None else ''}",
+        model=f"{scene}{', drag' if protocol.drag is not None else ''}",
         speed_m_s=speed,
         fall_time_s=time,
         free_fall_speed_m_s=speed,
@@ -251,15 +253,9 @@ def air_of(protocol: Protocol, name: str) -> list[float]:
     if drag.terminal_speed is not None:
         return [protocol.gravity.value / drag.terminal_speed.value**2] * rods.chain.rods
     assert drag.coefficient is not None
-    return leg_drags(
-        rods.chain,
-        [
-            cylinder_drag(
-                drag.coefficient.value, drag.air_density, diameter, rods.rod_length, rods.tilt_deg
-            )
-            for diameter in rods.diameters
-        ],
-    )
+    medium = drag.coefficient.value, drag.air_density
+    drags = [cylinder_drag(*medium, d, rods.rod_length, rods.tilt_deg) for d in rods.diameters]
+    return leg_drags(rods.chain, drags)
 
 
 def air_shares(protocol: Protocol) -> dict[str, list[float]]:
@@ -269,19 +265,19 @@ def air_shares(protocol: Protocol) -> dict[str, list[float]]:
     not given, with 1/diameter. Where widths are not known, all are taken to be alike.
     """
     if protocol.drag is not None:
-        found = {name: air_of(protocol, name) for name in protocol.chains}
+        shares = {name: air_of(protocol, name) for name in protocol.chains}
     else:
-        every = protocol.chains.values()
-        if any(min(rods.diameters, default=0.0) == 0.0 for rods in every):
+        chains = protocol.chains.values()
+        if any(min(rods.diameters, default=0.0) == 0.0 for rods in chains):
             return {name: [1.0] * rods.chain.rods for name, rods in protocol.chains.items()}
-        measured = not any(isnan(rods.rod_length) for rods in every)
-        weighed = measured and all(rods.weighed for rods in every)
-        found = {
+        measured = not any(isnan(rods.rod_length) for rods in chains)
+        weighed = measured and all(rods.weighed for rods in chains)
+        shares = {
             name: _per_mass(rods, rods.rod_length if measured else 1.0, weighed=weighed)
             for name, rods in protocol.chains.items()
         }
-    one = next(iter(found.values()))[0]
-    return {name: [kappa / one for kappa in kappas] for name, kappas in found.items()}
+    first = next(iter(shares.values()))[0]
+    return {name: [kappa / first for kappa in kappas] for name, kappas in shares.items()}
 
 
 def _per_mass(rods: RodChain, length: float, *, weighed: bool) -> list[float]:
@@ -302,5 +298,5 @@ def _held_back(
     from rig.model.drag import fallen  # noqa: PLC0415 - only where there is air
 
     gravity, start = protocol.gravity.value, protocol.initial_speed.value
-    way, its_way = (fallen(time, gravity, each[0], start) for each in (kappas, its_kappas))
-    return way - its_way
+    first, second = (fallen(time, gravity, chain[0], start) for chain in (kappas, its_kappas))
+    return first - second

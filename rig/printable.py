@@ -19,18 +19,22 @@ def printable(text: str) -> str:
     Bytes of a file's name that are not UTF-8 are half of a surrogate pair here, and print as
     ``\udcff``.
     """
-    return "".join(_escaped(one) if is_hidden(one) and one not in "\n\t" else one for one in text)
+    return "".join(
+        character.encode("unicode_escape").decode("ascii")
+        if is_hidden(character) and character not in "\n\t"
+        else character
+        for character in text
+    )
 
 
 def one_line(text: str, limit: int) -> str:
     """Cut text to so many characters on one line, those that do not print replaced."""
-    return "".join("\N{REPLACEMENT CHARACTER}" if is_hidden(one) else one for one in text[:limit])
+    return "".join(
+        "\N{REPLACEMENT CHARACTER}" if is_hidden(character) else character
+        for character in text[:limit]
+    )
 
 
 def encodable(text: str) -> str:
     """Replace what UTF-8 cannot hold: half a surrogate pair, as in names that are not UTF-8."""
     return text.encode("utf-8", "replace").decode("utf-8")
-
-
-def _escaped(character: str) -> str:
-    return character.encode("unicode_escape").decode("ascii")

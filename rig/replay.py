@@ -32,15 +32,15 @@ class _ByBytes(Reader):
         replay = ByteReplay()
         replay.feed(session.byte_log())
         self.chunks = replay.fed
-        self._samples = [one for one in replay.records if isinstance(one, ClockSample)]
-        self._pulses = [one for one in replay.records if isinstance(one, Pulse)]
+        self._samples = [sample for sample in replay.records if isinstance(sample, ClockSample)]
+        self._pulses = [pulse for pulse in replay.records if isinstance(pulse, Pulse)]
         acknowledged = replay.acknowledged()
         # What was stored and not acknowledged any more still is in the bytes.
         have = {_key(drop) for drop in acknowledged}
         stored = {_key(drop): drop for drop in session.drops()}
         late = [drop for drop in replay.unfinished() if _key(drop) in stored.keys() - have]
-        told = sorted(_once([*acknowledged, *late]), key=_key)
-        self._drops = [as_old_as(stored.get(_key(drop), drop), drop) for drop in told]
+        drops = sorted(_once([*acknowledged, *late]), key=_key)
+        self._drops = [as_old_as(stored.get(_key(drop), drop), drop) for drop in drops]
 
     def digest(self) -> None:
         return None
@@ -62,10 +62,10 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     be recording meanwhile.
     """
     with session.snapshot():
-        return _compared(session, progress)
+        return _compare(session, progress)
 
 
-def _compared(session: Reader, progress: Progress | None) -> Outcome:
+def _compare(session: Reader, progress: Progress | None) -> Outcome:
     lines: list[str] = []
     differences: list[str] = []
 
@@ -92,16 +92,16 @@ def _compared(session: Reader, progress: Progress | None) -> Outcome:
 
 def _once(drops: list[Drop]) -> list[Drop]:
     """Leave out what was acknowledged again because the first ACKNOWLEDGE was lost on its way."""
-    kept: list[Drop] = []
+    unique: list[Drop] = []
     for drop in drops:
         if not any(
-            (one.certificate, one.fire_tick, one.edges)
+            (earlier.certificate, earlier.fire_tick, earlier.edges)
             == (drop.certificate, drop.fire_tick, drop.edges)
-            for one in kept
-            if _key(one) == _key(drop)
+            for earlier in unique
+            if _key(earlier) == _key(drop)
         ):
-            kept.append(drop)
-    return kept
+            unique.append(drop)
+    return unique
 
 
 def _key(drop: Drop) -> tuple[int, int]:

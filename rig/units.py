@@ -63,49 +63,36 @@ class Dimension(Enum):
     @property
     def units(self) -> tuple[str, ...]:
         """Accepted units in their canonical spelling."""
-        return tuple(unit for unit, (dimension, _) in UNITS.items() if dimension is self)
+        return tuple(_FACTORS[self])
 
 
 # 180/π to 50 digits: the only factor that no fraction gives exactly.
 _DEGREES_PER_RADIAN = Fraction("57.295779513082320876798154814105170332405472466564")
 _FOOT = Fraction("0.3048")  # international foot and inch, exact since 1959
 
+_FACTORS: dict[Dimension, dict[str, Fraction | int | str]] = {
+    Dimension.LENGTH: {
+        "m": 1, "mm": "1/1000", "cm": "1/100", "µm": "1/1000000", "km": 1000, "in": _FOOT / 12,
+        "ft": _FOOT,
+    },
+    Dimension.TIME: {
+        "s": 1, "ms": "1/1000", "µs": "1/1000000", "ns": "1/1000000000", "min": 60, "h": 3600,
+    },
+    Dimension.ANGLE: {"deg": 1, "rad": _DEGREES_PER_RADIAN, "mrad": _DEGREES_PER_RADIAN / 1000},
+    Dimension.ACCELERATION: {"m/s^2": 1, "cm/s^2": "1/100", "ft/s^2": _FOOT},
+    Dimension.SPEED: {"m/s": 1, "cm/s": "1/100", "km/h": "5/18"},
+    Dimension.MASS: {"kg": 1, "g": "1/1000", "mg": "1/1000000"},
+    Dimension.DENSITY: {"kg/m^3": 1, "g/cm^3": 1000},
+    Dimension.FREQUENCY: {"Hz": 1, "kHz": 1000},
+    Dimension.TURNING: {"rad/s": 1, "deg/s": 1 / _DEGREES_PER_RADIAN},
+    Dimension.NUMBER: {"1": 1, "%": "1/100", "ppm": "1/1000000"},
+}  # fmt: skip
 UNITS: dict[str, tuple[Dimension, Fraction]] = {
-    "m": (Dimension.LENGTH, Fraction(1)),
-    "mm": (Dimension.LENGTH, Fraction(1, 1000)),
-    "cm": (Dimension.LENGTH, Fraction(1, 100)),
-    "µm": (Dimension.LENGTH, Fraction(1, 10**6)),
-    "km": (Dimension.LENGTH, Fraction(1000)),
-    "in": (Dimension.LENGTH, _FOOT / 12),
-    "ft": (Dimension.LENGTH, _FOOT),
-    "s": (Dimension.TIME, Fraction(1)),
-    "ms": (Dimension.TIME, Fraction(1, 1000)),
-    "µs": (Dimension.TIME, Fraction(1, 10**6)),
-    "ns": (Dimension.TIME, Fraction(1, 10**9)),
-    "min": (Dimension.TIME, Fraction(60)),
-    "h": (Dimension.TIME, Fraction(3600)),
-    "deg": (Dimension.ANGLE, Fraction(1)),
-    "rad": (Dimension.ANGLE, _DEGREES_PER_RADIAN),
-    "mrad": (Dimension.ANGLE, _DEGREES_PER_RADIAN / 1000),
-    "m/s^2": (Dimension.ACCELERATION, Fraction(1)),
-    "cm/s^2": (Dimension.ACCELERATION, Fraction(1, 100)),
-    "ft/s^2": (Dimension.ACCELERATION, _FOOT),
-    "m/s": (Dimension.SPEED, Fraction(1)),
-    "cm/s": (Dimension.SPEED, Fraction(1, 100)),
-    "km/h": (Dimension.SPEED, Fraction(5, 18)),
-    "kg": (Dimension.MASS, Fraction(1)),
-    "g": (Dimension.MASS, Fraction(1, 1000)),
-    "mg": (Dimension.MASS, Fraction(1, 10**6)),
-    "kg/m^3": (Dimension.DENSITY, Fraction(1)),
-    "g/cm^3": (Dimension.DENSITY, Fraction(1000)),
-    "Hz": (Dimension.FREQUENCY, Fraction(1)),
-    "kHz": (Dimension.FREQUENCY, Fraction(1000)),
-    "rad/s": (Dimension.TURNING, Fraction(1)),
-    "deg/s": (Dimension.TURNING, 1 / _DEGREES_PER_RADIAN),
-    "1": (Dimension.NUMBER, Fraction(1)),
-    "%": (Dimension.NUMBER, Fraction(1, 100)),
-    "ppm": (Dimension.NUMBER, Fraction(1, 10**6)),
+    unit: (dimension, Fraction(factor))
+    for dimension, factors in _FACTORS.items()
+    for unit, factor in factors.items()
 }
+"""What each unit measures, and what it is in base units."""
 # The micro sign and the Greek letter look alike and both come off keyboards.
 _SPELLINGS = str.maketrans({"μ": "µ", "²": "^2", "³": "^3", "°": "deg"})
 _ALIASES = {
@@ -163,30 +150,30 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
         If the text is no such quantity; the message says what was found and what is accepted.
     """
     text = repr(text) if isinstance(text, float) else str(text)
-    wanted = f"accepted: {dimension.noun}, such as {dimension.example}"
+    accepted_form = f"accepted: {dimension.noun}, such as {dimension.example}"
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:
-        raise UnitError(f"found a text of {len(clean)} characters; {wanted}")
+        raise UnitError(f"found a text of {len(clean)} characters; {accepted_form}")
     match = _BRACKETED.fullmatch(clean) or _PLAIN.fullmatch(clean)
     if match is None:
         pointed = _DECIMAL_COMMA.sub(r"\1.\2", clean)
         if pointed != clean and (_BRACKETED.fullmatch(pointed) or _PLAIN.fullmatch(pointed)):
-            wanted = f"write a decimal point, not a comma: {pointed}"
-        raise UnitError(f"found {quoted(text)}; {wanted}")
-    found = match.groupdict()
-    unit, u_unit = found["unit"], found.get("u_unit")
-    if found["u"] is not None and match.re is _PLAIN:
+            accepted_form = f"write a decimal point, not a comma: {pointed}"
+        raise UnitError(f"found {quoted(text)}; {accepted_form}")
+    parts = match.groupdict()
+    unit, u_unit = parts["unit"], parts.get("u_unit")
+    if parts["u"] is not None and match.re is _PLAIN:
         unit, u_unit = _shared_unit(clean, unit, u_unit)
     factor = _factor(unit, dimension, clean)
-    value = _scaled(found["value"], factor / int(found.get("per") or 1), clean)
-    if found.get("last"):
-        if found["u"] is not None:
-            raise UnitError(f"found {quoted(text)} with two uncertainties; {wanted}")
-        digits = Decimal(found["value"]).as_tuple().exponent
-        return Quantity(value, _scaled(f"{found['last']}e{digits}", factor, clean))
-    if found["u"] is None:
+    value = _scaled(parts["value"], factor / int(parts.get("per") or 1), clean)
+    if parts.get("last"):
+        if parts["u"] is not None:
+            raise UnitError(f"found {quoted(text)} with two uncertainties; {accepted_form}")
+        digits = Decimal(parts["value"]).as_tuple().exponent
+        return Quantity(value, _scaled(f"{parts['last']}e{digits}", factor, clean))
+    if parts["u"] is None:
         return Quantity(value)
-    u = _scaled(found["u"], _factor(u_unit or unit, dimension, clean), clean)
+    u = _scaled(parts["u"], _factor(u_unit or unit, dimension, clean), clean)
     if u < 0:
         raise UnitError(f"found {quoted(text)}; an uncertainty is at least 0")
     return Quantity(value, u)
@@ -213,18 +200,18 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     if name not in UNITS:
         import difflib  # noqa: PLC0415 - only a mistake needs it
 
-        near = {known.casefold(): known for known in dimension.units}
-        close = difflib.get_close_matches(name.casefold(), near, n=1, cutoff=0.5)
-        guess = f"did you mean {near[close[0]]}? " if close else ""
+        folded = {accepted_unit.casefold(): accepted_unit for accepted_unit in dimension.units}
+        close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
+        guess = f"did you mean {folded[close[0]]}? " if close else ""
         raise UnitError(f"unknown unit {quoted(unit or '')}; {guess}{accepted}")
-    found, factor = UNITS[name]
-    if found is not dimension:
+    measures, factor = UNITS[name]
+    if measures is not dimension:
         if unit is None:
             raise UnitError(
                 f"found {quoted(text)} without a unit; {accepted}, such as {dimension.example}"
             )
         raise UnitError(
-            f"{text} is {found.noun}; accepted: {dimension.noun}, such as {dimension.example}"
+            f"{text} is {measures.noun}; accepted: {dimension.noun}, such as {dimension.example}"
         )
     return factor
 
@@ -267,7 +254,5 @@ def format_quantity(quantity: Quantity, unit: str) -> str:
     if not (u > 0 and math.isfinite(u) and math.isfinite(value)):
         return f"{value:.6g}{suffix}"
     places = 1 - int(f"{u:.1e}".partition("e")[2])  # after rounding: 0.0996 is 0.10, not 0.100
-    shown, shown_u = (f"{round(x, places):.{max(places, 0)}f}" for x in (value, u))
-    if unit in _RELATIVE:
-        return f"({shown} ± {shown_u}){suffix}"
-    return f"{shown} ± {shown_u}{suffix}"
+    numbers = " ± ".join(f"{round(x, places):.{max(places, 0)}f}" for x in (value, u))
+    return f"({numbers}){suffix}" if unit in _RELATIVE else f"{numbers}{suffix}"

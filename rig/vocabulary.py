@@ -39,55 +39,24 @@ class Vocabulary:
     two_sides: bool = False
 
 
-OBJECT = Vocabulary(
-    "object",
-    "the object",
-    "the object starts",
-    "object",
-    "the object, its drop and the gates",
-    "holding the object",
-)
-TRACK = Vocabulary(
-    "track",
-    "the glider",
-    "the glider starts",
-    "glider",
-    "the glider, its start and the gates",
-    "placing the glider",
-)
-FENCE = Vocabulary(
-    "picket-fence",
-    "the fence",
-    "the fence starts",
-    "bar",
-    "the fence, its drop and the gates",
-    "holding the fence",
-)
-FREE_CHAIN = Vocabulary(
-    "free-chain",
-    "the chain",
-    "the chain hangs",
-    "rod",
-    "the chain, its drop and the gates",
-    "hanging the chain",
-)
-ONE_CHAIN = Vocabulary(
-    "one-chain",
-    "the chain",
-    "the chain hangs",
-    "rod",
-    "chain, drop, incline and gates",
-    "hanging the chain",
-)
-TWO_CHAINS = Vocabulary(
-    "two-chains",
-    "the chains",
-    "the chains hang",
-    "rod",
-    "chains, drop, incline and gates",
-    "hanging the chains",
-    two_sides=True,
-)
+_ROWS = """\
+object | the object | the object starts | object | the object, its drop and the gates | holding
+track | the glider | the glider starts | glider | the glider, its start and the gates | placing
+picket-fence | the fence | the fence starts | bar | the fence, its drop and the gates | holding
+free-chain | the chain | the chain hangs | rod | the chain, its drop and the gates | hanging
+one-chain | the chain | the chain hangs | rod | chain, drop, incline and gates | hanging
+two-chains | the chains | the chains hang | rod | chains, drop, incline and gates | hanging
+"""
+"""A scene a row; what is done by hand before a drop is done to what falls."""
+
+
+def _read_row(row: str) -> Vocabulary:
+    scene, body, start, part, setup, handling = row.split(" | ")
+    two_sides = scene == "two-chains"
+    return Vocabulary(scene, body, start, part, setup, f"{handling} {body}", two_sides)
+
+
+OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS = map(_read_row, _ROWS.splitlines())
 ANY_SCENE = Vocabulary(
     "", "what falls", "it starts", "part", "your set-up", "preparing it", two_sides=True
 )

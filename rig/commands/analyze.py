@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Compute the results of a session."""
-    if arguments.others:
+    if arguments.further:
         from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
 
         return analyze_together(arguments)
@@ -38,70 +38,72 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         deep = arguments.priors or arguments.session_trials is not None
         fresh, show_run = arguments.fresh, progress("analysing run")
-        found = results(session, show_run, fresh=fresh, with_joint_fit=deep)
-        more = _by_joint_fit(arguments, session, found) if deep else {}
+        outcome = results(session, show_run, fresh=fresh, with_joint_fit=deep)
+        members = _by_joint_fit(arguments, session, outcome) if deep else {}
     video = None if track is None else video_fall(*track)
-    if video is not None and not found.blind:
-        more["video"] = video.json(_by_gates(found))
-    code = print_results(found, as_json=arguments.json, more=more)
+    if video is not None and not outcome.blind:
+        members["video"] = video.json(_by_gates(outcome))
+    code = print_results(outcome, as_json=arguments.json, members=members)
     if not arguments.json:
-        asked = [scatter_part(found.analysis.summary)] if arguments.scatter else []
-        asked += [prior_part(more["prior_sensitivity"])] if arguments.priors else []
-        asked += [*gate_parts(found.analysis.summary), *effects_parts(found.analysis.effects)]
+        asked = [scatter_part(outcome.analysis.summary)] if arguments.scatter else []
+        asked += [prior_part(members["prior_sensitivity"])] if arguments.priors else []
+        asked += [*gate_parts(outcome.analysis.summary), *effects_parts(outcome.analysis.effects)]
         for part in asked:
             show(["", part.heading, *aligned(part.columns, part.records)])
-        if video is not None and "video" in more:
-            show(["", *_video_lines(video, _by_gates(found))])
-        if "monte_carlo" in more:
+        if video is not None and "video" in members:
+            show(["", *_video_lines(video, _by_gates(outcome))])
+        if "monte_carlo" in members:
             from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise
 
-            show(["", *trials_lines(more["monte_carlo"])])
+            show(["", *trials_lines(members["monte_carlo"])])
     return code
 
 
-def _by_joint_fit(arguments: Namespace, session: Session, found: SessionResults) -> dict[str, Any]:
-    """What takes the joint fit, and its time."""
-    more: dict[str, Any] = {}
+def _by_joint_fit(
+    arguments: Namespace, session: Session, outcome: SessionResults
+) -> dict[str, Any]:
+    """Compute what takes the joint fit, and its time."""
+    members: dict[str, Any] = {}
     trials = arguments.session_trials
-    analysis = cache(lambda: complete_analysis(session, found, progress("analysing run")))
+    analysis = cache(lambda: complete_analysis(session, outcome, progress("analysing run")))
     if trials is not None:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - only when it is asked for
 
-        more["monte_carlo"] = recall(
+        members["monte_carlo"] = recall(
             dict,
             lambda: session_trials(analysis(), trials),
-            *("session trials", found.digest, trials),
+            *("session trials", outcome.digest, trials),
             fresh=arguments.fresh,
         )
     if arguments.priors:
         from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - likewise
 
         make, fresh = lambda: prior_sensitivity(analysis()), arguments.fresh
-        more["prior_sensitivity"] = recall(list, make, "priors", found.digest, fresh=fresh)
-    return more
+        members["prior_sensitivity"] = recall(list, make, "priors", outcome.digest, fresh=fresh)
+    return members
 
 
-def _by_gates(found: SessionResults) -> Measured | None:
+def _by_gates(outcome: SessionResults) -> Measured | None:
     """Acceleration that the gates found: of what only falls, or of the free chain."""
-    for line in found.analysis.summary:
+    for line in outcome.analysis.summary:
         row = acceleration_in(line.means)
         if row is not None:
             return line.means[row.name]
-    return None if found.gravity is None else found.gravity.measured
+    return None if outcome.gravity is None else outcome.gravity.measured
 
 
 def _video_lines(video: VideoFall, gates: Measured | None) -> Iterator[str]:
-    yield f"acceleration by {video.frames} frames of a video: {_said(video.acceleration)}"
+    yield f"acceleration by {video.frames} frames of a video: {_write(video.acceleration)}"
     if gates is not None:
         error = video.beside(gates)
         word = (
             "they agree" if abs(error) <= 1.0 else "they disagree: the video's scale, or its frames"
         )
-        yield f"by the gates: {_said(gates)}; Eₙ {error:+.2f}, {word}"
+        yield f"by the gates: {_write(gates)}; Eₙ {error:+.2f}, {word}"
     if video.bent:
         yield "the frames follow no parabola: cut those before the release and after the end"
     yield "± is what the frames' scatter allows, without how well the video's lengths are scaled"
 
 
-def _said(value: Measured) -> str:
+def _write(value: Measured) -> str:
     return f"{plus_minus(value, 1.0, 3)} m/s²"

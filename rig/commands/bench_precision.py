@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, fields
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -29,33 +30,33 @@ are of one machine: compare them with each other. Every point is in `precision.c
 def main(arguments: Namespace) -> int:
     """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
     folder = make_folder(arguments.output)
-    found = precision(quick=arguments.quick, progress=say, keep=lambda one: _write(folder, one))
-    print_found(as_json(found), lambda: summary(found), as_json=arguments.json)
+    study = precision(quick=arguments.quick, progress=say, keep=partial(_write, folder))
+    print_found(as_json(study), lambda: summary(study), as_json=arguments.json)
     return 0
 
 
-def summary(found: Precision) -> str:
+def summary(study: Precision) -> str:
     """The cheapest methods, how far the models are apart, and what was left out."""
     lines = []
-    for name, title in found.scenes:
+    for name, title in study.scenes:
         lines.append(f"{title}: cheapest method for a relative error of Δz")
         rows: dict[str, list[Cheapest]] = {}
-        for one in found.cheapest:
-            if one.scene == name:
-                rows.setdefault(_model(one), []).append(one)
+        for method in study.cheapest:
+            if method.scene == name:
+                rows.setdefault(_model(method), []).append(method)
         width = max(map(len, rows))
         for model, row in rows.items():
             for winner, won in groupby(row, key=_winner):
-                targets = [f"{one.target:.0e}" for one in won]
+                targets = [f"{method.target:.0e}" for method in won]
                 lines.append(f"  {model:<{width}}  {', '.join(targets)}: {winner}")
         lines += [
             f"  {_model(gap):<{width}}  less discrete: Δz {gap.separation_relative:+.2e}, "
             f"V {gap.speed_relative:+.2e}, gate {gap.gate_difference_s:+.2e} s"
-            for gap in found.gaps
+            for gap in study.gaps
             if gap.scene == name
         ]
-        gone = sum(out.scene == name for out in found.left_out)
-        lines.append(f"  left out: {gone}, see precision.json")
+        omitted = sum(out.scene == name for out in study.left_out)
+        lines.append(f"  left out: {omitted}, see precision.json")
     return "\n".join(lines)
 
 
@@ -63,22 +64,22 @@ def _model(of: Cheapest | Gap) -> str:
     return of.model if of.contact_time_s is None else f"{of.model} τ {of.contact_time_s:.0e} s"
 
 
-def _winner(one: Cheapest) -> str:
-    if one.median_s is None:
+def _winner(method: Cheapest) -> str:
+    if method.median_s is None:
         return "none gets there"
-    setting = f", {one.setting}" if one.contact_time_s is None else ""
-    return f"{one.median_s * 1e6:.1f} µs, {one.method}{setting}"
+    setting = f", {method.setting}" if method.contact_time_s is None else ""
+    return f"{method.median_s * 1e6:.1f} µs, {method.method}{setting}"
 
 
-def _write(folder: Path, found: Precision) -> None:
+def _write(folder: Path, study: Precision) -> None:
     """Write ``precision.csv``, ``precision.json`` and a picture for each scene so far."""
     columns = [field.name for field in fields(Point)]
-    table = csv_text(columns, (asdict(point) for point in found.points))
+    table = csv_text(columns, (asdict(point) for point in study.points))
     write_atomic(folder / "precision.csv", table)
-    text = json.dumps(as_json(found), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(as_json(study), indent=2, ensure_ascii=False, allow_nan=False)
     write_atomic(folder / "precision.json", text + "\n")
-    for name, title in found.scenes:
-        points = [point for point in found.points if point.scene == name]
+    for name, title in study.scenes:
+        points = [point for point in study.points if point.scene == name]
         write_atomic(folder / f"precision-{name}.svg", precision_figure(title, points))
-    pictures = [f"![{title}](precision-{name}.svg)" for name, title in found.scenes]
-    write_page(folder, "precision", "\n\n".join([_HEAD, *pictures]), summary(found).splitlines())
+    pictures = [f"![{title}](precision-{name}.svg)" for name, title in study.scenes]
+    write_page(folder, "precision", "\n\n".join([_HEAD, *pictures]), summary(study).splitlines())

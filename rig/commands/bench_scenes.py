@@ -33,16 +33,16 @@ def main(arguments: Namespace) -> int:
     if not ready:
         say(f"no protocols in {arguments.protocols}: left out the ready ones")
     costs = scenes(ready, arguments.rounds, say)
-    whole = as_json(costs)
+    data = as_json(costs)
     if folder is not None:
         from rig.bench.figures import scenes_figure  # noqa: PLC0415 - it needs matplotlib
 
         rows = [_flat(cost) for cost in costs]
         write_study(
-            folder, "scenes", _HEAD, table(costs).splitlines(), whole,
+            folder, "scenes", _HEAD, table(costs).splitlines(), data,
             csv_text(rows[0], rows), scenes_figure(costs),
         )  # fmt: skip
-    print_found(whole, lambda: table(costs), as_json=arguments.json)
+    print_found(data, lambda: table(costs), as_json=arguments.json)
     return 0
 
 
@@ -76,9 +76,9 @@ def table(costs: Sequence[Cost]) -> str:
         f" and {', '.join(first.packages) or 'no large package'}; beyond it load",
     ]
     for cost in costs[1:]:
-        more = [name for name in cost.account.rooms if name not in first.rooms]
-        more += [name for name in cost.account.packages if name not in first.packages]
-        lines.append(f"  {cost.scene:<{width}}  {', '.join(more) or 'nothing'}")
+        names = [name for name in cost.account.rooms if name not in first.rooms]
+        names += [name for name in cost.account.packages if name not in first.packages]
+        lines.append(f"  {cost.scene:<{width}}  {', '.join(names) or 'nothing'}")
     return "\n".join(lines)
 
 

@@ -26,8 +26,8 @@ def main(arguments: Namespace) -> int:
     """Print one row a scene, and keep the table."""
     rows = stability(progress=None if arguments.json else lambda row: print(_line(row), flush=True))
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in _VERDICTS}
-    sonic = [asdict(one) for one in sonic_lengths()]
-    found: dict[str, Any] = {
+    sonic = [asdict(row) for row in sonic_lengths()]
+    study: dict[str, Any] = {
         "rows": [asdict(row) for row in rows],
         "counts": counts,
         "sonic": sonic,
@@ -35,16 +35,16 @@ def main(arguments: Namespace) -> int:
     totals = [
         ", ".join(f"{n} {verdict}" for verdict, n in counts.items()),
         *(
-            f"each rod {one['ratio']:g} of the one below: faster than sound from "
-            f"{one['rods']} rods, {one['length_m']:.2f} m, {one['decades']:.1f} decades of mass"
-            for one in sonic
+            f"each rod {row['ratio']:g} of the one below: faster than sound from "
+            f"{row['rods']} rods, {row['length_m']:.2f} m, {row['decades']:.1f} decades of mass"
+            for row in sonic
         ),
     ]
-    print_found(found, lambda: "\n".join(totals), as_json=arguments.json)
+    print_found(study, lambda: "\n".join(totals), as_json=arguments.json)
     if arguments.output is not None:
-        numbers = csv_text([field.name for field in fields(StabilityRow)], found["rows"])
-        said = [*map(_line, rows), "", *totals]
-        write_study(make_folder(arguments.output), "stability", _HEAD, said, found, numbers)
+        numbers = csv_text([field.name for field in fields(StabilityRow)], study["rows"])
+        lines = [*map(_line, rows), "", *totals]
+        write_study(make_folder(arguments.output), "stability", _HEAD, lines, study, numbers)
     return FAILED if counts["FAILED"] else 0
 
 
@@ -56,8 +56,8 @@ def _line(row: StabilityRow) -> str:
         "–" if error is None else f"{error:.1e}"
         for error in (row.separation_error, row.speed_error)
     ]
-    said = f"  {row.note}" if row.note else ""
+    lines = f"  {row.note}" if row.note else ""
     return (
         f"{f'{row.group} {row.value}':<40} {errors[0]:>8} {errors[1]:>8}  {row.verdict:<8} "
-        f"{row.naive}{said}"
+        f"{row.naive}{lines}"
     )

@@ -39,15 +39,15 @@ def main(arguments: Namespace) -> int:
     """Print a run's budget in the session's light, and by itself beside Monte Carlo trials."""
     with Session.open(arguments.session, readonly=True) as session:
         asked, fresh = (arguments.budget, arguments.trials, SEED), arguments.fresh
-        whole = results(session, fresh=fresh)
-        make = partial(budget, session, whole, *asked)
-        account = recall(dict, make, "budget", whole.digest, asked, fresh=fresh)
+        outcome = results(session, fresh=fresh)
+        make = partial(budget, session, outcome, *asked)
+        account = recall(dict, make, "budget", outcome.digest, asked, fresh=fresh)
     print_found(account, lambda: "\n".join(_table(account)), as_json=arguments.json)
-    return tell_damage(whole.analysis)
+    return tell_damage(outcome.analysis)
 
 
 def budget(
-    session: Reader, whole: SessionResults, number: int, trials: int | str | None, seed: int
+    session: Reader, outcome: SessionResults, number: int, trials: int | str | None, seed: int
 ) -> dict[str, Any]:
     """Account for the uncertainty of a run's results, beside the analysis of all.
 
@@ -72,12 +72,12 @@ def budget(
     protocol = protocol_of(session)
     check_open(session, protocol)
     planned = planned_run({run.number: run for run in runs(protocol)}, drop)
-    alone, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
+    single, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
     if fit is None:
-        raise InputError(f"run {number} is void: {sentences(alone.reasons)}")
-    result = next(result for result in whole.analysis.runs if result.run.number == number)
+        raise InputError(f"run {number} is void: {sentences(single.reasons)}")
+    result = next(result for result in outcome.analysis.runs if result.run.number == number)
     if trials is None:
-        samples, count = monte_carlo.until_decided(fit, alone.quantities, seed)
+        samples, count = monte_carlo.until_decided(fit, single.quantities, seed)
     elif isinstance(trials, str):
         samples, count = monte_carlo.adaptive(fit, seed)
     else:
@@ -86,12 +86,12 @@ def budget(
         "run": number,
         "learned": result.learned,
         "budget": {name: _lines(value) for name, value in result.quantities.items()},
-        "by_itself": {name: _lines(value) for name, value in alone.quantities.items()},
+        "by_itself": {name: _lines(value) for name, value in single.quantities.items()},
         "monte_carlo": {
             "trials": count,
             "seed": seed,
             "quantities": {
-                name: _compare_trials(alone.quantities[name], sample, count)
+                name: _compare_trials(single.quantities[name], sample, count)
                 for name, sample in samples.items()
             },
         },
@@ -121,7 +121,7 @@ def _table(account: Mapping[str, Any]) -> Iterator[str]:
     trials = account["monte_carlo"]
     for name, value in account["budget"].items():
         row, trial = MEASURANDS[name], trials["quantities"][name]
-        alone = _written(row, account["by_itself"][name]["u"])
+        single = _written(row, account["by_itself"][name]["u"])
         yield ""
         yield (
             f"{row.symbol} = {plus_minus(value, row.scale)} {row.unit} (U, 95 %), "
@@ -131,7 +131,7 @@ def _table(account: Mapping[str, Any]) -> Iterator[str]:
             u, _, unit = _written(row, line["u"]).rpartition(" ")
             yield f"  {line['name']:<18}{u:>10} {unit:<5}{100 * line['share']:6.1f} %"
         yield (
-            f"  by itself u = {alone}; by {trials['trials']} trials (seed {trials['seed']}) "
+            f"  by itself u = {single}; by {trials['trials']} trials (seed {trials['seed']}) "
             f"{_written(row, trial['u'])}"
         )
         digits = decimals_for(row.scale * trial["u"])

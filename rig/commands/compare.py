@@ -30,32 +30,32 @@ def main(arguments: Namespace) -> int:
     """Compare sessions with the first of them."""
     if arguments.output is not None:
         check_place(arguments.output)
-    found = read_together(arguments)
+    together = read_together(arguments)
     if arguments.json:
-        print_json(found.comparison_json())
+        print_json(together.comparison_json())
     else:
-        show(difference_lines(found))
+        show(difference_lines(together))
     if arguments.output is not None:
         if arguments.output.endswith((".html", ".htm")):
-            write_atomic(arguments.output, comparison_page(found))
+            write_atomic(arguments.output, comparison_page(together))
         else:
-            write_figure(Path(arguments.output), draw_comparison(found))
+            write_figure(Path(arguments.output), draw_comparison(together))
         say(f"comparison: {arguments.output}")
     return 0
 
 
 def analyze_together(arguments: Namespace) -> int:
     """Print the results of several sessions in one joint fit, as ``rig analyze A B`` does."""
-    alone = ("budget", "video", "session_trials", "priors", "scatter")
-    if options := [name for name in alone if getattr(arguments, name) not in {None, False}]:
+    single = ("budget", "video", "session_trials", "priors", "scatter")
+    if options := [name for name in single if getattr(arguments, name) not in {None, False}]:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in options)
         raise make_error(InputError, "option_for_one_session", options=names)
-    found = read_together(arguments)
+    together = read_together(arguments)
     if arguments.json:
-        print_json(found.json())
+        print_json(together.json())
     else:
-        show(pooled_lines(found))
-    return VOID if found.void else 0
+        show(pooled_lines(together))
+    return VOID if together.void else 0
 
 
 def read_together(arguments: Namespace) -> TogetherResults:
@@ -63,7 +63,7 @@ def read_together(arguments: Namespace) -> TogetherResults:
     with ExitStack() as open_files:
         files = [
             open_files.enter_context(Session.open(path, readonly=True))
-            for path in (arguments.session, *arguments.others)
+            for path in (arguments.session, *arguments.further)
         ]
         return results_together(
             files,

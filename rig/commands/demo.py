@@ -9,7 +9,7 @@ from argparse import Namespace
 from datetime import UTC, datetime
 from operator import itemgetter
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.analysis.result import GOOD
 from rig.commands import report
@@ -53,21 +53,21 @@ def main(arguments: Namespace) -> int:
         f"rig demo -o {quote(str(folder))} --repeats {arguments.repeats} --seed {arguments.seed}"
     )
     with goes_on(f"{again} continues it"):
-        return _dropped(protocol, session, arguments)
+        return _run_demo(protocol, session, arguments)
 
 
-def _dropped(protocol: Path, session: Path, arguments: Namespace) -> int:
+def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
     """Let chains fall, or those that have not fallen yet, and show what was found."""
     interrupts = Interrupts()
     with interrupts.caught():
-        told = narrator(str(protocol), None)
-        found = run_protocol(
-            str(protocol), "sim://", str(session), told, arguments.seed, interrupts
+        operator = narrator(str(protocol), None)
+        outcome = run_protocol(
+            str(protocol), "sim://", str(session), operator, arguments.seed, interrupts
         )
     print("SIMULATED DATA")
-    print("\n".join(beside_truth(found.analysis, session)))
+    print("\n".join(beside_truth(outcome.analysis, session)))
     with Session.open(session, readonly=True) as recorded:
-        show([impacts(recorded, found)])
+        show([impacts(recorded, outcome)])
     page = session.with_name("report.html")
     code = report.main(
         Namespace(
@@ -83,7 +83,7 @@ def _dropped(protocol: Path, session: Path, arguments: Namespace) -> int:
 
         webbrowser.open(page.absolute().as_uri())
     say(f"show it: rig tui --session {session}\nyour own set-up: rig new my.yaml")
-    return code or (VOID if any(one.verdict == "void" for one in found.analysis.runs) else 0)
+    return code or (VOID if any(run.verdict == "void" for run in outcome.analysis.runs) else 0)
 
 
 def beside_truth(analysis: Analysis, session: Path) -> list[str]:
@@ -99,10 +99,8 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     list of str
         A table, and how many intervals hold the truth.
     """
-    truths: dict[tuple[int, int], dict[str, Any]] = {}
-    for line in truth_file(session).read_text("utf-8").splitlines():
-        one = json.loads(line)
-        truths[one["run"], one["attempt"]] = one
+    lines = map(json.loads, truth_file(session).read_text("utf-8").splitlines())
+    truths = {(truth["run"], truth["attempt"]): truth for truth in lines}
     rows: list[dict[str, str]] = []
     held = of = 0
     measured = [row for row in averaged() if any(row.name in r.quantities for r in analysis.runs)]
@@ -134,19 +132,18 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
 def impacts(session: Session, results: SessionResults) -> str:
     """Say which β and μ the drops tell, beside those that the simulated board has."""
     try:
-        found = session_estimate(session, results).coefficients
+        coefficients = session_estimate(session, results).coefficients
     except InputError as error:
         return error.message
     parts = [
-        f"{symbol(one.name)} {plus_minus(one.least_squares)} (hidden: {one.stated.value:g})"
-        for one in (found.parameters if found else ())
-        if one.identified
+        f"{symbol(value.name)} {plus_minus(value.least_squares)} (hidden: {value.stated.value:g})"
+        for value in (coefficients.parameters if coefficients else ())
+        if value.identified
     ]
-    said = ", ".join(parts).replace("-", "−")
-    return f"from all impacts: {said or 'too few drops'}"
+    return f"from all impacts: {', '.join(parts).replace('-', '−') or 'too few drops'}"
 
 
 def _has_screen() -> bool:
     """Whether a page can be shown to somebody: a browser in a terminal would be in the way."""
-    shown = sys.platform == "darwin" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
-    return sys.stdout.isatty() and bool(shown)
+    seen = sys.platform == "darwin" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+    return sys.stdout.isatty() and bool(seen)

@@ -44,7 +44,7 @@ def main(arguments: Namespace) -> int:
     beams = beams_of(protocol)
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
-    components = stated(protocol) if arguments.learned is None else _learned(arguments.learned)
+    components = stated(protocol) if arguments.learned is None else _read_scatter(arguments.learned)
     lowest, highest, spacing = (
         _read_length(f"--{name}", getattr(arguments, name))
         for name in ("lowest", "highest", "spacing")
@@ -69,7 +69,7 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _learned(path: str) -> Components:
+def _read_scatter(path: str) -> Components:
     """Return the scatter of an earlier session of the same rig."""
     from rig.results import detailed  # noqa: PLC0415 - only with --learned
     from rig.session.store import Session  # noqa: PLC0415
@@ -127,13 +127,13 @@ def _forecast(
     }
 
 
-def design_text(found: Mapping[str, Any]) -> str:
+def design_text(design: Mapping[str, Any]) -> str:
     """Write layouts and their uncertainties, for a terminal."""
-    layouts = {name: found[name] for name in ("current", "proposed") if name in found}
+    layouts = {name: design[name] for name in ("current", "proposed") if name in design}
     cells = {name: _uncertainties(layout) for name, layout in layouts.items()}
-    rows = [[what, *(column[what] for column in cells.values())] for what in cells["current"]]
+    rows = [[name, *(column[name] for column in cells.values())] for name in cells["current"]]
     lines = [
-        f"expected standard uncertainties of {found['runs']} runs, with the {found['scatter']} "
+        f"expected standard uncertainties of {design['runs']} runs, with the {design['scatter']} "
         "scatter",
         "",
         *text_table([["quantity", *layouts], *rows], left={0}, rule=True),

@@ -23,26 +23,26 @@ def main(arguments: Namespace) -> int:
         folder = None if arguments.output is None else make_folder(arguments.output)
         check_open(session, protocol_of(session))
         show, fresh = progress("analysing run"), arguments.fresh
-        whole = results(session, show, fresh=fresh, with_joint_fit=True)
-        found = session_estimate(session, whole, show, fresh=fresh)
-    analysis, simulated = whole.analysis, whole.simulated
-    like = None if analysis.rig is None else analysis.rig.likeness
+        outcome = results(session, show, fresh=fresh, with_joint_fit=True)
+        estimate = session_estimate(session, outcome, show, fresh=fresh)
+    analysis, simulated = outcome.analysis, outcome.simulated
+    likeness = None if analysis.rig is None else analysis.rig.likeness
     sections = Sections()
     if arguments.json:
-        said: dict[str, Any] = {"simulated": simulated, **found.json()}
-        print_json(said if like is None else said | {"likeness": like.json()})
+        members: dict[str, Any] = {"simulated": simulated, **estimate.json()}
+        print_json(members if likeness is None else members | {"likeness": likeness.json()})
     else:
-        if like is not None and not like.like:
-            print(like.sentence)
-        print(estimate_text(found, sections, simulated=simulated))
+        if likeness is not None and not likeness.like:
+            print(likeness.sentence)
+        print(estimate_text(estimate, sections, simulated=simulated))
     if folder is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
-        kept = CacheEntry(dict, "estimate pictures", whole.digest, fresh=fresh)
-        drawn = kept.find()
+        entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
+        drawn = entry.find()
         if drawn is None:
-            drawn = estimate_pictures(found, sections, simulated=simulated)
-            drawn = drawn if sections.failed or found.failed else kept.keep(drawn)
+            drawn = estimate_pictures(estimate, sections, simulated=simulated)
+            drawn = drawn if sections.failed or estimate.failed else entry.keep(drawn)
         for name, picture in drawn.items():
             write_atomic(folder / f"{name}.svg", picture.svg)
             say(f"{folder / name}.svg")

@@ -22,14 +22,14 @@ def main(arguments: Namespace) -> int:
     """Write a session as CSV files."""
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
-        found = results(session, progress("analysing run"), fresh=arguments.fresh)
-        make = partial(_tables, session, found)
-        tables = recall(dict, make, "tables", found.digest, fresh=arguments.fresh)
+        outcome = results(session, progress("analysing run"), fresh=arguments.fresh)
+        make = partial(_tables, session, outcome)
+        tables = recall(dict, make, "tables", outcome.digest, fresh=arguments.fresh)
         for name, text in tables.items():
             write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")
-    return tell_damage(found.analysis)
+    return tell_damage(outcome.analysis)
 
 
-def _tables(session: Session, found: SessionResults) -> dict[str, str]:
-    return csv_files(session, found.json(), tick_rates(session))
+def _tables(session: Session, outcome: SessionResults) -> dict[str, str]:
+    return csv_files(session, outcome.json(), tick_rates(session))

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Flash a board and say what it is now."""
     with goes_on("the firmware may be incomplete; run the same command again"):
-        return _flashed(arguments)
+        return _flash(arguments)
 
 
-def _flashed(arguments: Namespace) -> int:
+def _flash(arguments: Namespace) -> int:
     board, port = arguments.board, arguments.port
     if board not in TARGETS:
         if arguments.avrdude is not None:
             raise InputError(f"--avrdude does not write a {DRIVE.board.name}", "leave it out")
-        found = flash_drive(arguments.drive, port, arguments.hex, say)
+        identity = flash_drive(arguments.drive, port, arguments.hex, say)
     elif arguments.drive is not None:
         raise InputError(f"--drive is for a {DRIVE.board.name}", "an Arduino has a --port")
     elif port is None:
@@ -32,9 +32,9 @@ def _flashed(arguments: Namespace) -> int:
             "rig flash: --port is missing", "such as --port /dev/ttyACM0; rig ports lists the ports"
         )
     else:
-        found = flash(board, port, arguments.hex, arguments.avrdude, say)
+        identity = flash(board, port, arguments.hex, arguments.avrdude, say)
     print(
-        f"{found.board}, {found.firmware}, {found.gates} gates, "
-        f"id {found.unique_id.hex()}: flashed and verified"
+        f"{identity.board}, {identity.firmware}, {identity.gates} gates, "
+        f"id {identity.unique_id.hex()}: flashed and verified"
     )
     return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.curves import model_curves
 from rig.analysis.session import Analysis
 from rig.analysis.summary import summarize
-from rig.commands.output import coloured, tinted
+from rig.commands.output import has_colours, tint
 from rig.printable import printable
 from rig.runner import narration
 from rig.tui.plots import inclined
@@ -50,11 +50,11 @@ class Growing:
     def say(self, line: str) -> None:
         """Say something that stays."""
         self._wipe()
-        self._write([tinted(printable(line))])
+        self._write([tint(printable(line))])
         self._height = 0
         self._draw()
 
-    def judged(self, result: DropResult, planned: int) -> None:
+    def show_result(self, result: DropResult, planned: int) -> None:
         """Draw what came of a drop; one that does not count is said too."""
         self._results[result.run.number] = result
         line = narration(result, planned)
@@ -86,11 +86,11 @@ class Growing:
         columns, rows = get_terminal_size()
         width = min(columns - 1, _WIDEST)
         runs = tuple(self._results[number] for number in sorted(self._results))
-        found = Analysis(runs, (), tuple(summarize(self._protocol, runs)))
-        shown = inclined(found, self._curves)[: max(1, (rows - 6) // _ROWS)]
+        analysis = Analysis(runs, (), tuple(summarize(self._protocol, runs)))
+        pictures = inclined(analysis, self._curves)[: max(1, (rows - 6) // _ROWS)]
         lines = [
-            "".join(map(_inked, row))
-            for picture in shown
+            "".join(map(_ink, row))
+            for picture in pictures
             for row in plotted(picture, width, _ROWS).rows
         ]
         self._write([*lines, self._last[:width]])
@@ -100,7 +100,7 @@ class Growing:
         self._height += len(lines)
 
 
-def _inked(span: Span) -> str:
-    if not coloured() or span.color not in _INKS:
+def _ink(span: Span) -> str:
+    if not has_colours() or span.color not in _INKS:
         return span.text
     return f"\x1b[{_INKS[span.color]}m{span.text}\x1b[0m"

@@ -24,11 +24,11 @@ def report(error: BaseException) -> int:
     int
         The exit code.
     """
-    now = datetime.now(UTC)
+    moment = datetime.now(UTC)
     packages = {name for name in sys.modules if "." not in name} - sys.stdlib_module_names
     versions = {name: vars(sys.modules[name]).get("__version__") for name in sorted(packages)}
     lines = [
-        f"{now.isoformat(timespec='seconds')}, process {os.getpid()}",
+        f"{moment.isoformat(timespec='seconds')}, process {os.getpid()}",
         f"command: {shlex.join(sys.argv)}",
         f"rig {__version__}, Python {sys.version}, {platform.platform()}",
         *(f"{name} {version}" for name, version in versions.items() if version and name != "rig"),
@@ -37,7 +37,7 @@ def report(error: BaseException) -> int:
     ]
     try:
         folder = make_folder(state_folder())
-        log = folder / f"internal-error-{now:%Y%m%dT%H%M%SZ}-{os.getpid()}.log"
+        log = folder / f"internal-error-{moment:%Y%m%dT%H%M%SZ}-{os.getpid()}.log"
         write_atomic(log, printable("\n".join(lines)))
         where = f"with the log at {log}"
     except RigError as failure:

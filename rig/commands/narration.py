@@ -32,4 +32,4 @@ def narrator(source: str, ask: Callable[[str], None] | None) -> Operator:
     from rig.commands.growing import Growing  # noqa: PLC0415 - only where somebody looks
 
     screen = Growing(protocol, sys.stderr)
-    return Operator(screen.say, screen.ask if ask else None, screen.judged)
+    return Operator(screen.say, screen.ask if ask else None, screen.show_result)

@@ -33,12 +33,12 @@ def say(line: str) -> None:
 
 
 @contextmanager
-def goes_on(how: str) -> Iterator[None]:
+def goes_on(hint: str) -> Iterator[None]:
     """Add to the message of Ctrl-C how to continue; see `rig.cli.main`."""
     try:
         yield
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(how) from None
+        raise KeyboardInterrupt(hint) from None
 
 
 _ODD = re.compile(r"\b(void|rejected|marginal|disagrees)\b")
@@ -54,15 +54,15 @@ def show(lines: Iterable[str]) -> None:
     width = get_terminal_size().columns
     for line in lines:
         for part in _broken(line, width):
-            print(tinted(part))
+            print(tint(part))
 
 
-def tinted(text: str) -> str:
+def tint(text: str) -> str:
     """Colour what is not as it should be, unless the reader wants none (no-color.org)."""
-    return _ODD.sub("\x1b[33m\\1\x1b[0m", text) if coloured() else text
+    return _ODD.sub("\x1b[33m\\1\x1b[0m", text) if has_colours() else text
 
 
-def coloured() -> bool:
+def has_colours() -> bool:
     """Whether a terminal may be given colours."""
     return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
@@ -76,16 +76,16 @@ def _broken(line: str, width: int) -> list[str]:
     return wrap(line, width, subsequent_indent=f"{indent}  ", break_on_hyphens=False)
 
 
-def progress(what: str) -> Callable[[int, int], None]:
+def progress(label: str) -> Callable[[int, int], None]:
     """Count up on one line of a terminal; silent elsewhere."""
 
     def show(done: int, of: int) -> None:
-        stage("" if done == of else f"{what} {done}/{of}")
+        stage("" if done == of else f"{label} {done}/{of}")
 
     return show
 
 
-def stage(what: str) -> None:
+def stage(label: str) -> None:
     """Say what is being worked on, on one line of a terminal that the next one takes; else nothing.
 
     Parameters
@@ -95,20 +95,20 @@ def stage(what: str) -> None:
     """
     if sys.stderr.isatty():
         with tolerated(sys.stderr):
-            print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
+            print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
 
 
 def leave_study(
-    folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
+    folder: Path, name: str, head: str, lines: Sequence[str], data: Mapping[str, Any],
     table: str, picture: str | None = None, *, as_json: bool,
 ) -> None:  # fmt: skip
     """Write the files of a study of simulated drops, see `write_study`, and print it."""
-    write_study(folder, name, head, lines, whole, table, picture)
-    print_found(whole, lambda: "\n".join(["SIMULATED DATA", *lines]), as_json=as_json)
+    write_study(folder, name, head, lines, data, table, picture)
+    print_found(data, lambda: "\n".join(["SIMULATED DATA", *lines]), as_json=as_json)
 
 
 def write_study(
-    folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
+    folder: Path, name: str, head: str, lines: Sequence[str], data: Mapping[str, Any],
     table: str, picture: str | None = None,
 ) -> None:  # fmt: skip
     """Write the files of a study.
@@ -122,7 +122,7 @@ def write_study(
     whole, table, picture
         All that was found; every line of it as CSV; as SVG, where there is a picture.
     """
-    json_text = json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
+    json_text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
     for kind, text in {"json": json_text, "csv": table, "svg": picture}.items():
         if text is not None:
             write_atomic(folder / f"{name}.{kind}", text)
@@ -144,44 +144,44 @@ def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bo
 
 def print_json(data: Mapping[str, Any]) -> None:
     """Print one JSON object; what lies deeper than a run's members has one line."""
-    print(_indented(data, 1))
+    print(_indent(data, 1))
 
 
 _DEEPEST = 3
 _encoded = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
-def _indented(value: object, level: int) -> str:
+def _indent(value: object, level: int) -> str:
     # Indenting all there is takes a tenth of the time of an analysis.
     if level > _DEEPEST or not isinstance(value, dict | list | tuple) or not value:
         return _encoded(value)
     begin, end = "{}" if isinstance(value, dict) else "[]"
     if isinstance(value, dict):
-        parts = [f"{_encoded(key)}: {_indented(one, level + 1)}" for key, one in value.items()]
+        parts = [f"{_encoded(key)}: {_indent(item, level + 1)}" for key, item in value.items()]
     else:
-        parts = [_indented(one, level + 1) for one in value]
+        parts = [_indent(item, level + 1) for item in value]
     margin = "\n" + level * "  "
     return f"{begin}{margin}{f',{margin}'.join(parts)}\n{(level - 1) * '  '}{end}"
 
 
 def print_results(
-    found: SessionResults, *, as_json: bool, more: Mapping[str, Any] = MappingProxyType({})
+    outcome: SessionResults, *, as_json: bool, members: Mapping[str, Any] = MappingProxyType({})
 ) -> int:
     """Print an analysis, as JSON with more members; the exit code says whether a run is void."""
     if as_json:
-        print_json({**found.json(), **more})
+        print_json({**outcome.json(), **members})
     else:
-        if found.simulated:
+        if outcome.simulated:
             print("SIMULATED DATA")
-        if found.blind:
+        if outcome.blind:
             print("BLIND: results stay hidden until rig unblind SESSION")
         from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
         from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 
-        if not found.blind:
-            show(summary_table(found.analysis.summary).splitlines())
-        show([*void_lines(found.analysis), *found.analysis.damage, *remarks(found)])
-    void = any(one.verdict == "void" for one in found.analysis.runs) or found.analysis.damaged
+        if not outcome.blind:
+            show(summary_table(outcome.analysis.summary).splitlines())
+        show([*void_lines(outcome.analysis), *outcome.analysis.damage, *remarks(outcome)])
+    void = any(run.verdict == "void" for run in outcome.analysis.runs) or outcome.analysis.damaged
     return VOID if void else 0
 
 

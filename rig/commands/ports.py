@@ -25,14 +25,15 @@ def main(arguments: Namespace) -> int:
     asked: dict[str, dict[str, Any]] = {}
     if arguments.identify is not None:
         chosen = arguments.identify or [port.path for port in ports if port.candidate]
-        asked = {path: _who(path) for path in chosen}
+        asked = {path: _identify(path) for path in chosen}
     if arguments.json:
         print_json({"ports": [_fields(port, asked) for port in _all(ports, asked)]})
         return 0
     for port in _all(ports, asked):
         print(_line(port, asked.get(port.path)))
-    ids = Counter(who["identity"]["unique_id"] for who in asked.values() if who["identity"])
-    for shared in (one for one, count in ids.items() if count > 1):
+    identities = (answer["identity"] for answer in asked.values() if answer["identity"])
+    ids = Counter(identity["unique_id"] for identity in identities)
+    for shared in (number for number, count in ids.items() if count > 1):
         say(f"several boards have the id {shared}: erase the EEPROM of all but one board")
     for drive in waiting_drives():
         say(f"a Pico waits for firmware at {drive}: rig flash --board pico")
@@ -41,7 +42,7 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _who(path: str) -> dict[str, Any]:
+def _identify(path: str) -> dict[str, Any]:
     """Ask who is at a port; what is wrong there is an answer too."""
     try:
         with closing(open_port(path)) as port:
@@ -60,22 +61,22 @@ def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPor
 
 
 def _fields(port: SerialPort, asked: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
-    shown = {"kind": port.kind, "candidate": port.candidate, "identity": None, "trouble": None}
-    return asdict(port) | shown | asked.get(port.path, {})
+    fields = {"kind": port.kind, "candidate": port.candidate, "identity": None, "trouble": None}
+    return asdict(port) | fields | asked.get(port.path, {})
 
 
-def _line(port: SerialPort, who: Mapping[str, Any] | None) -> str:
+def _line(port: SerialPort, answer: Mapping[str, Any] | None) -> str:
     parts = [port.path]
     if port.vid is not None and port.pid is not None:
         parts.append(f"USB {port.vid:04x}:{port.pid:04x}")
     if port.serial_number:
         parts.append(f"serial number {port.serial_number}")
     parts += filter(None, dict.fromkeys([port.product, port.kind]))
-    if who is None:
+    if answer is None:
         parts.append(f"skipped: {port.skipped}" if port.skipped else "a candidate")
-    elif who["identity"] is None:
-        parts.append(who["trouble"].replace("\n", ";"))
+    elif answer["identity"] is None:
+        parts.append(answer["trouble"].replace("\n", ";"))
     else:
-        identity = who["identity"]
+        identity = answer["identity"]
         parts.append(f"{identity['board']}, {identity['firmware']}, id {identity['unique_id']}")
     return "  ".join(parts)

@@ -10,7 +10,7 @@ from rig.commands.output import print_found, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED
-from rig.predictions import predictions
+from rig.predictions import group_notes, predictions
 from rig.protocol import reader
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import csv_text, text_table
@@ -39,40 +39,42 @@ def main(arguments: Namespace) -> int:
             "PROTOCOL is missing", "rig predict PROTOCOL, or rig predict --figure 3 -o FILE.svg"
         )
     protocol = reader.read(arguments.protocol)
-    found = predictions(protocol)
-    whole = {"predictions": [line.json() for line in found]}
-    print_found(whole, lambda: table(protocol, found), as_json=arguments.json)
+    lines = predictions(protocol)
+    data = {"predictions": [line.json() for line in lines]}
+    print_found(data, lambda: table(protocol, lines), as_json=arguments.json)
     return 0
 
 
-def table(protocol: Protocol, found: list[PredictedIncline]) -> str:
+def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     apart, end = SEPARATION, SPEED
+
+    def separation(line: PredictedIncline) -> str:
+        return _written(line.separation_m, line.separation_u_m, apart)
+
+    def speed(line: PredictedIncline) -> str:
+        return _written(line.speed_m_s, line.speed_u_m_s, end)
+
     columns: dict[str, Callable[[PredictedIncline], str]] = {
-        "incline (°)": lambda one: degrees(one.incline_deg),
-        "strikes": lambda one: one.impact_chain or "",
-        "α": lambda one: fixed(one.alpha, 4),
-        f"{apart.symbol} ± U ({apart.unit})": lambda one: _written(
-            one.separation_m, one.separation_u_m, apart
-        ),
-        f"{end.symbol} ± U ({end.unit})": lambda one: _written(one.speed_m_s, one.speed_u_m_s, end),
-        "t (s)": lambda one: fixed(one.fall_time_s, 5),
-        "model": lambda one: one.model,
+        "incline (°)": lambda line: degrees(line.incline_deg),
+        "strikes": lambda line: line.impact_chain or "",
+        "α": lambda line: fixed(line.alpha, 4),
+        f"{apart.symbol} ± U ({apart.unit})": separation,
+        f"{end.symbol} ± U ({end.unit})": speed,
+        "t (s)": lambda line: fixed(line.fall_time_s, 5),
+        "model": lambda line: line.model,
     }
     if not protocol.two_chains:
         del columns[f"{apart.symbol} ± U ({apart.unit})"]
     if protocol.surface is None:
-        speed = {f"speed ({end.unit})": lambda one: fixed(one.speed_m_s, 4)}
-        columns = speed | {name: columns[name] for name in ("t (s)", "model")}
-    shown = {name: [tell(one) for one in found] for name, tell in columns.items()}
-    rows = [[name, *(text or "–" for text in texts)] for name, texts in shown.items() if any(texts)]
-    said: dict[str, list[str]] = {}
-    for line in found:
-        for note in line.notes:
-            said.setdefault(note, []).append(line.label)
-    notes = [f"{', '.join(labels)}: {note}" for note, labels in said.items()]
+        columns = {f"speed ({end.unit})": lambda line: fixed(line.speed_m_s, 4)} | {
+            name: columns[name] for name in ("t (s)", "model")
+        }
+    cells = {name: [tell(line) for line in lines] for name, tell in columns.items()}
+    rows = [[name, *(text or "–" for text in texts)] for name, texts in cells.items() if any(texts)]
+    notes = group_notes(lines)
     if protocol.surface is not None:
-        free = dict.fromkeys(fixed(one.free_fall_speed_m_s, 4) for one in found)
+        free = dict.fromkeys(fixed(line.free_fall_speed_m_s, 4) for line in lines)
         notes.insert(0, f"free fall: {end.symbol} = {' or '.join(free)} {end.unit}")
     words = {place for place, row in enumerate(rows) if row[0] in {"strikes", "model"}}
     return "\n".join([*text_table([*zip(*rows, strict=True)], left=words), *notes])
@@ -96,7 +98,7 @@ def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     kind_of(picture)
     check_place(picture)
-    falls = _resolved(number) if resolved else None
+    falls = _resolve(number) if resolved else None
     drawing, columns = paper_figure(number, falls)
     write_figure(picture, drawing)
     written = {path.with_suffix(".csv"): _table(columns)}
@@ -112,7 +114,7 @@ def _table(columns: Mapping[str, list[float]]) -> str:
     return csv_text(columns, rows)
 
 
-def _resolved(number: int) -> dict[str, list[float]]:
+def _resolve(number: int) -> dict[str, list[float]]:
     """Let the figure's chains fall in the resolved world."""
     from rig.bench import resolved_paper  # noqa: PLC0415 - only where chains really fall
 

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Say what is whole; save it where that is wanted."""
-    found = examine(arguments.session)
-    print("\n".join(describe(found)))
+    damage = examine(arguments.session)
+    print("\n".join(describe(damage)))
     if arguments.output is None:
-        if not found.whole and not found.foreign:
+        if not damage.whole and not damage.foreign:
             say("rig recover SESSION -o NEW saves it")
-        return 0 if found.whole else SessionError.exit_code
-    missing = save(found, arguments.output, arguments.protocol)
-    for what in missing:
-        say(f"not saved: {what}")
-    say(f"{arguments.output}: {len(found.drops)} drops; rig analyze computes their results")
+        return 0 if damage.whole else SessionError.exit_code
+    missing = save(damage, arguments.output, arguments.protocol)
+    for record in missing:
+        say(f"not saved: {record}")
+    say(f"{arguments.output}: {len(damage.drops)} drops; rig analyze computes their results")
     return 0

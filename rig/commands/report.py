@@ -53,31 +53,31 @@ def main(arguments: Namespace) -> int:
     check_place(arguments.output)
     with Session.open(arguments.session, readonly=True) as session:
         fresh = arguments.fresh
-        found = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=True)
+        outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=True)
         # The page has the file's name; how simulated chains moved lies beside the file.
         content = session.path.name, arguments.bars, film_digest(session.path)
-        kept = CacheEntry(_Page, found.digest, content, fresh=fresh)
-        page = kept.find()
+        entry = CacheEntry(_Page, outcome.digest, content, fresh=fresh)
+        page = entry.find()
         if page is None:
-            page = _page(session, found, arguments.bars, fresh=fresh)
-            page = page if page.failed else kept.keep(page)
+            page = _page(session, outcome, arguments.bars, fresh=fresh)
+            page = page if page.failed else entry.keep(page)
     write_atomic(arguments.output, page.html)
     if arguments.figures is not None:
         _write_figures(Path(arguments.figures), page.figures)
     for sentence in page.failed:
         say(sentence)
     say(f"report: {arguments.output}")
-    return tell_damage(found.analysis)
+    return tell_damage(outcome.analysis)
 
 
-def _page(session: Session, found: SessionResults, bars: Bars, *, fresh: bool) -> _Page:
+def _page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: bool) -> _Page:
     """Draw the figures and write the page around them."""
     protocol = protocol_of(session)
     sections = Sections()
     stage("drawing figures")
     curves = sections.make("The model's curve", lambda: model_curves(protocol))
     figures = pictures(
-        found.analysis,
+        outcome.analysis,
         curves,
         session.simulated,
         skew_limit_s=protocol.accept.release_skew,
@@ -86,13 +86,13 @@ def _page(session: Session, found: SessionResults, bars: Bars, *, fresh: bool) -
         films=read_films(session.path) if session.simulated else None,
         sections=sections,
     )
-    effects = found.analysis.effects
+    effects = outcome.analysis.effects
     compared = sections.make("The paired differences", lambda: list(effects_parts(effects)))
     stage("estimating the impacts")
-    summary = found.analysis.summary
+    summary = outcome.analysis.summary
     gates = sections.make("The table of gates", lambda: list(gate_parts(summary)))
     estimated = sections.make(
-        "The estimate of the impacts", lambda: _estimated(session, found, fresh=fresh)
+        "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
     )
     parts: list[Part] = []
     if estimated is not None:
@@ -101,13 +101,13 @@ def _page(session: Session, found: SessionResults, bars: Bars, *, fresh: bool) -
         figures += drawn.values()
         parts = list(page_parts(estimated, sections))
     stage("writing the page")
-    timelines, data = timelines_and_data(session, protocol, found)
+    timelines, data = timelines_and_data(session, protocol, outcome)
     figures = in_order(figures)
     name = session.path.name
     html = report_html(
         ReportContext(
             title=protocol.title,
-            analysis=found.analysis,
+            analysis=outcome.analysis,
             simulated=session.simulated,
             figures=figures,
             protocol_text=session.protocol_text,
@@ -121,10 +121,10 @@ def _page(session: Session, found: SessionResults, bars: Bars, *, fresh: bool) -
                 "analysed with": f"rig {__version__}, {', '.join(map(_version, _NUMERICS))}",
             },
             identities=[identity for _, identity in session.identities()],
-            clock=found.clock.details,
-            notes=[*found.analysis.damage, *remarks(found)],
-            operator_notes=_noted(session),
-            deviations=deviations(protocol, found.analysis, session.states()),
+            clock=outcome.clock.details,
+            notes=[*outcome.analysis.damage, *remarks(outcome)],
+            operator_notes=_operator_notes(session),
+            deviations=deviations(protocol, outcome.analysis, session.states()),
             parts=parts,
             effects=[*(gates or ()), *(compared or ())],
             timelines=timelines,
@@ -146,17 +146,17 @@ def _version(package: str) -> str:
     return f"{package} {version(package)}"
 
 
-def _noted(session: Session) -> list[str]:
+def _operator_notes(session: Session) -> list[str]:
     """Tell what operators noted to drops."""
     return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
 
 
-def _estimated(session: Session, found: SessionResults, *, fresh: bool) -> SessionEstimate | None:
+def _estimate(session: Session, outcome: SessionResults, *, fresh: bool) -> SessionEstimate | None:
     """What the impacts have in common; `None` where there are none, or none is good."""
-    good = any(run.verdict in GOOD for run in found.analysis.runs)
-    if protocol_of(session).surface is None or found.blind or not good:
+    good = any(run.verdict in GOOD for run in outcome.analysis.runs)
+    if protocol_of(session).surface is None or outcome.blind or not good:
         return None
-    return session_estimate(session, found, fresh=fresh)
+    return session_estimate(session, outcome, fresh=fresh)
 
 
 def _write_figures(folder: Path, figures: Sequence[str]) -> None:

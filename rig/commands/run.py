@@ -23,7 +23,7 @@ def main(arguments: Namespace) -> int:
     operator = narrator(arguments.protocol, _ask if attended else None)
     interrupts = Interrupts()
     with goes_on("the same command continues the session"), interrupts.caught():
-        found = run_protocol(
+        outcome = run_protocol(
             arguments.protocol,
             arguments.port,
             arguments.session,
@@ -32,9 +32,9 @@ def main(arguments: Namespace) -> int:
             interrupts,
             None if arguments.socket is None else Path(arguments.socket),
         )
-        code = print_results(found, as_json=arguments.json)
+        code = print_results(outcome, as_json=arguments.json)
     say(f"session: {arguments.session}")
-    say(f"{raised(counted(found.analysis))}." if found.blind else finding(found.analysis))
+    say(f"{raised(counted(outcome.analysis))}." if outcome.blind else finding(outcome.analysis))
     return code
 
 

@@ -51,8 +51,8 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 
     def show(done: int) -> None:
         rate = done / (time.monotonic() - start)
-        left = (size - done) / rate
-        stage(f"{done / size:4.0%} of {size} points, {rate:.3g}/s, {left:.0f} s left")
+        rest = (size - done) / rate
+        stage(f"{done / size:4.0%} of {size} points, {rate:.3g}/s, {rest:.0f} s left")
 
     try:
         with _executor(jobs, address, -(-size // length)) as (executor, workers):

@@ -31,11 +31,11 @@ def main(arguments: Namespace) -> int:
             "without a terminal: rig run PROTOCOL --port URL --session FILE",
         )
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
-    asyncio.run(_shown(RigApp(options, keys, loaded=gc.freeze)))
+    asyncio.run(_show(RigApp(options, keys, loaded=gc.freeze)))
     return 0
 
 
-async def _shown(app: RigApp) -> None:
+async def _show(app: RigApp) -> None:
     """Show it until it ends. For Textual a signal is an end like any other, for a shell it is not.
 
     Raises
@@ -80,11 +80,11 @@ def _options(arguments: Namespace) -> Options:
 
 def _last() -> Path | None:
     """Find the session that was written last in this folder."""
-    found = []
+    sessions = []
     for path in Path().glob("*.session"):
         with suppress(OSError):  # gone meanwhile
-            found.append((path.stat().st_mtime_ns, path))
-    return max(found)[1] if found else None
+            sessions.append((path.stat().st_mtime_ns, path))
+    return max(sessions)[1] if sessions else None
 
 
 def _fresh() -> Path:

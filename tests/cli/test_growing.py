@@ -63,10 +63,10 @@ def test_a_picture_is_drawn_over_and_what_is_odd_stays(size):
     growing.say("the rig is ready")
     heights = []
     for run in planned[:3]:
-        growing.judged(dropped(run), len(planned))
+        growing.show_result(dropped(run), len(planned))
         heights.append(len(screen(terminal.getvalue())))
     assert len(set(heights)) == 1
-    growing.judged(dropped(planned[3], "void", "release skew -5.10 ms"), len(planned))
+    growing.show_result(dropped(planned[3], "void", "release skew -5.10 ms"), len(planned))
     lines = screen(terminal.getvalue())
     assert lines[0] == "the rig is ready"
     assert lines[1].startswith("run 4/4")
@@ -81,7 +81,7 @@ def test_a_tall_terminal_shows_the_speed_too(size):
     size(120, 40)
     protocol = reader.parse(short("[40 deg]", 1))
     terminal = Terminal()
-    Growing(protocol, terminal).judged(dropped(runs(protocol)[0]), 1)
+    Growing(protocol, terminal).show_result(dropped(runs(protocol)[0]), 1)
     assert "V (m/s)" in terminal.getvalue()
 
 
@@ -110,4 +110,4 @@ def test_colours_and_broken_sentences_are_for_terminals(size, monkeypatch):
         else:
             assert told == lines
     monkeypatch.setenv("NO_COLOR", "1")
-    assert output.tinted("void") == "void"
+    assert output.tint("void") == "void"
